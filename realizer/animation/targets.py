@@ -1,0 +1,66 @@
+"""The fixed axis of what can be animated: AUs by side, the 68 FAPs, and how far a region is taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+from realizer import tables
+
+__all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence"]
+
+# How far (0..1) a layer has taken a region from what lies below it: speech takes the lips,
+# a temporary gaze takes eyes and head from the base gaze.
+PRESENCES = ("lips", "eyes", "head")
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One column of the axis. `name` is "12L" for an AU, "open_jaw" for a FAP, "lips" for a presence."""
+
+    name: str
+    column: int
+
+
+@cache
+def axis() -> dict[str, Target]:
+    """Name -> Target of every column: the AUs (one column a side where they have sides), 68 FAPs, presences."""
+    names = [*_au_names(), *(row.name for row in tables.faps()), *PRESENCES]
+    return {name: Target(name, column) for column, name in enumerate(names)}
+
+
+@cache
+def _au_names() -> tuple[str, ...]:
+    """ "1L", "1R", ... "17", ...: ascending AU number, left before right."""
+    names: list[str] = []
+    for row in tables.action_units():
+        names += [f"{row.au}L", f"{row.au}R"] if row.sides else [str(row.au)]
+    return tuple(names)
+
+
+def AU_NAMES() -> tuple[str, ...]:  # noqa: N802
+    """Names of the AU columns, in order: the `au.names` of the JSON."""
+    return _au_names()
+
+
+def au(number: int, side: str = "BOTH") -> tuple[Target, ...]:
+    """The columns of one AU; side is LEFT, RIGHT or BOTH (the character's). A midline AU has one column.
+
+    Raises:
+        KeyError: no such AU.
+    """
+    columns = axis()
+    if str(number) in columns:
+        return (columns[str(number)],)
+    sides = {"LEFT": "L", "RIGHT": "R", "BOTH": "LR"}[side]
+    return tuple(columns[f"{number}{s}"] for s in sides)
+
+
+def fap(number: int) -> Target:
+    """The column of one FAP, 1..68."""
+    return axis()[tables.faps()[number - 1].name]
+
+
+def presence(region: str) -> Target:
+    """The column that says how far a region ("lips", "eyes", "head") is taken."""
+    return axis()[region]

@@ -1,0 +1,120 @@
+"""The values of step 2 and 3: what a behaviour wants of time, and the times it got."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Float64
+
+__all__ = ["Schedule", "Timing", "Warning"]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What one behaviour wants of time: k sync points, k-1 gaps.
+
+    Attributes:
+        points: k sync point names in chronological order, such as ("start", "attackPeak", "relax", "end").
+        preferred: (k-1,) float64 seconds, the length each gap would like.
+        least: (k-1,) float64 seconds, the length each gap must have.
+        stiffness: (k-1,) float64 > 0, the a of a (t[i+1] - t[i] - preferred[i])^2 (Paul 2010, 3.3.3).
+        rigid: every gap is exactly its preferred length (speech); stiffness and least do not count then.
+    """
+
+    points: tuple[str, ...]
+    preferred: Float64
+    least: Float64
+    stiffness: Float64
+    rigid: bool = False
+
+    def __post_init__(self) -> None:
+        gaps = (len(self.points) - 1,)
+        for name in ("preferred", "least", "stiffness"):
+            value = np.asarray(getattr(self, name), np.float64)
+            if value.shape != gaps:
+                raise ValueError(
+                    f"{name}: wanted shape {gaps} for {len(self.points)} points, got {value.shape}"
+                )
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True)
+class Warning:  # noqa: A001 - the standard's word
+    """One BML warning: `id` is a block or "block:behaviour", `type` of the standard's list."""
+
+    id: str
+    type: str
+    text: str
+
+    def to_json(self) -> dict[str, str]:
+        return {"id": self.id, "type": self.type, "text": self.text}
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The sync times of one block.
+
+    Attributes:
+        block: the block's id.
+        points: behaviour id -> its k sync point names, in order. Dropped behaviours are absent.
+        times: behaviour id -> (k,) float64, seconds from block start.
+        start: seconds on the session clock; 0 for a block planned on its own.
+        warnings: one per thing that was dropped.
+        cost: the sum of a (gap - preferred)^2 that remains.
+        failed: the whole block was refused (a required part cannot hold); times is empty then.
+    """
+
+    block: str
+    points: Mapping[str, tuple[str, ...]]
+    times: Mapping[str, Float64]
+    start: float = 0.0
+    warnings: tuple[Warning, ...] = ()
+    cost: float = 0.0
+    failed: bool = False
+    character: str | None = field(default=None, compare=False)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from block start to the last behaviour's end; 0 for an empty block."""
+        return max((float(t[-1]) for t in self.times.values()), default=0.0)
+
+    @property
+    def end(self) -> float:
+        """When the block ends, on the session clock."""
+        return self.start + self.duration
+
+    @property
+    def behaviours(self) -> dict[str, dict[str, float]]:
+        """{behaviour id: {sync point: seconds from block start}}."""
+        return {
+            b: {p: float(t) for p, t in zip(self.points[b], times, strict=True)}
+            for b, times in self.times.items()
+        }
+
+    def at(self, behaviour: str, sync: str) -> float:
+        """Seconds from block start of one sync point.
+
+        Raises:
+            KeyError: no such behaviour (or it was dropped), or no such sync point.
+        """
+        try:
+            return float(self.times[behaviour][self.points[behaviour].index(sync)])
+        except ValueError:
+            raise KeyError(f"{behaviour}:{sync}") from None
+
+    def __getitem__(self, behaviour: str) -> dict[str, float]:
+        return {p: float(t) for p, t in zip(self.points[behaviour], self.times[behaviour], strict=True)}
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON of `realizer schedule --json`."""
+        return {
+            "block": self.block,
+            "start": self.start,
+            "end": self.end,
+            "behaviours": self.behaviours,
+            "warnings": [w.to_json() for w in self.warnings],
+        }

@@ -1,0 +1,88 @@
+"""What a voice makes of a text: sound, and the times of words, phonemes and marks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from realizer.arrays import Int16
+
+__all__ = ["Phoneme", "Say", "Utterance", "Voice", "Word"]
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """What a voice is asked to say.
+
+    Attributes:
+        ssml: the content of <speak>: text with <mark name="x"/> and the SSML elements the document used;
+            plain text has its <, > and & escaped.
+        marks: names of the marks in the order of the text.
+        language: BCP-47, such as "en-US".
+        voice: name of a voice, or None for the language's default.
+        rate: 1 is the voice's own rate, 2 twice as fast.
+    """
+
+    ssml: str
+    marks: tuple[str, ...] = ()
+    language: str = "en-US"
+    voice: str | None = None
+    rate: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    start: float
+    end: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Phoneme:
+    """One phoneme; `ipa` is "" for a pause, `stress` 0 none, 1 primary, 2 secondary."""
+
+    start: float
+    end: float
+    ipa: str
+    stress: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Utterance:
+    """Speech with its times; all in seconds from its start.
+
+    Attributes:
+        duration: seconds; the PCM is exactly this long where there is any.
+        sample_rate: Hz; 0 where there is no sound (silent voice).
+        pcm: (n,) int16 mono, or None.
+        words, phonemes: in order; phonemes do not overlap.
+        marks: mark name -> seconds.
+        warnings: sentences for the client, such as "the text is empty".
+    """
+
+    duration: float
+    words: tuple[Word, ...]
+    phonemes: tuple[Phoneme, ...]
+    marks: Mapping[str, float]
+    sample_rate: int = 0
+    pcm: Int16 | None = None
+    warnings: tuple[str, ...] = field(default=())
+
+
+class Voice(Protocol):
+    """Anything that turns text with marks into an utterance; one method, blocking, callable from any thread."""
+
+    name: str
+
+    def say(self, request: Say) -> Utterance:
+        """Speak.
+
+        Raises:
+            VoiceError: the engine is missing or died; the text says what to do. The next call works again.
+        """
+        ...
+
+    def close(self) -> None:
+        """End the engine's process, if it has one. May be called twice."""
+        ...
