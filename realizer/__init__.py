@@ -1,0 +1,82 @@
+"""Send it BML, get a living face.
+
+realize(text)   documents in, schedule, FAP frames, sound and feedback out; no clock
+schedule(text)  the sync times alone
+Player          blocks alive in a session, told the time
+load_face(name) a face folder as arrays
+serve(settings) the service
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from realizer.errors import (
+        FaceError,
+        RealizerError,
+        RenderError,
+        ScheduleError,
+        TableError,
+        VoiceError,
+    )
+    from realizer.face import load_face
+    from realizer.face.model import Face
+    from realizer.pipeline import Realization, realize, schedule
+    from realizer.player import Player
+    from realizer.scheduling.timing import Schedule
+    from realizer.server.serve import serve
+    from realizer.settings import Settings
+
+__version__ = "0.1.0"
+
+# Where each public name lives. They are imported on first use: `import realizer` stays quick, and works
+# where an optional part is missing.
+_HOMES = {
+    "Face": "realizer.face.model",
+    "FaceError": "realizer.errors",
+    "Player": "realizer.player",
+    "RealizerError": "realizer.errors",
+    "Realization": "realizer.pipeline",
+    "RenderError": "realizer.errors",
+    "Schedule": "realizer.scheduling.timing",
+    "ScheduleError": "realizer.errors",
+    "Settings": "realizer.settings",
+    "TableError": "realizer.errors",
+    "VoiceError": "realizer.errors",
+    "load_face": "realizer.face",
+    "realize": "realizer.pipeline",
+    "schedule": "realizer.pipeline",
+    "serve": "realizer.server.serve",
+}
+
+__all__ = [
+    "Face",
+    "FaceError",
+    "Player",
+    "Realization",
+    "RealizerError",
+    "RenderError",
+    "Schedule",
+    "ScheduleError",
+    "Settings",
+    "TableError",
+    "VoiceError",
+    "load_face",
+    "realize",
+    "schedule",
+    "serve",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'realizer' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

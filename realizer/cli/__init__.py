@@ -1,0 +1,67 @@
+"""The command line: one module a command, exit status 0 done, 1 refused, 2 wrong usage, 3 something is missing."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+import realizer
+from realizer.cli.demo import demo
+from realizer.cli.doctor import doctor
+from realizer.cli.faces import faces
+from realizer.cli.lists import outputs, voices
+from realizer.cli.play import check, realize, schedule
+from realizer.cli.serve import serve
+from realizer.errors import RealizerError
+
+__all__ = ["main"]
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(realizer.__version__, prog_name="realizer")
+@click.option("-v", "--verbose", is_flag=True, help="Say more on standard error.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors on standard error.")
+@click.pass_context
+def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
+    """Send it BML, get a living face.
+
+    \b
+    realizer demo                          play the examples, leave a film, open a page
+    realizer serve                         take BML over a WebSocket, stream faces back
+    realizer realize hello.bml -o hello.mp4
+    realizer schedule hello.bml            when every sync point falls
+    realizer check hello.bml               every fault, with line and path
+
+    DOC may be - for standard input. Settings may also come from REALIZER_* variables.
+    """
+    import logging
+
+    level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
+    logging.basicConfig(level=level, format="realizer: %(message)s", stream=sys.stderr)
+    context.obj = {"quiet": quiet, "verbose": verbose}
+
+
+for command in (serve, realize, schedule, check, faces, voices, outputs, doctor, demo):
+    cli.add_command(command)
+
+
+def main() -> None:
+    """Run the command line; never shows a traceback for a fault that has words."""
+    try:
+        status = cli(standalone_mode=False)
+        sys.exit(status if isinstance(status, int) else 0)
+    except click.exceptions.Exit as end:
+        sys.exit(end.exit_code)
+    except click.Abort:
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except RealizerError as error:
+        click.echo(f"realizer: {error}", err=True)
+        sys.exit(3)
+    except BrokenPipeError:
+        # The reader of our output went away (`realizer ... | head`): that is not our fault.
+        sys.stderr.close()
+        sys.exit(0)

@@ -1,0 +1,73 @@
+"""`demo`: the examples played over the wire and filmed, and a page to look at."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import click
+
+__all__: list[str] = []
+
+FILM, FRAMES = Path("demo.mp4"), Path("demo.fap")
+
+
+@click.command()
+@click.option("--once", is_flag=True, help="End when the examples have been played.")
+@click.option("--port", default=8765, show_default=True, help="Of the page; a free one is taken if it is in use.")
+@click.option("--voice", metavar="NAME", help="A voice of `realizer voices`.")
+@click.option("--face", default="default", show_default=True, help="A face of `realizer faces list`.")
+def demo(once: bool, port: int, voice: str | None, face: str) -> None:
+    """Play the examples: serve them, film them, and give the page's address.
+
+    Leaves demo.mp4 and demo.fap in the current folder.
+    """
+    from realizer.examples import examples
+
+    documents = examples()
+    _film(list(documents.values()), voice, face)
+    asyncio.run(_serve(documents, once, port, voice, face))
+
+
+def _film(documents: list[str], voice: str | None, face: str) -> None:
+    """All examples one after the other into demo.fap and demo.mp4."""
+    from realizer.cli.options import find_voice
+    from realizer.errors import RealizerError
+    from realizer.outputs import output_for
+    from realizer.outputs.output import Drawing
+    from realizer.pipeline import realize
+
+    appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
+    realization = realize(appended, face=face, voice=find_voice(voice))
+    for path in (FRAMES, FILM):
+        click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
+        try:
+            output_for(path).write(realization, path, Drawing())
+        except RealizerError as error:
+            click.echo(f"realizer: {path} was left out: {error}", err=True)
+
+
+async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | None, face: str) -> None:
+    """Serve, send every example as a client would, print its feedback."""
+    from realizer.client import connect
+    from realizer.server.serve import Server
+    from realizer.settings import Settings
+
+    settings = Settings.read({"port": port, "voice": voice, "face": face})
+    try:
+        server = await Server(settings).start()
+    except OSError:
+        server = await Server(settings.model_copy(update={"port": 0})).start()
+    try:
+        click.echo(f"page: http://{settings.host}:{server.port}/?session=demo")
+        async with connect(f"ws://{settings.host}:{server.port}/ws?session=demo") as client:
+            for name, text in documents.items():
+                click.echo(f"\n{name}")
+                await client.send(text)
+                async for feedback in client.until_end():
+                    click.echo(f"  {feedback.to_xml()}")
+        if not once:
+            click.echo("\nthe page is open for you; Ctrl-C ends")
+            await server.wait_closed()
+    finally:
+        await server.close()

@@ -1,0 +1,85 @@
+"""Arguments that several commands share."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from realizer.behaviours.kind import Position
+from realizer.scheduling.timing import Warning
+
+__all__: list[str] = []
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+documents = click.argument("documents", nargs=-1, required=True, metavar="DOC...", type=click.Path(allow_dash=True))
+
+
+def playing(command: Command) -> Command:
+    """--voice, --scene and --strict."""
+    for option in (
+        click.option("--strict", is_flag=True, help="Exit 1 if any behaviour was dropped."),
+        click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z."),
+        click.option("--voice", metavar="NAME", help="A voice of `realizer voices`."),
+    ):
+        command = option(command)
+    return command
+
+
+def read_documents(names: Iterable[str]) -> list[bytes]:
+    """The bytes of every document; `-` is standard input.
+
+    Raises:
+        click.UsageError: a file that cannot be read.
+    """
+    texts = []
+    for name in names:
+        try:
+            texts.append(sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes())
+        except OSError as error:
+            raise click.UsageError(f"{name}: {error.strerror}") from None
+    return texts
+
+
+def read_scene(path: str | None) -> dict[str, Position] | None:
+    from realizer.pipeline import parse_scene
+
+    if path is None:
+        return None
+    try:
+        return parse_scene(Path(path).read_text("utf-8"))
+    except ValueError as error:
+        raise click.UsageError(f"{path}: {error}") from None
+
+
+def find_voice(name: str | None) -> Any:
+    """The voice, with a word on standard error where there is no sound."""
+    from realizer.speech import find_voice as find
+
+    voice = find(name)
+    if name is None and voice.name == "silent":
+        from realizer.speech import voices
+
+        missing = next((v.says for v in voices() if not v.available), "")
+        click.echo(f"realizer: no voice is installed, speech is silent; {missing}", err=True)
+    return voice
+
+
+def tell(warnings: Iterable[Warning]) -> None:
+    """Warnings of documents, one line each, on standard error."""
+    for warning in warnings:
+        click.echo(f"{warning.id}: {warning.type}: {warning.text}", err=True)
+
+
+def size(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, int]:
+    """512x512 -> (512, 512)."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", value)
+    width, height = (int(n) for n in match.groups()) if match else (0, 0)
+    if not (16 <= width <= 4096 and 16 <= height <= 4096):
+        raise click.BadParameter(f"wanted WIDTHxHEIGHT between 16x16 and 4096x4096, got {value!r}")
+    return width, height

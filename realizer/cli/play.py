@@ -1,0 +1,142 @@
+"""`realize`, `schedule` and `check`: documents played without a clock."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from realizer.cli import options
+
+__all__: list[str] = []
+
+
+@click.command()
+@options.documents
+@click.option("-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding. Default: JSON here.")
+@click.option("--fps", default=25.0, show_default=True, type=click.FloatRange(0, 240, min_open=True))
+@click.option("--at", type=click.FloatRange(0), metavar="SECONDS", help="With .png: the picture of that instant.")
+@click.option("--face", default="default", show_default=True, help="A face of `realizer faces list`.")
+@click.option("--size", default="512x512", show_default=True, callback=options.size, help="Of pictures.")
+@click.option("--camera", default="front", show_default=True, help="front, three-quarter, profile or close.")
+@click.option("--seed", default=0, show_default=True, help="Of idle motion: the same seed, the same bytes.")
+@click.option("--no-idle", is_flag=True, help="No blinks, no small head motion.")
+@options.playing
+@click.pass_context
+def realize(
+    context: click.Context,
+    documents: tuple[str, ...],
+    output: str | None,
+    fps: float,
+    at: float | None,
+    face: str,
+    size: tuple[int, int],
+    camera: str,
+    seed: int,
+    no_idle: bool,
+    voice: str | None,
+    scene: str | None,
+    strict: bool,
+) -> int:
+    """Play documents offline and write frames, pictures, sound or film.
+
+    Several documents are submitted at 0 s in order; their composition attributes apply.
+    """
+    from realizer.outputs import output_for
+    from realizer.outputs.output import Drawing
+    from realizer.pipeline import realize as run
+
+    writer = None
+    if output not in (None, "-"):
+        try:
+            writer = output_for(Path(output))
+        except ValueError as error:
+            raise click.BadParameter(str(error), param_hint="-o") from None
+    texts = options.read_documents(documents)
+    realization = run(
+        texts,
+        face=face,
+        fps=fps,
+        voice=options.find_voice(voice),
+        scene=options.read_scene(scene),
+        seed=seed,
+        idle=not no_idle,
+    )
+    options.tell(realization.warnings)
+    if writer is None:
+        json.dump(realization.to_json(), sys.stdout)
+        sys.stdout.write("\n")
+    elif output is not None:
+        try:
+            writer.write(realization, Path(output), Drawing(size=size, camera=camera, at=at))
+        except OSError as error:
+            raise click.UsageError(f"{output}: {error.strerror or error}") from None
+        if not context.obj["quiet"]:
+            words = f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {fps:g} fps"
+            click.echo(words, err=True)
+    return 1 if realization.refused or (strict and realization.warnings) else 0
+
+
+@click.command()
+@options.documents
+@click.option("--json", "as_json", is_flag=True, help="As JSON instead of a table.")
+@options.playing
+def schedule(
+    documents: tuple[str, ...], as_json: bool, voice: str | None, scene: str | None, strict: bool
+) -> int:
+    """Print when every sync point falls, in seconds from block start."""
+    from realizer.pipeline import play
+    from realizer.player import Player
+
+    player = Player(scene=options.read_scene(scene), idle=False)
+    schedules, refused = play(options.read_documents(documents), player, options.find_voice(voice))
+    options.tell(w for w in refused if not any(w in s.warnings for s in schedules))
+    for planned in schedules:
+        options.tell(planned.warnings)
+    if as_json:
+        out: Any = [s.to_json() for s in schedules]
+        click.echo(json.dumps(out[0] if len(out) == 1 and len(documents) == 1 else out, indent=1))
+    else:
+        for planned in schedules:
+            click.echo(f"{planned.block}  {planned.start:.3f} .. {planned.end:.3f} s")
+            width = max((len(b) for b in planned.times), default=0)
+            for behaviour, times in planned.behaviours.items():
+                points = "  ".join(f"{name} {time:.3f}" for name, time in times.items())
+                click.echo(f"  {behaviour:<{width}}  {points}")
+    dropped = any(s.warnings for s in schedules)
+    return 1 if refused or (strict and dropped) else 0
+
+
+@click.command()
+@options.documents
+@click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
+@click.pass_context
+def check(context: click.Context, documents: tuple[str, ...], scene: str | None) -> int:
+    """Say every fault of documents, one line each, with line and path."""
+    from bml_schema import Block, read
+    from realizer.behaviours import VOCABULARY
+    from realizer.pipeline import speak, warning_of
+    from realizer.player import Player
+    from realizer.speech import SilentVoice
+
+    faults = 0
+    for name, text in zip(documents, options.read_documents(documents), strict=True):
+        # A player a file: what one document says must not colour the next one's report.
+        player = Player(scene=options.read_scene(scene), idle=False)
+        blocks = 0
+        for item in read(text, VOCABULARY):
+            if isinstance(item, Block):
+                blocks += 1
+                said = speak(player.wants(item), SilentVoice())
+                warnings = player.submit(item, 0.0, said).warnings
+            else:
+                warnings = (warning_of(item),)
+            faults += len(warnings)
+            for warning in warnings:
+                click.echo(f"{name}: {warning.id}: {warning.type}: {warning.text}")
+        if not faults and not context.obj["quiet"]:
+            click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)
+    return 1 if faults else 0

@@ -1,0 +1,45 @@
+"""`serve`: the service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from realizer.cli import options
+
+__all__: list[str] = []
+
+
+@click.command()
+@click.option("--host", metavar="ADDRESS", help="Address to listen on.  [default: 127.0.0.1]")
+@click.option("--port", type=int, help="Port of WebSocket and page; 0 takes a free one.  [default: 8765]")
+@click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
+@click.option("--voice", metavar="NAME", help="Voice of characters that name none.")
+@click.option("--fps", type=float, help="Frames a second of streams that name no rate.  [default: 25]")
+@click.option(
+    "--scene", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Targets of every session."
+)
+@click.option("--seed", type=int, help="Of idle motion.  [default: 0]")
+@click.option("--idle/--no-idle", default=None, help="Blinks and small head motion.  [default: idle]")
+@click.option(
+    "--config", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="A TOML file of settings."
+)
+def serve(config: Path | None, **flags: Any) -> None:
+    """Take BML over a WebSocket; stream frames, sound and feedback back.
+
+    Prints one line for each open door when it is ready. SIGINT or SIGTERM: takes no more work, gives what
+    plays 5 s, ends.
+    """
+    import asyncio
+
+    from realizer.server.serve import serve as run
+    from realizer.settings import Settings, SettingsError
+
+    try:
+        settings = Settings.read(flags, file=config)
+    except SettingsError as error:
+        raise click.UsageError(str(error)) from None
+    options.find_voice(settings.voice).close()  # says on stderr when speech will be silent
+    asyncio.run(run(settings))

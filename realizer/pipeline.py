@@ -1,0 +1,302 @@
+"""The eight steps without a clock: BML documents in, one Realization (schedule, frames, sound, feedback) out."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bml_schema import Block, BMLError, read
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.targets import AU_NAMES
+from realizer.arrays import Int16
+from realizer.behaviours import VOCABULARY
+from realizer.behaviours.kind import Position
+from realizer.errors import VoiceError
+from realizer.player import Player, Speaking
+from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.tables import faps
+from realizer.units import frame_count
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+
+__all__ = ["Realization", "realize", "schedule", "speak"]
+
+# Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
+WINDOW = 10.0  # s
+# Cut-off speech fades this long, so that it does not click.
+CUT = 0.05  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """What one character does: (n, ...) frames at k / fps."""
+
+    aus: AUFrames
+    faps: FAPFrames
+
+
+@dataclass(frozen=True, eq=False)
+class Realization:
+    """Documents, played from 0 to their end.
+
+    Attributes:
+        fps: frames a second; frame k is sampled at k / fps.
+        duration: seconds, to the end of the last block.
+        face_name: which face folder pictures are drawn with.
+        characters: character id (None: unnamed) -> its frames, the first character first.
+        schedules: one per accepted or failed block, in the order of submission.
+        feedback: BML feedback as XML text, in order.
+        warnings: all of them, in order.
+        refused: documents and blocks that gave nothing to play.
+        speaking: what sounds when.
+    """
+
+    fps: float
+    duration: float
+    face_name: str
+    characters: Mapping[str | None, Performance]
+    schedules: tuple[Schedule, ...]
+    feedback: tuple[str, ...]
+    warnings: tuple[Warning, ...]
+    refused: tuple[str, ...] = ()
+    speaking: tuple[Speaking, ...] = field(default=())
+
+    @property
+    def frames(self) -> int:
+        """Number of frames: floor(duration x fps) + 1."""
+        return len(self.aus.times)
+
+    @property
+    def aus(self) -> AUFrames:
+        """AU frames of the first character."""
+        return next(iter(self.characters.values())).aus
+
+    @property
+    def faps(self) -> FAPFrames:
+        """FAP frames of the first character."""
+        return next(iter(self.characters.values())).faps
+
+    @property
+    def speech(self) -> tuple[tuple[float, Utterance], ...]:
+        """(start in seconds, utterance) of everything said."""
+        return tuple((s.start, s.utterance) for s in self.speaking)
+
+    @cached_property
+    def face(self) -> Face:
+        """The face pictures are drawn with.
+
+        Raises:
+            FaceError: no such face, or its folder is damaged.
+        """
+        from realizer.face import load_face
+
+        return load_face(self.face_name)
+
+    def sound(self, rate: int = 22050) -> Int16:
+        """(round(duration x rate),) int16 mono: all that is said, mixed; silence where nobody speaks."""
+        mix = np.zeros(round(self.duration * rate), np.float32)
+        for speaking in self.speaking:
+            utterance = speaking.utterance
+            if utterance.pcm is None or not len(utterance.pcm):
+                continue
+            pcm = resample(utterance.pcm, utterance.sample_rate, rate)
+            first = round(speaking.start * rate)
+            if speaking.until < speaking.start + utterance.duration:
+                kept = max(0, round((speaking.until + CUT - speaking.start) * rate))
+                ramp = min(kept, round(CUT * rate))
+                pcm = pcm[:kept].copy()
+                pcm[kept - ramp :] *= np.linspace(1, 0, len(pcm[kept - ramp :]), dtype=np.float32)
+            last = min(len(mix), first + len(pcm))
+            mix[first:last] += pcm[: max(0, last - first)]
+        return np.clip(np.rint(mix), -32768, 32767).astype(np.int16)
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON of `realizer realize -o x.json`."""
+        first, *others = self.characters.items()
+        out: dict[str, Any] = {
+            "fps": self.fps,
+            "frames": self.frames,
+            "duration": round(self.duration, 6),
+            "face": self.face_name,
+            "schedule": [s.to_json() for s in self.schedules],
+            **_performance_json(first[1]),
+            "feedback": list(self.feedback),
+            "warnings": [w.to_json() for w in self.warnings],
+        }
+        if others:
+            out["characters"] = {str(name): _performance_json(p) for name, p in others}
+        return out
+
+
+def realize(
+    documents: str | bytes | Iterable[str | bytes],
+    *,
+    face: str = "default",
+    fps: float = 25.0,
+    voice: Voice | str | None = None,
+    scene: Mapping[str, Position] | None = None,
+    seed: int = 0,
+    idle: bool = True,
+    language: str = "en-US",
+) -> Realization:
+    """Play BML documents from start to end, without a clock.
+
+    Args:
+        documents: BML text, or several texts; all are submitted at t = 0, in order.
+        face: name of a face folder; only pictures need it.
+        fps: frames a second.
+        voice: a voice or its name; None takes espeak-ng where it is installed, otherwise the silent voice.
+        scene: target name -> (x, y, z) metres, origin between the eyes.
+        seed: for idle motion; the same seed gives the same frames.
+        idle: blinks and small head motion.
+
+    Raises:
+        VoiceError: the named voice is not installed.
+    """
+    texts = [documents] if isinstance(documents, str | bytes) else list(documents)
+    player = Player(scene=scene, seed=seed, idle=idle, language=language)
+    schedules, refused = play(texts, player, voice)
+    end = player.end
+    times = np.arange(frame_count(end, fps)) / fps
+    characters: dict[str | None, Performance] = {}
+    for index, name in enumerate(player.characters):
+        step = max(1, int(WINDOW * fps))
+        windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
+        aus = AUFrames(times, np.concatenate([w.values for w in windows]))
+        characters[name] = Performance(aus, to_fap(aus))
+    speaking = player.speech()
+    feedback = tuple(f.to_xml() for f in player.due(float("inf")))
+    warnings = tuple(w for s in schedules for w in s.warnings)
+    warnings += tuple(w for w in refused if w not in warnings)
+    return Realization(
+        fps=fps,
+        duration=end,
+        face_name=face,
+        characters=characters,
+        schedules=tuple(schedules),
+        feedback=feedback,
+        warnings=warnings,
+        refused=tuple(w.text for w in refused),
+        speaking=speaking,
+    )
+
+
+def schedule(
+    document: str | bytes,
+    *,
+    voice: Voice | str | None = None,
+    scene: Mapping[str, Position] | None = None,
+) -> Schedule:
+    """The sync times of one BML document: parse, timing, solve; no animation.
+
+    Raises:
+        BMLError: the document gives no block; with line and path.
+        VoiceError: the named voice is not installed.
+    """
+    from bml_schema import parse
+
+    player = Player(scene=scene, idle=False)
+    block = parse(document, VOCABULARY)
+    return player.submit(block, 0.0, speak(player.wants(block), voice))
+
+
+def play(
+    texts: Sequence[str | bytes], player: Player, voice: Voice | str | None = None
+) -> tuple[list[Schedule], list[Warning]]:
+    """Submit every document of every text at t = 0; returns the schedules, and what was refused."""
+    schedules: list[Schedule] = []
+    refused: list[Warning] = []
+    for text in texts:
+        for item in read(text, VOCABULARY):
+            if isinstance(item, Block):
+                planned = player.submit(item, 0.0, speak(player.wants(item), voice))
+                schedules.append(planned)
+                if planned.failed:
+                    refused += planned.warnings
+            else:
+                warning = warning_of(item)
+                player.refuse(warning, 0.0)
+                refused.append(warning)
+    return schedules, refused
+
+
+def warning_of(error: BMLError) -> Warning:
+    """The BML warning of a document that gave no block."""
+    return Warning(error.block or "<no id>", "PARSING_FAILURE", str(error))
+
+
+def speak(says: Mapping[str, Say], voice: Voice | str | None = None) -> dict[str, Utterance]:
+    """Let a voice say everything a block wants; where it fails the silent voice takes over, said on stderr."""
+    if not says:
+        return {}
+    from realizer.speech import SilentVoice, find_voice
+
+    chosen = find_voice(voice) if isinstance(voice, str) or voice is None else voice
+    utterances: dict[str, Utterance] = {}
+    for behaviour, say in says.items():
+        try:
+            utterances[behaviour] = chosen.say(say)
+        except VoiceError as error:
+            print(f"realizer: {behaviour}: {error}; going on without sound", file=sys.stderr)
+            utterances[behaviour] = SilentVoice().say(say)
+    return utterances
+
+
+def resample(pcm: Int16, rate: int, wanted: int) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """PCM at another rate, (n,) float32; linear, after a box filter where the rate falls."""
+    samples = pcm.astype(np.float32)
+    if rate == wanted:
+        return samples
+    if wanted < rate:
+        width = max(1, round(rate / wanted))
+        samples = np.convolve(samples, np.full(width, 1 / width, np.float32), "same")
+    count = round(len(pcm) * wanted / rate)
+    at = np.arange(count) * (rate / wanted)
+    return np.interp(at, np.arange(len(samples)), samples).astype(np.float32)
+
+
+def parse_scene(text: str) -> dict[str, Position]:
+    """A scene from JSON `{"cup": [x, y, z], ...}` or lines `cup x y z`; metres, origin between the eyes.
+
+    Raises:
+        ValueError: says which entry and what was wanted.
+    """
+    import json
+
+    if text.lstrip().startswith("{"):
+        entries = json.loads(text)
+        items = [(str(k), v.values() if isinstance(v, dict) else v) for k, v in entries.items()]
+    else:
+        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        items = [(parts[0], parts[1:]) for parts in (re.split(r"[\s,]+", line.strip()) for line in lines)]
+    scene: dict[str, Position] = {}
+    for name, numbers in items:
+        try:
+            x, y, z = (float(v) for v in numbers)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name}: wanted three numbers x y z in metres, got {list(numbers)}") from None
+        scene[name] = (x, y, z)
+    return scene
+
+
+def _performance_json(performance: Performance) -> dict[str, Any]:
+    return {
+        "fap": {
+            "names": [row.name for row in faps()],
+            "values": performance.faps.integers().tolist(),
+            "mask": performance.faps.mask.astype(int).tolist(),
+        },
+        "au": {
+            "names": list(AU_NAMES()),
+            "values": [[round(v, 4) for v in row] for row in performance.aus.aus.tolist()],
+        },
+    }

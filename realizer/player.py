@@ -1,0 +1,510 @@
+"""Which blocks are alive: documents are composed here, their feedback comes due and their faces are sampled.
+
+Knows no clock and no I/O: every call is told `now`, in seconds on the session clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from bml_schema import Block, SyncRef
+from bml_schema.feedback import (
+    BlockProgress,
+    Feedback,
+    PredictedBehaviour,
+    PredictedBlock,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
+from realizer.animation.blend import blend
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.frames import AUFrames
+from realizer.animation.idle import idle_channels
+from realizer.animation.targets import AU_NAMES, Target, axis
+from realizer.arrays import Float64
+from realizer.behaviours import KINDS
+from realizer.behaviours.kind import Kind, Position, World
+from realizer.planning import plan
+from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.utterance import Say, Utterance
+
+__all__ = ["Player", "Speaking"]
+
+# How long a face takes back to its base when a block is cut off. 0.3 s is about a natural expression's
+# release; sound and lips stop faster, so that a barge-in is heard at once.
+RELAX = 0.3  # s
+HUSH = 0.12  # s
+# Frames up to this long before `now` can still be asked for.
+KEPT = 1.0  # s
+# A directly set AU or FAP is reached this long after it was set.
+SETTLE = 0.12  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Speaking:
+    """An utterance that sounds from `start` on, cut off (with a short fade) at `until` if that is sooner."""
+
+    start: float
+    until: float
+    utterance: Utterance
+    character: int
+
+
+@dataclass(eq=False)
+class Playing:
+    """A block that was accepted, until it has ended and its last frames are past."""
+
+    block: Block
+    schedule: Schedule
+    character: int
+    number: int  # order of acceptance
+    channels: tuple[Channel, ...]  # on the session clock
+    shifts: tuple[Shift, ...]
+    speech: tuple[Speaking, ...]
+    ended: float  # when its end feedback is due; moved to `now` when it is stopped
+    started: bool = False
+    done: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """A change of a base state: from `begin` to `end` it replaces what was the base of its regions."""
+
+    begin: float
+    end: float
+    regions: frozenset[str]
+    channels: tuple[Channel, ...]
+
+
+@dataclass(eq=False)
+class Character:
+    """One face of a session: its base states and what a client set directly."""
+
+    id: str | None
+    shifts: list[Shift] = field(default_factory=list)
+    direct: dict[str, Channel] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, order=True)
+class Event:
+    """One feedback and when it is due; the order of the fields is the order of report."""
+
+    time: float
+    block: int
+    phase: int  # 0 start, 1 sync point, 2 end
+    behaviour: int
+    point: int
+    feedback: Feedback = field(compare=False)
+
+
+class Player:
+    """The blocks of one session and what they show.
+
+    Args:
+        kinds: tag -> Kind, what behaviours there are.
+        scene: target name -> (x, y, z) metres; None while no scene was declared.
+        seed: for idle motion and anything else random.
+        idle: blinks and small head motion between and under the behaviours.
+        language: BCP-47 of speech that does not name its own.
+
+    Attributes:
+        revision: rises whenever frames change that were already computed; `changed_from` says from when on.
+    """
+
+    def __init__(
+        self,
+        *,
+        kinds: Mapping[str, Kind] = KINDS,
+        scene: Mapping[str, Position] | None = None,
+        seed: int = 0,
+        idle: bool = True,
+        language: str = "en-US",
+    ) -> None:
+        self.kinds = kinds
+        self.world = World(scene=scene, seed=seed, language=language)
+        self.idle = idle
+        self.revision = 0
+        self.changed_from = 0.0
+        self._characters: list[Character] = [Character(None)]
+        self._playing: list[Playing] = []
+        self._past: dict[str, Schedule] = {}
+        self._announced: set[str] = set()
+        self._outbox: list[Feedback] = []
+        self._events: list[Event] = []
+        self._number = 0
+
+    # documents in -------------------------------------------------------------------------------
+
+    def wants(self, block: Block) -> dict[str, Say]:
+        """{behaviour id: what a voice has to say} before the block can be submitted."""
+        says: dict[str, Say] = {}
+        for node in block.behaviours:
+            kind = self.kinds.get(node.tag)
+            if kind is not None and kind.say is not None and (say := kind.say(node, self.world)) is not None:
+                says[node.id] = say
+        return says
+
+    def announce(self, block: Block, now: float) -> None:
+        """Acknowledge a block: planning has begun. `submit` does it where it was not done before."""
+        if block.id not in self._announced:
+            self._announced.add(block.id)
+            self._outbox.append(
+                PredictionFeedback(
+                    character_id=block.character_id,
+                    blocks=(PredictedBlock(id=block.id, global_start=self._start_of(block, now)),),
+                    behaviours=(),
+                )
+            )
+
+    def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
+        """Plan a block and let it play as its composition says.
+
+        Args:
+            block: as parsed; its own problems are reported with it.
+            now: seconds on the session clock.
+            utterances: what the voice made of `wants(block)`.
+
+        Returns:
+            The schedule; `schedule.failed` when the whole block was refused.
+        """
+        self.announce(block, now)
+        self._announced.discard(block.id)
+        character = self._character(block.character_id)
+        if block.composition != "REPLACE" and any(p.block.id == block.id for p in self._alive()):
+            text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
+            return self._refused(block, Warning(block.id, "PARSING_FAILURE", text), now)
+        start = self._start_of(block, now)
+        world = replace(self.world, utterances=dict(utterances or {}))
+        planned = plan(block, self.kinds, world, outside=lambda ref: self._outside(ref, start))
+        schedule = replace(planned.schedule, start=start, character=block.character_id)
+        if schedule.failed:
+            for warning in schedule.warnings:
+                self.refuse(warning, now, block.character_id)
+            return schedule
+        if block.composition == "REPLACE":
+            for earlier in self._alive():
+                if earlier.character == character:
+                    self._stop(earlier, now)
+        self._accept(block, schedule, character, planned.channels, world, now)
+        return schedule
+
+    def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
+        """Report a document, block or behaviour that cannot be played."""
+        self._outbox.append(WarningFeedback(warning.id, warning.type, warning.text, character_id=character))
+
+    def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
+        """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
+
+        Args:
+            block_ids: which; None for all that play or wait.
+
+        Returns:
+            The ids of the blocks that were stopped.
+        """
+        wanted = None if block_ids is None else set(block_ids)
+        stopped = [p for p in self._alive() if wanted is None or p.block.id in wanted]
+        for playing in stopped:
+            self._stop(playing, now)
+        return [p.block.id for p in stopped]
+
+    def set_scene(self, scene: Mapping[str, Position] | None) -> None:
+        """Declare where targets are; documents planned from now on look there."""
+        self.world = replace(self.world, scene=scene)
+
+    def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
+        """Hold AUs (0..1) and FAPs (FAPU) by name until told otherwise; None lets go of one.
+
+        Raises:
+            KeyError: no such AU or FAP.
+        """
+        columns = axis()
+        targets = {name: columns[name] for name in values}
+        direct = self._characters[character].direct
+        for name, value in values.items():
+            held = direct.get(name)
+            if value is None:
+                if held is not None:
+                    direct[name] = held.faded(now, now + RELAX)
+                continue
+            before = 0.0 if held is None else float(np.interp(now, held.times, held.values))
+            direct[name] = Channel(
+                targets[name],
+                np.array([now, now + SETTLE]),
+                np.array([before, value]),
+                layer=Layer.DIRECT,
+                holds=True,
+                source="set",
+            )
+        self._changed(now)
+
+    # feedback out -------------------------------------------------------------------------------
+
+    def due(self, now: float) -> list[Feedback]:
+        """Feedback whose time has come, in the order of report, each once."""
+        out, self._outbox = self._outbox, []
+        count = sum(1 for event in self._events if event.time <= now)
+        for event in self._events[:count]:
+            out.append(event.feedback)
+        del self._events[:count]
+        for playing in self._playing:
+            playing.started = playing.started or playing.schedule.start <= now
+            playing.done = playing.done or playing.ended <= now
+        self._forget(now)
+        return out
+
+    def next_deadline(self) -> float | None:
+        """When `due` will next have something; None when nothing plays or waits. In the past: at once."""
+        if self._outbox:
+            return float("-inf")
+        return self._events[0].time if self._events else None
+
+    # faces out ----------------------------------------------------------------------------------
+
+    @property
+    def characters(self) -> list[str | None]:
+        """Ids of the characters; the first is the one that documents without characterId move."""
+        return [c.id for c in self._characters]
+
+    def character_index(self, character: str | None) -> int:
+        """Where a character stands in `characters`; it is added where it is new."""
+        return self._character(character)
+
+    def frames(self, times: Float64, character: int = 0) -> AUFrames:
+        """The face at any times: a pure function of what was submitted, so live and offline agree.
+
+        Args:
+            times: (n,) float64 seconds on the session clock, rising; not earlier than 1 s before the last
+                `due`.
+        """
+        times = np.asarray(times, np.float64)
+        if not len(times):
+            return blend((), times)
+        first, last = float(times[0]), float(times[-1])
+        channels = [c for c in self._channels(character) if c.span[0] <= last and c.span[1] >= first]
+        if self.idle:
+            channels += idle_channels(first, last, self.world.seed + 7919 * character)
+        return blend(tuple(channels), times)
+
+    @property
+    def end(self) -> float:
+        """When the last block that plays or waits ends; 0 where there was none."""
+        return max((p.ended for p in self._playing), default=0.0)
+
+    def speech(self) -> tuple[Speaking, ...]:
+        """What sounds or will sound, in order of its start."""
+        return tuple(sorted((s for p in self._playing for s in p.speech), key=lambda s: s.start))
+
+    def state(self, now: float) -> dict[str, Any]:
+        """What is playing and which AUs are up, as plain data."""
+        names = AU_NAMES()
+        faces = []
+        for index, character in enumerate(self._characters):
+            aus = self.frames(np.array([now]), index).aus[0]
+            faces.append(
+                {
+                    "character": character.id,
+                    "aus": {n: round(float(v), 3) for n, v in zip(names, aus, strict=True) if v > 0.005},
+                }
+            )
+        blocks = [
+            {
+                "id": p.block.id,
+                "character": p.block.character_id,
+                "status": "IN_EXEC" if p.schedule.start <= now else "LURKING",
+                "start": p.schedule.start,
+                "end": p.ended,
+            }
+            for p in self._alive()
+            if p.ended > now
+        ]
+        return {"time": now, "blocks": blocks, "characters": faces}
+
+    # inside -------------------------------------------------------------------------------------
+
+    def _alive(self) -> list[Playing]:
+        return [p for p in self._playing if not p.done]
+
+    def _character(self, wanted: str | None) -> int:
+        if wanted is None:
+            return 0
+        for index, character in enumerate(self._characters):
+            if character.id == wanted:
+                return index
+        if self._characters[0].id is None:
+            # The first name that a session hears is the name of its first face.
+            self._characters[0].id = wanted
+            return 0
+        self._characters.append(Character(wanted))
+        return len(self._characters) - 1
+
+    def _start_of(self, block: Block, now: float) -> float:
+        """BML 1.0: APPEND starts at the end of all blocks known at submission, the others at once."""
+        if block.composition != "APPEND":
+            return now
+        character = self._character(block.character_id)
+        return max([now, *(p.ended for p in self._alive() if p.character == character)])
+
+    def _outside(self, ref: SyncRef, start: float) -> float | None:
+        """Seconds from `start` of a sync point of another block; None where it is not known."""
+        schedule = next((p.schedule for p in reversed(self._playing) if p.block.id == ref.block), None)
+        schedule = schedule or self._past.get(ref.block or "")
+        if schedule is None:
+            return None
+        if ref.behaviour == "bml":
+            time = {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
+        else:
+            sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
+            try:
+                time = schedule.at(ref.behaviour or "", sync or "")
+            except KeyError:
+                time = None
+        return None if time is None else schedule.start + time + ref.offset - start
+
+    def _refused(self, block: Block, warning: Warning, now: float) -> Schedule:
+        self.refuse(warning, now, block.character_id)
+        return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
+
+    def _accept(
+        self,
+        block: Block,
+        schedule: Schedule,
+        character: int,
+        channels: Mapping[str, tuple[Channel, ...]],
+        world: World,
+        now: float,
+    ) -> None:
+        start, number = schedule.start, self._number
+        self._number += 1
+        tags = {node.id: node.tag for node in block.behaviours}
+        moving: list[Channel] = []
+        shifts: list[Shift] = []
+        for behaviour, own in channels.items():
+            own = tuple(replace(c.shifted(start), source=f"{block.id}:{behaviour}") for c in own)
+            region = self.kinds[tags[behaviour]].region
+            if region is None:
+                moving += own
+            else:
+                times = schedule.times[behaviour] + start
+                regions = frozenset({region, *(_region(c.target) for c in own)})
+                shifts.append(Shift(float(times[0]), float(times[-1]), regions, own))
+        speech = tuple(
+            Speaking(start + float(schedule.times[b][0]), float("inf"), utterance, character)
+            for b, utterance in world.utterances.items()
+            if b in schedule.times
+        )
+        playing = Playing(
+            block, schedule, character, number, tuple(moving), tuple(shifts), speech, schedule.end
+        )
+        self._playing.append(playing)
+        self._characters[character].shifts += shifts
+        self._outbox.append(_prediction(block, schedule))
+        for warning in schedule.warnings:
+            self.refuse(warning, now, block.character_id)
+        self._events = sorted([*self._events, *_events(block, schedule, number)])
+        self._changed(min(now, start))
+
+    def _stop(self, playing: Playing, now: float) -> None:
+        """Cut a block off at `now`: what plays fades, what waits never comes, its end is reported."""
+        self._events = [e for e in self._events if e.block != playing.number]
+        progress = BlockProgress(f"{playing.block.id}:end", now, character_id=playing.block.character_id)
+        if not playing.started and playing.schedule.start <= now:
+            # Its start was due but not yet asked for.
+            begin = BlockProgress(
+                f"{playing.block.id}:start", playing.schedule.start, character_id=playing.block.character_id
+            )
+            self._outbox.append(begin)
+        self._outbox.append(progress)
+        relax = HUSH if playing.speech else RELAX
+        playing.channels = tuple(
+            c.faded(now, now + (relax if c.layer is Layer.SPEECH else RELAX))
+            for c in playing.channels
+            if c.times[0] < now
+        )
+        late = {id(s) for s in playing.shifts if s.begin >= now}
+        shifts = self._characters[playing.character].shifts
+        shifts[:] = [s for s in shifts if id(s) not in late]
+        playing.speech = tuple(
+            replace(s, until=min(s.until, now)) for s in playing.speech if s.start < now
+        )
+        playing.ended, playing.done = now, True
+        self._changed(now)
+
+    def _channels(self, character: int) -> list[Channel]:
+        own = self._characters[character]
+        channels = [c for p in self._playing if p.character == character for c in p.channels]
+        ordered = sorted(own.shifts, key=lambda s: (s.begin, s.end))
+        for index, shift in enumerate(ordered):
+            # The next shift of a region takes it over; until then a base state holds.
+            for channel in shift.channels:
+                region = _region(channel.target)
+                heir = next((s for s in ordered[index + 1 :] if region in s.regions), None)
+                channels.append(channel if heir is None else channel.faded(heir.begin, heir.end))
+        return [*channels, *own.direct.values()]
+
+    def _forget(self, now: float) -> None:
+        """Drop what can no longer be seen, so that a session's cost does not grow with its past."""
+        gone = [p for p in self._playing if p.done and p.ended + max(RELAX, HUSH) + KEPT < now]
+        for playing in gone:
+            self._past[playing.block.id] = playing.schedule
+            self._playing.remove(playing)
+        while len(self._past) > 100:
+            del self._past[next(iter(self._past))]
+        if not gone:
+            return
+        for character in self._characters:
+            ordered = sorted(character.shifts, key=lambda s: (s.begin, s.end))
+            character.shifts = [
+                shift
+                for index, shift in enumerate(ordered)
+                if not any(
+                    heir.end + KEPT < now and shift.regions <= heir.regions for heir in ordered[index + 1 :]
+                )
+            ]
+            character.direct = {
+                n: c for n, c in character.direct.items() if c.fade is None or c.fade[1] + KEPT > now
+            }
+
+    def _changed(self, since: float) -> None:
+        self.revision += 1
+        self.changed_from = since
+
+
+def _region(target: Target) -> str:
+    """Which base state a target belongs to: eyes, head or face."""
+    number = target.name.rstrip("LR")
+    if number.isdigit():
+        return {5: "head", 6: "eyes"}.get(int(number) // 10, "face") if int(number) > 50 else "face"
+    return target.name if target.name in ("eyes", "head") else "face"
+
+
+def _prediction(block: Block, schedule: Schedule) -> PredictionFeedback:
+    nodes = {node.id: node for node in block.behaviours}
+    return PredictionFeedback(
+        character_id=block.character_id,
+        blocks=(PredictedBlock(id=block.id, global_start=schedule.start, global_end=schedule.end),),
+        behaviours=tuple(
+            PredictedBehaviour(nodes[b], f"{block.id}:{b}", times) for b, times in schedule.behaviours.items()
+        ),
+    )
+
+
+def _events(block: Block, schedule: Schedule, number: int) -> Sequence[Event]:
+    """Every feedback of a block that goes as planned (BML 1.0): start, each sync point, end."""
+    who, start = block.character_id, schedule.start
+    events = [
+        Event(start, number, 0, 0, 0, BlockProgress(f"{block.id}:start", start, character_id=who)),
+        Event(schedule.end, number, 2, 0, 0, BlockProgress(f"{block.id}:end", schedule.end, character_id=who)),
+    ]
+    order = {node.id: index for index, node in enumerate(block.behaviours)}
+    for behaviour, times in schedule.behaviours.items():
+        for index, (point, time) in enumerate(times.items()):
+            progress = SyncPointProgress(
+                f"{block.id}:{behaviour}:{point}", time, start + time, character_id=who
+            )
+            events.append(Event(start + time, number, 1, order[behaviour], index, progress))
+    return events
