@@ -1,0 +1,45 @@
+"""The public names of each package are the `__all__`s of its modules."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+
+import bml_schema
+import pytest
+import realizer
+
+# Extension points and doors that are public by their module's name, not from the package root.
+MODULES = [
+    name
+    for package in (bml_schema, realizer)
+    for _, name, _ in pkgutil.walk_packages(package.__path__, package.__name__ + ".")
+    if not name.endswith(("__main__", "_worker", ".worker", ".build_hook"))
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_each_module_says_what_is_public(name: str) -> None:
+    module = importlib.import_module(name)
+    assert hasattr(module, "__all__"), f"{name} has no __all__"
+    missing = [public for public in module.__all__ if not hasattr(module, public)]
+    assert not missing
+
+
+def test_bml_schema_exports_exactly_the_public_names_of_its_modules() -> None:
+    names: set[str] = set()
+    for _, name, _ in pkgutil.iter_modules(bml_schema.__path__, "bml_schema."):
+        names |= set(importlib.import_module(name).__all__)
+    modules = {name for _, name, _ in pkgutil.iter_modules(bml_schema.__path__)}
+    assert set(bml_schema.__all__) - modules == names
+
+
+def test_every_name_the_root_promises_is_there() -> None:
+    for name in realizer.__all__:
+        assert getattr(realizer, name) is not None
+    assert set(realizer.__all__) <= set(dir(realizer))
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'sing'"):
+        _ = realizer.sing  # type: ignore[attr-defined]
