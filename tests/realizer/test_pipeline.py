@@ -1,0 +1,127 @@
+"""Documents in; schedule, frames, sound and feedback out, without a clock."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bml_schema import BMLError
+from realizer import realize, schedule
+from realizer.examples import examples
+from realizer.pipeline import Speaking, parse_scene
+from realizer.speech import SilentVoice
+from realizer.speech.utterance import Utterance
+from realizer.tables import faps
+
+GOLDEN = Path(__file__).parent.parent / "golden"
+HELLO = examples()["greeting"]
+
+
+@pytest.mark.parametrize("name", examples())
+def test_the_examples_play_without_a_warning(name: str) -> None:
+    played = realize(examples()[name], voice=SilentVoice())
+    assert played.warnings == ()
+    assert played.duration > 1
+
+
+def test_frames_reach_from_0_to_the_end() -> None:
+    played = realize(HELLO, voice=SilentVoice(), fps=30)
+    assert played.frames == int(played.duration * 30 + 1e-6) + 1
+    assert played.faps.values.shape == (played.frames, 68)
+    assert played.aus.times[1] == pytest.approx(1 / 30)
+
+
+def test_the_json_holds_what_it_promises() -> None:
+    out = json.loads(json.dumps(realize(HELLO, voice=SilentVoice()).to_json()))
+    assert {"fps", "frames", "duration", "face", "schedule", "fap", "au", "feedback", "warnings"} <= set(out)
+    assert len(out["fap"]["names"]) == len(out["fap"]["mask"]) == 68
+    assert len(out["fap"]["values"]) == len(out["au"]["values"]) == out["frames"]
+    assert all(isinstance(v, int) for v in out["fap"]["values"][0])
+    assert all(0 <= v <= 1 for row in out["au"]["values"] for v in row)
+    assert out["schedule"][0]["block"] == "greeting"
+    assert out["feedback"][0].startswith("<predictionFeedback")
+
+
+def test_several_documents_are_composed() -> None:
+    nod = '<bml id="{}" composition="APPEND"><head id="n" lexeme="NOD"/></bml>'
+    played = realize([nod.format("a"), nod.format("b")])
+    first, second = played.schedules
+    assert second.start == pytest.approx(first.end)
+    assert played.duration == pytest.approx(second.end)
+
+
+def test_two_characters_stand_side_by_side() -> None:
+    nod = '<bml id="{0}" characterId="{0}"><head id="n" lexeme="NOD"/></bml>'
+    played = realize([nod.format("Ann"), nod.format("Bob")])
+    assert list(played.characters) == ["Ann", "Bob"]
+    assert set(played.to_json()["characters"]) == {"Bob"}
+
+
+def test_a_broken_document_is_refused_and_the_next_one_plays() -> None:
+    played = realize(['<bml id="x"><head', '<bml id="b"><head id="n" lexeme="NOD"/></bml>'])
+    assert len(played.refused) == 1
+    assert played.duration > 0
+
+
+def test_the_same_seed_gives_the_same_frames_and_another_seed_does_not() -> None:
+    document = '<bml id="b"><wait id="w" duration="12"/></bml>'
+    one, two, other = (realize(document, seed=s).faps.values for s in (1, 1, 2))
+    assert np.array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_without_idle_an_empty_stretch_is_neutral() -> None:
+    played = realize('<bml id="b"><wait id="w" duration="3"/></bml>', idle=False)
+    assert not played.faps.values.any()
+
+
+def test_long_documents_have_no_seam_between_windows() -> None:
+    document = '<bml id="b"><faceLexeme id="f" lexeme="SMILE" start="8" attackPeak="10" relax="12" end="14"/></bml>'
+    values = realize(document, idle=False).faps.values
+    assert np.abs(np.diff(values, axis=0)).max() < 40
+
+
+def test_schedule_of_a_document_that_is_no_block_is_an_error() -> None:
+    with pytest.raises(BMLError, match="id"):
+        schedule("<bml/>")
+
+
+def test_sound_is_mixed_where_it_belongs() -> None:
+    played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False)
+    tone = Utterance(0.5, (), (), {}, 8000, np.full(4000, 1000, np.int16))
+    object.__setattr__(played, "speaking", (Speaking(1.0, float("inf"), tone, 0), Speaking(1.2, 1.3, tone, 0)))
+    sound = played.sound(16000)
+    assert len(sound) == 32000
+    assert sound[:16000].max() == 0
+    assert sound[int(1.1 * 16000)] == 1000
+    assert sound[int(1.25 * 16000)] == 2000
+    assert sound[int(1.4 * 16000)] == 1000
+
+
+def test_a_scene_is_read_from_lines_or_json() -> None:
+    scene = {"cup": (0.1, -0.2, 0.5)}
+    assert parse_scene("# what she sees\ncup 0.1 -0.2 0.5\n") == scene
+    assert parse_scene('{"cup": [0.1, -0.2, 0.5]}') == scene
+    with pytest.raises(ValueError, match="cup: wanted three numbers"):
+        parse_scene("cup 1 2")
+
+
+@pytest.mark.parametrize("name", ["greeting", "nod-on-a-word", "gaze-and-back"])
+def test_frames_are_the_golden_ones(name: str, request: pytest.FixtureRequest) -> None:
+    """FAP frames at 25 fps as text, one frame a line: a change is a diff that can be read."""
+    played = realize(examples()[name], voice=SilentVoice())
+    used = [i for i in range(68) if played.faps.integers()[:, i].any()]
+    lines = [" ".join(["frame", *(faps()[i].name for i in used)])]
+    lines += [" ".join(map(str, [k, *row[used]])) for k, row in enumerate(played.faps.integers())]
+    golden = GOLDEN / f"{name}.fap.txt"
+    if request.config.getoption("--update-golden"):
+        golden.write_text("\n".join(lines) + "\n")
+    head, *rows = golden.read_text().splitlines()
+    assert lines[0] == head
+    ours = np.array([line.split() for line in lines[1:]], int)
+    theirs = np.array([row.split() for row in rows], int)
+    assert ours.shape == theirs.shape
+    # One unit for the last bit of another machine's arithmetic.
+    assert np.abs(ours - theirs).max() <= 1

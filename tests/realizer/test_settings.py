@@ -1,0 +1,39 @@
+"""Settings come from flags, variables and a file, in that order of weight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from realizer.settings import Settings, SettingsError
+
+
+def test_defaults_need_nothing() -> None:
+    assert Settings.read(environment={}) == Settings()
+
+
+def test_flags_win_over_variables_and_those_over_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_text('port = 1\nfps = 10\nface = "x"\n')
+    environment = {"REALIZER_PORT": "2", "REALIZER_FPS": "30", "HOME": "nowhere"}
+    settings = Settings.read({"port": 3, "voice": None}, file=file, environment=environment)
+    assert (settings.port, settings.fps, settings.face, settings.voice) == (3, 30.0, "x", None)
+
+
+def test_a_wrong_value_says_which_and_what_came() -> None:
+    with pytest.raises(SettingsError, match=r"setting port: .*65535.*got '70000'"):
+        Settings.read(environment={"REALIZER_PORT": "70000"})
+
+
+def test_an_unknown_name_in_the_file_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_text("prot = 1\n")
+    with pytest.raises(SettingsError, match="prot"):
+        Settings.read(file=file, environment={})
+
+
+def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_text("port 1")
+    with pytest.raises(SettingsError, match=r"realizer\.toml"):
+        Settings.read(file=file, environment={})
