@@ -1,0 +1,29 @@
+"""A path in, the encoding for its suffix out. To add one: a module with OUTPUTS, and its name in MODULES."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+
+from realizer.outputs.output import Drawing, Output
+
+__all__ = ["OUTPUTS", "Drawing", "Output", "output_for"]
+
+MODULES = ("fap_text", "json_text", "csv_table", "vtt", "wav", "png", "film")
+
+OUTPUTS: Mapping[str, Output] = {
+    output.suffix: output for name in MODULES for output in import_module(f"realizer.outputs.{name}").OUTPUTS
+}
+
+
+def output_for(path: str | Path) -> Output:
+    """The encoding of a path's suffix, either case.
+
+    Raises:
+        ValueError: no or an unknown suffix; the text lists the known ones.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in OUTPUTS:
+        raise ValueError(f"{path}: wanted a suffix of {' '.join(OUTPUTS)}, got {suffix or 'none'}")
+    return OUTPUTS[suffix]

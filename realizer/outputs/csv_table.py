@@ -1,0 +1,36 @@
+"""A realization as a table (.csv): a row a frame; time, every AU, every FAP."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from realizer.animation.targets import AU_NAMES
+from realizer.outputs.files import write_text
+from realizer.outputs.output import Drawing, Output
+from realizer.tables import faps
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "encode_csv", "write_csv"]
+
+
+def encode_csv(realization: Realization) -> str:
+    """A header, then a row a frame: `time` in seconds, `AU12L` ... 0..1, `open_jaw` ... integers in FAPU."""
+    buffer = io.StringIO()
+    table = csv.writer(buffer, lineterminator="\n")
+    table.writerow(["time", *(f"AU{name}" for name in AU_NAMES()), *(row.name for row in faps())])
+    aus, clip = realization.aus, realization.faps
+    for time, intensities, values in zip(aus.times, aus.aus.tolist(), clip.integers().tolist(), strict=True):
+        table.writerow([f"{time:.6f}", *(f"{x:.4f}" for x in intensities), *values])
+    return buffer.getvalue()
+
+
+def write_csv(realization: Realization, path: Path, drawing: Drawing) -> None:
+    write_text(path, encode_csv(realization))
+
+
+OUTPUTS = (Output(".csv", "text/csv", "a row a frame: time, action units, FAPs", write_csv),)

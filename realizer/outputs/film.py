@@ -1,0 +1,183 @@
+"""A realization as a film (.mp4: H.264 and AAC; .webm: VP9 and Opus), with its sound."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realizer.arrays import Int16, UInt8
+from realizer.errors import RealizerError
+from realizer.outputs.files import replacing
+from realizer.outputs.output import Drawing, Output
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "FORMATS", "Format", "encode_film", "write_film"]
+
+log = logging.getLogger(__name__)
+
+RATE = 48000  # Hz; the one rate that AAC and Opus share with every player
+REPORT = 250  # frames between two lines of progress: 10 s of film
+# FFmpeg's number for ITU-R BT.709 in matrix, primaries and transfer; untagged films come out with other
+# reds, player by player.
+BT709 = 1
+
+
+@dataclass(frozen=True)
+class Format:
+    """What goes into a film file.
+
+    Attributes:
+        container, video, audio: FFmpeg's names.
+        options: of the video encoder. Fixed threads, so that two machines write the same bytes.
+        container_options: bitexact leaves out the writer's version and random identifiers.
+    """
+
+    container: str
+    video: str
+    audio: str
+    bit_rate: int
+    options: Mapping[str, str]
+    container_options: Mapping[str, str] = field(default_factory=lambda: {"fflags": "+bitexact"})
+
+
+FORMATS: Mapping[str, Format] = {
+    ".mp4": Format(
+        "mp4",
+        "libx264",
+        "aac",
+        96_000,
+        {"preset": "veryfast", "crf": "19", "threads": "2", "bf": "2", "g": "50"},
+        {"fflags": "+bitexact", "movflags": "+faststart"},
+    ),
+    ".webm": Format(
+        "webm",
+        "libvpx-vp9",
+        "libopus",
+        64_000,
+        {
+            "deadline": "realtime",
+            "cpu-used": "7",
+            "crf": "28",
+            "b": "0",
+            "threads": "2",
+            "row-mt": "1",
+            "g": "50",
+        },
+    ),
+}
+
+
+def encode_film(
+    path: Path,
+    form: Format,
+    pictures: Iterable[UInt8],
+    count: int,
+    fps: float,
+    sound: Int16,
+    rate: int = RATE,
+) -> None:
+    """Write a film: picture k is shown at k / fps, the first sample sounds at 0.
+
+    The sound is filled up with silence to the last picture's end, so the track is always there.
+
+    Args:
+        pictures: `count` times (h, w, 3) uint8; an odd last row or column is left out (4:2:0 needs even sizes).
+        sound: (n,) int16 mono at `rate`.
+
+    Raises:
+        RealizerError: PyAV is not installed, or lacks an encoder.
+    """
+    av = _av()
+    pace = Fraction(fps).limit_denominator(1001)
+    length = round(count / pace * rate)
+    pcm = np.zeros(length, np.int16)
+    pcm[: min(len(sound), length)] = sound[:length]
+    try:
+        with av.open(str(path), "w", format=form.container, options=dict(form.container_options)) as film:
+            _write(av, film, form, pictures, pace, pcm, rate, count)
+    except (av.error.FFmpegError, ValueError) as error:
+        raise RealizerError(f"the film could not be written: {error}") from error
+
+
+def _write(
+    av: Any,
+    film: Any,
+    form: Format,
+    pictures: Iterable[UInt8],
+    pace: Fraction,
+    pcm: Int16,
+    rate: int,
+    count: int,
+) -> None:
+    video = film.add_stream(form.video, rate=pace, options=dict(form.options))
+    audio = film.add_stream(form.audio, rate=rate, layout="mono")
+    audio.bit_rate = form.bit_rate
+    # Without this an encoder writes its version into the stream, or picks threads by the machine.
+    for stream in (video, audio):
+        stream.codec_context.flags |= av.codec.context.Flags.bitexact
+    heard = 0
+    for k, picture in enumerate(pictures):
+        height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
+        if k == 0:
+            _picture_format(video, width, height, pace)
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
+        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame.pts, frame.time_base = k, 1 / pace
+        film.mux(video.encode(frame))
+        until = round((k + 1) / pace * rate)
+        if until > heard:
+            film.mux(audio.encode(_sound(av, pcm[heard:until], rate, heard)))
+            heard = until
+        if (k + 1) % REPORT == 0:
+            log.info("film: %d of %d pictures", k + 1, count)
+    film.mux(video.encode(None))
+    film.mux(audio.encode(None))
+
+
+def _picture_format(video: Any, width: int, height: int, pace: Fraction) -> None:
+    video.width, video.height, video.pix_fmt = width, height, "yuv420p"
+    context = video.codec_context
+    context.time_base = 1 / pace
+    context.colorspace = context.color_primaries = context.color_trc = BT709
+    context.color_range = 1  # 16..235, as players expect
+
+
+def _sound(av: Any, pcm: Int16, rate: int, first: int) -> Any:
+    frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(pcm[None]), format="s16", layout="mono")
+    frame.sample_rate, frame.pts, frame.time_base = rate, first, Fraction(1, rate)
+    return frame
+
+
+def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """Draw and encode side by side: the drawing process is a batch ahead."""
+    from realizer.render import Renderer
+
+    _av()  # before the drawing starts
+    form = FORMATS[Path(path).suffix.lower()]
+    size = (drawing.size[0] + drawing.size[0] % 2, drawing.size[1] + drawing.size[1] % 2)
+    rows = realization.faps.values
+    with replacing(path) as draft, Renderer(realization.face_name, size, drawing.camera) as renderer:
+        pictures = renderer.frames(rows)
+        encode_film(draft, form, pictures, len(rows), realization.fps, realization.sound(RATE))
+
+
+def _av() -> Any:
+    try:
+        import av
+    except ImportError:
+        raise RealizerError("films need PyAV: pip install 'bml-realizer[film]'") from None
+    return av
+
+
+OUTPUTS = (
+    Output(".mp4", "video/mp4", "film with sound, H.264 and AAC", write_film, "film"),
+    Output(".webm", "video/webm", "film with sound, VP9 and Opus", write_film, "film"),
+)

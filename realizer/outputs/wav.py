@@ -1,0 +1,37 @@
+"""A realization's sound (.wav): 16 bit, mono, as long as the realization; silence where nobody speaks."""
+
+from __future__ import annotations
+
+import io
+import wave
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from realizer.arrays import Int16
+from realizer.outputs.files import write_bytes
+from realizer.outputs.output import Drawing, Output
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "encode_wav", "write_wav"]
+
+RATE = 22050  # Hz; the rate of espeak-ng's voices, so nothing is resampled
+
+
+def encode_wav(pcm: Int16, rate: int) -> bytes:
+    """RIFF bytes of (n,) int16 mono."""
+    buffer = io.BytesIO()
+    with wave.open(buffer, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(rate)
+        file.writeframes(pcm.astype("<i2").tobytes())
+    return buffer.getvalue()
+
+
+def write_wav(realization: Realization, path: Path, drawing: Drawing) -> None:
+    write_bytes(path, encode_wav(realization.sound(RATE), RATE))
+
+
+OUTPUTS = (Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", write_wav),)

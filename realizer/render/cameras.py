@@ -1,0 +1,149 @@
+"""A face and a preset's name in; a camera out: where it stands, what it sees, and where a point lands in the picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Float32, Float64
+from realizer.errors import RenderError
+from realizer.face.model import Face
+
+__all__ = ["PRESETS", "Camera", "Framing", "camera_for", "camera_names"]
+
+
+@dataclass(frozen=True, slots=True)
+class Framing:
+    """A preset: from where, and between which heights of the picture hairline and chin stand.
+
+    Attributes:
+        yaw: degrees; positive walks around the head to the character's left.
+        hairline, chin: fraction of the picture's height from the top, of feature points 11.1 and 2.1.
+        distance: metres from the origin (between the eyes). Portrait distance: nearer makes noses big.
+    """
+
+    yaw: float = 0.0
+    hairline: float = 0.22
+    chin: float = 0.72
+    distance: float = 1.8
+
+
+# Front: hairline to chin is the middle half of the height, its centre at 47 % from the top; fixed for good.
+PRESETS: Mapping[str, Framing] = {
+    "front": Framing(),
+    "three-quarter": Framing(yaw=-35),
+    "profile": Framing(yaw=-90),
+    "close": Framing(hairline=0.08, chin=0.90, distance=1.5),
+}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Camera:
+    """A camera that stands level.
+
+    Attributes:
+        position, target: (3,) float64 metres; same height.
+        fovy: radians, the picture's whole height.
+        near, far: metres.
+    """
+
+    name: str
+    position: Float64
+    target: Float64
+    fovy: float
+    near: float
+    far: float
+
+    @property
+    def towards(self) -> Float32:
+        """(3,) float32, length 1: from the head towards the camera."""
+        back = self.position - self.target
+        return (back / np.linalg.norm(back)).astype(np.float32)
+
+    @property
+    def pose(self) -> Float64:
+        """(4, 4) camera to world; the camera looks along its own -z, +y up (as OpenGL and glTF)."""
+        pose = np.eye(4)
+        back = np.asarray(self.towards, np.float64)
+        right = np.cross([0, 1, 0], back)
+        right /= np.linalg.norm(right)
+        pose[:3, :4] = np.stack([right, np.cross(back, right), back, self.position], axis=1)
+        return pose
+
+    def project(self, points: Any, size: tuple[int, int]) -> Float64:
+        """(n, 2) pixels, x to the right and y down from the top left corner, of (n, 3) points in metres."""
+        width, height = size
+        local = (np.atleast_2d(np.asarray(points, np.float64)) - self.position) @ self.pose[:3, :3]
+        scale = height / 2 / math.tan(self.fovy / 2)
+        x = width / 2 + scale * local[:, 0] / -local[:, 2]
+        y = height / 2 - scale * local[:, 1] / -local[:, 2]
+        return np.stack([x, y], axis=1)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers for the page; `fovy` in degrees, vertical, as WebGL libraries take it."""
+        return {
+            "name": self.name,
+            "position": [round(float(x), 6) for x in self.position],
+            "target": [round(float(x), 6) for x in self.target],
+            "up": [0, 1, 0],
+            "fovy": round(math.degrees(self.fovy), 5),
+            "near": self.near,
+            "far": self.far,
+        }
+
+
+def camera_names(face: Face) -> tuple[str, ...]:
+    """The presets of every face, then the face's own."""
+    return (*PRESETS, *(name for name in face.cameras if name not in PRESETS))
+
+
+def camera_for(face: Face, name: str = "front") -> Camera:
+    """The camera of that name for this face.
+
+    Raises:
+        RenderError: no such camera; the text lists the known ones.
+    """
+    if name in face.cameras:
+        framing = Framing(**face.cameras[name])
+    elif name in PRESETS:
+        framing = PRESETS[name]
+    else:
+        raise RenderError(f"camera: wanted one of {', '.join(camera_names(face))}, got {name!r}")
+    yaw = math.radians(framing.yaw)
+    back = np.array([math.sin(yaw), 0.0, math.cos(yaw)])
+    right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+    hairline, chin = (np.asarray(face.points[p], np.float64) for p in ("11.1", "2.1"))
+    # A point at height y and depth d stands (y - eye) / (d tan(fovy / 2)) of half the picture above its
+    # middle: two points, two unknowns.
+    high, low = 1 - 2 * framing.hairline, 1 - 2 * framing.chin
+    depths = [framing.distance - float(p @ back) for p in (hairline, chin)]
+    tangent = (hairline[1] - chin[1]) / (high * depths[0] - low * depths[1])
+    eye = hairline[1] - high * depths[0] * tangent
+    sideways = _sideways(face, right, framing.yaw)
+    target = right * sideways + np.array([0.0, eye, 0.0])
+    low_corner, high_corner = face.bounds
+    reach = float(np.max(np.abs([low_corner, high_corner])))
+    return Camera(
+        name=name,
+        position=target + back * framing.distance,
+        target=target,
+        fovy=2 * math.atan(tangent),
+        near=max(0.05, framing.distance - 2 * reach),
+        far=framing.distance + 4 * reach,
+    )
+
+
+def _sideways(face: Face, right: Float64, yaw: float) -> float:
+    """Metres along `right` of the picture's middle: half-way between the head's outermost points above the chin.
+
+    From the front that is the nose's plane, whatever the hair does.
+    """
+    if yaw == 0:
+        return float(np.asarray(face.points["2.1"], np.float64) @ right)
+    head = face.vertices[face.vertices[:, 1] > face.points["2.1"][1]]
+    across = head @ right
+    return float(across.min() + across.max()) / 2

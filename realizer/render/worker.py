@@ -1,0 +1,137 @@
+"""The drawing process: FAP rows in over stdin, pixels out into shared memory, JPEG out over stdout."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from realizer.arrays import Float32, UInt8
+from realizer.errors import RealizerError
+from realizer.face.model import Face
+from realizer.render.cameras import camera_for
+from realizer.render.light import preset
+from realizer.render.offscreen import Canvas
+from realizer.render.wire import Draw, Failed, Jpeg, Message, Open, Pixels, connection
+
+__all__: list[str] = []
+
+BATCH = 16  # frames deformed in one call: enough to spread its fixed cost, few enough to stay in the cache
+
+
+class Artist:
+    """A face, a canvas, and the memory that pictures go to."""
+
+    def __init__(self, order: Open) -> None:
+        from realizer.face import load_face
+
+        self.face = load_face(order.face) if isinstance(order.face, str) else order.face
+        self.pixels = Pixels(order.memory, order.slots, order.size)
+        self.canvas = Canvas(self.face, order.size, camera_for(self.face, order.camera), preset())
+
+    def draw(self, rows: Float32, first: int) -> int:
+        slots = self.pixels.array[first : first + len(rows)]
+        for (vertices, ups), out in zip(shapes(self.face, rows), slots, strict=True):
+            self.canvas.draw(vertices, ups, out)
+        return len(rows)
+
+    def jpeg(self, row: Float32, quality: int) -> bytes:
+        ((vertices, ups),) = shapes(self.face, row[None])
+        return encode_jpeg(self.canvas.draw(vertices, ups), quality)
+
+
+def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
+    """Vertices and normals, (n_vertices, 3) each, of each row of (n, 68) FAPs."""
+    from realizer.face import deform, normals
+
+    for first in range(0, len(rows), BATCH):
+        vertices = deform(face, rows[first : first + BATCH])
+        yield from zip(vertices, normals(face, vertices), strict=True)
+
+
+def encode_jpeg(pixels: UInt8, quality: int) -> bytes:
+    """JPEG of (h, w, 3) uint8; simplejpeg is twice as fast as Pillow and optional."""
+    pixels = np.ascontiguousarray(pixels)
+    try:
+        import simplejpeg
+    except ModuleNotFoundError:
+        import io
+
+        from PIL import Image
+
+        buffer = io.BytesIO()
+        Image.fromarray(pixels).save(buffer, "JPEG", quality=quality)
+        return buffer.getvalue()
+    encoded: bytes = simplejpeg.encode_jpeg(pixels, quality=quality, colorspace="RGB", colorsubsampling="420")
+    return encoded
+
+
+def answer(artist: Artist | None, message: Message) -> tuple[Artist, int | bytes | None]:
+    """What a message asks for, done."""
+    if isinstance(message, Open):
+        return Artist(message), None
+    if artist is None:
+        raise RealizerError(f"wanted Open first, got {type(message).__name__}")
+    if isinstance(message, Draw):
+        return artist, artist.draw(message.rows, message.first)
+    return artist, artist.jpeg(message.row, message.quality)
+
+
+def serve(orders: Connection, answers: Connection) -> None:
+    """Answer messages until the owner hangs up or dies, or something fails."""
+    artist: Artist | None = None
+    owner = os.getppid()
+    while True:
+        # A child of the owner may have inherited the pipe and keep it open: look at who our parent is, too.
+        while not orders.poll(2.0):
+            if os.getppid() != owner:
+                return
+        try:
+            message: Message = orders.recv()
+        except EOFError:
+            return
+        try:
+            artist, result = answer(artist, message)
+        except RealizerError as error:
+            answers.send(Failed(str(error)))
+            return
+        except Exception as error:
+            answers.send(Failed(f"drawing failed: {type(error).__name__}: {error}"))
+            raise
+        answers.send(result)
+
+
+def check() -> int:
+    """Draw one triangle; say on stdout what is missing, and return 3, where that does not work."""
+    from realizer.errors import RenderError
+    from realizer.render.sample import triangle
+
+    face = triangle()
+    try:
+        canvas = Canvas(face, (16, 16), camera_for(face), preset())
+        canvas.draw(face.vertices, np.zeros_like(face.vertices))
+        canvas.close()
+    except RenderError as error:
+        print(error)
+        return 3
+    return 0
+
+
+def main(arguments: list[str]) -> int:
+    if arguments == ["--check"]:
+        return check()
+    orders = connection(0, writes=False)
+    answers = connection(1, writes=True)
+    os.dup2(2, 1)  # what a library prints must not get between the answers
+    try:
+        serve(orders, answers)
+    except BrokenPipeError:
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
