@@ -17,7 +17,17 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from realizer.errors import TableError
 
-__all__ = ["ActionUnit", "Fap", "action_units", "faps", "read_csv", "read_toml"]
+__all__ = [
+    "ActionUnit",
+    "AuToFap",
+    "Fap",
+    "action_units",
+    "au_to_fap",
+    "faps",
+    "override",
+    "read_csv",
+    "read_toml",
+]
 
 Row = TypeVar("Row")
 HEAD = ("source", "units", "licence")
@@ -133,6 +143,26 @@ class ActionUnit:
     degrees: float
 
 
+@dataclass(frozen=True, slots=True)
+class AuToFap:
+    """One straight piece of what an action unit asks of a FAP (Paul 2010, 5.2).
+
+    The pieces of one (au, side, fap) join into a polyline through (0, 0); beyond its end it stays level.
+    """
+
+    au: int
+    side: Literal["L", "R", ""]
+    fap: int
+    au_from: float
+    au_to: float
+    fap_from: float
+    fap_to: float
+
+    @property
+    def key(self) -> tuple[int, str, int]:
+        return self.au, self.side, self.fap
+
+
 @cache
 def faps() -> tuple[Fap, ...]:
     """The 68 FAPs, in order: row i is FAP i + 1."""
@@ -143,6 +173,18 @@ def faps() -> tuple[Fap, ...]:
 def action_units() -> tuple[ActionUnit, ...]:
     """The action units, ascending."""
     return read_csv(text_of("action_units.csv"), ActionUnit, "action_units.csv")
+
+
+@cache
+def au_to_fap() -> tuple[AuToFap, ...]:
+    """What each action unit asks of each FAP, in file order."""
+    return read_csv(text_of("au_to_fap.csv"), AuToFap, "au_to_fap.csv")
+
+
+def override(rows: tuple[AuToFap, ...], own: tuple[AuToFap, ...]) -> tuple[AuToFap, ...]:
+    """`rows` with every polyline (au, side, fap) that `own` names replaced by `own`'s: a face's few rows."""
+    replaced = {row.key for row in own}
+    return (*(row for row in rows if row.key not in replaced), *own)
 
 
 def by_number(rows: tuple[ActionUnit, ...]) -> Mapping[int, ActionUnit]:

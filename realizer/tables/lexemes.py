@@ -1,0 +1,113 @@
+"""lexemes.toml -> what the words of faceLexeme and head mean: action units, and head poses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from realizer import tables
+from realizer.errors import TableError
+
+__all__ = ["FaceLexeme", "HeadLexeme", "face_lexemes", "head_lexemes"]
+
+FILE = "lexemes.toml"
+SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
+
+
+@dataclass(frozen=True, slots=True)
+class FaceLexeme:
+    """A word for a face: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at amount 1."""
+
+    name: str
+    aus: Mapping[tuple[int, str], float]
+
+
+@dataclass(frozen=True, slots=True)
+class HeadLexeme:
+    """A word for a head movement: AU -> degrees at amount 1, at three poses.
+
+    Attributes:
+        ready: before the first stroke.
+        stroke: at each stroke.
+        back: between strokes, and from strokeEnd to relax.
+        decay: each further stroke beside the one before it, 0..1.
+    """
+
+    name: str
+    ready: Mapping[int, float]
+    stroke: Mapping[int, float]
+    back: Mapping[int, float]
+    decay: float
+
+
+@cache
+def face_lexemes() -> Mapping[str, FaceLexeme]:
+    """Upper-case name -> lexeme, in file order.
+
+    Raises:
+        TableError: a name that is no action unit, or an intensity outside 0..1.
+    """
+    return {name: FaceLexeme(name, _aus(name, row)) for name, row in _rows("face").items()}
+
+
+@cache
+def head_lexemes() -> Mapping[str, HeadLexeme]:
+    """Upper-case name -> lexeme, in file order.
+
+    Raises:
+        TableError: a pose of an action unit that is no rotation, or further than it goes.
+    """
+    return {
+        name: HeadLexeme(
+            name, *(_pose(name, row, pose) for pose in ("ready", "stroke", "back")), decay=float(row["decay"])
+        )
+        for name, row in _rows("head").items()
+    }
+
+
+@cache
+def _table() -> Mapping[str, Any]:
+    return tables.read_toml(tables.text_of(FILE), FILE)
+
+
+def _rows(part: str) -> dict[str, Mapping[str, Any]]:
+    rows: Mapping[str, Mapping[str, Any]] = _table()[part]
+    found = {}
+    for name, row in rows.items():
+        same = row.get("same_as", name)
+        if same not in rows:
+            raise TableError(f"{FILE}, {part}.{name}, same_as: wanted another {part} lexeme, got {same!r}")
+        found[name] = rows[same]
+    return found
+
+
+def _aus(name: str, row: Mapping[str, Any]) -> dict[tuple[int, str], float]:
+    known = tables.by_number(tables.action_units())
+    aus = {}
+    for cell, amount in row["aus"].items():
+        match = re.fullmatch(r"(\d+)([LR]?)", cell)
+        au = known.get(int(match[1])) if match else None
+        if match is None or au is None or (match[2] and not au.sides):
+            raise TableError(f"{FILE}, face.{name}: wanted an action unit such as 12 or 12L, got {cell!r}")
+        if not 0 < amount <= 1:
+            raise TableError(f"{FILE}, face.{name}, {cell}: wanted an intensity above 0 and to 1, got {amount}")
+        aus[au.au, SIDES[match[2]]] = float(amount)
+    return aus
+
+
+def _pose(name: str, row: Mapping[str, Any], pose: str) -> dict[int, float]:
+    known = tables.by_number(tables.action_units())
+    degrees = {}
+    for cell, angle in row[pose].items():
+        au = known.get(int(cell)) if cell.isdigit() else None
+        if au is None or not au.degrees:
+            raise TableError(f"{FILE}, head.{name}, {pose}: wanted a rotation such as 54, got {cell!r}")
+        if not 0 < angle <= au.degrees:
+            raise TableError(
+                f"{FILE}, head.{name}, {pose}, {cell}: wanted 0..{au.degrees:g} degrees, got {angle}"
+            )
+        degrees[au.au] = float(angle)
+    return degrees
