@@ -14,7 +14,7 @@ __all__ = ["Channel", "Layer"]
 
 
 class Layer(IntEnum):
-    """Bottom up (DESIGN 6): a higher layer is drawn over a lower one."""
+    """Bottom up: where a channel is blended; `animation.blend` says what each layer does to those below."""
 
     BASE = 0  # mood, *Shift
     IDLE = 1  # blinks, small head motion

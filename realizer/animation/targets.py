@@ -7,7 +7,7 @@ from functools import cache
 
 from realizer import tables
 
-__all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence"]
+__all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence", "region"]
 
 # How far (0..1) a layer has taken a region from what lies below it: speech takes the lips,
 # a temporary gaze takes eyes and head from the base gaze.
@@ -64,3 +64,18 @@ def fap(number: int) -> Target:
 def presence(region: str) -> Target:
     """The column that says how far a region ("lips", "eyes", "head") is taken."""
     return axis()[region]
+
+
+def region(target: Target) -> str:
+    """The part of the face a column moves, as base states are replaced: "eyes" (gaze), "head", or "face".
+
+    A presence stands in the region it takes; all FAPs but those of eyeballs and head are of the face.
+    """
+    name = target.name
+    if name in PRESENCES:
+        return name if name != "lips" else "face"
+    if not name.rstrip("LR").isdigit():
+        number = next(row.fap for row in tables.faps() if row.name == name)
+        return "eyes" if 23 <= number <= 28 else "head" if 48 <= number <= 50 else "face"
+    number = int(name.rstrip("LR"))
+    return "eyes" if 61 <= number <= 66 else "head" if 51 <= number <= 58 else "face"

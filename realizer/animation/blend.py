@@ -1,0 +1,120 @@
+"""Channels and times -> AUFrames: layers laid over each other, whatever the order of the channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+
+import numpy as np
+
+from realizer import tables
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.curves import sample, weights
+from realizer.animation.frames import AUFrames
+from realizer.animation.targets import AU_NAMES, PRESENCES, axis, region
+from realizer.arrays import Bool, Float64
+
+__all__ = ["blend"]
+
+
+def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
+    """What all channels show together.
+
+    Column by column of the axis:
+
+    - AUs: the strongest channel wins; rotations (combine = "sum" in the table) of all layers add up.
+    - BASE states add up, so that one which is faded out while another rises passes smoothly into it; the
+      part of a region that the GAZE layer has taken (its presence) is taken from them.
+    - GAZE: where several gazes claim a region together more than once, each gets its share of it.
+    - FAPs add up; presences add up to at most 1.
+    - DIRECT: as far as such a channel is there, it replaces all that lies below.
+
+    AUs are limited to 0..1 at the end.
+
+    Args:
+        channels: any number, any order; times on the same clock as `times`.
+        times: (n,) seconds, any order.
+    """
+    times = np.asarray(times, np.float64)
+    alive = _alive(channels, times)
+    sampled = sample(alive, times)
+    sums, _ = _columns()
+    shape = (len(axis()), len(times))
+    base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for channel, row in zip(alive, sampled, strict=True):
+        column = channel.target.column
+        if channel.layer is Layer.DIRECT:
+            continue
+        if channel.layer is Layer.BASE:
+            base[column] += row
+        elif channel.layer is Layer.GAZE and sums[column]:
+            gaze[column] += row
+        elif sums[column]:
+            over[column] += row
+        else:
+            np.maximum(over[column], row, out=over[column])
+    for name, part in _regions().items():
+        taken = gaze[axis()[name].column]
+        if taken.any():
+            gaze[part] /= np.maximum(taken, 1.0)
+            base[part] *= 1.0 - np.minimum(taken, 1.0)
+    over += gaze
+    # Base states and expressions: the stronger one shows; rotations add up.
+    values = np.where(sums[:, None], base + over, np.maximum(base, over))
+    _override(values, alive, sampled, times)
+    limited = _limited()
+    values[limited] = np.clip(values[limited], 0.0, 1.0)
+    return AUFrames(times, np.ascontiguousarray(values.T, np.float32))
+
+
+def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
+    if not len(times):
+        return []
+    first, last = float(np.min(times)), float(np.max(times))
+    return [c for c in channels if c.span[0] <= last and c.span[1] >= first]
+
+
+def _override(values: Float64, channels: list[Channel], sampled: Float64, times: Float64) -> None:
+    """Lay the DIRECT channels over `values` (n_targets, n), in place."""
+    rows = [i for i, channel in enumerate(channels) if channel.layer is Layer.DIRECT]
+    if not rows:
+        return
+    sums, _ = _columns()
+    there = weights([channels[i] for i in rows], times)
+    direct: dict[int, tuple[Float64, Float64]] = {}
+    for i, weight in zip(rows, there, strict=True):
+        column = channels[i].target.column
+        value = sampled[i]
+        if column in direct:
+            other, other_weight = direct[column]
+            value = value + other if sums[column] else np.maximum(value, other)
+            weight = np.maximum(weight, other_weight)
+        direct[column] = value, weight
+    for column, (value, weight) in direct.items():
+        values[column] = values[column] * (1.0 - weight) + value
+
+
+@cache
+def _columns() -> tuple[Bool, int]:
+    """(n_targets,) True where channels add up; number of AU columns."""
+    n_aus = len(AU_NAMES())
+    sums = np.ones(len(axis()), bool)
+    known = tables.by_number(tables.action_units())
+    sums[:n_aus] = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
+    return sums, n_aus
+
+
+@cache
+def _limited() -> list[int]:
+    """Columns that stay within 0..1: the AUs and the presences."""
+    return [*range(len(AU_NAMES())), *(axis()[name].column for name in PRESENCES)]
+
+
+@cache
+def _regions() -> dict[str, list[int]]:
+    """The presences that a gaze takes -> AU columns of that region."""
+    regions: dict[str, list[int]] = {"eyes": [], "head": []}
+    for name in AU_NAMES():
+        if region(axis()[name]) in regions:
+            regions[region(axis()[name])].append(axis()[name].column)
+    return regions

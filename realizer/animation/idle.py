@@ -1,0 +1,130 @@
+"""A seed and a span of time -> what a face does when it does nothing: blinks, small head motion, saccades.
+
+Everything is a function of (seed, time) alone: each movement has a number k = 0, 1, 2, .. and draws what is
+random about it from (seed, kind, k), so any two windows of time agree where they overlap.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer import tables
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import au
+from realizer.arrays import Float64
+
+__all__ = ["idle_channels"]
+
+# s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
+BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
+# s: a lid closes faster than it opens; 0.05 s shut is at least one frame at 25 fps. 0.3 s in all.
+BLINK_TIMES = (0.0, 0.08, 0.13, 0.3)
+BLINK_VALUES = (0.0, 1.0, 1.0, 0.0)
+
+# Small head motion, ours: a new pose every 1.9 s, up to so many degrees each way. AUs: (negative, positive).
+SWAY_PERIOD = 1.9  # s
+SWAY = {(52, 51): 1.6, (53, 54): 1.1, (55, 56): 1.0}
+# Small saccades, ours: a new point of fixation every 1.1 s, up to so many degrees, reached in 0.04 s.
+SACCADE_PERIOD = 1.1  # s
+SACCADE = {(62, 61): 1.4, (63, 64): 0.9}
+SACCADE_TIME = 0.04  # s
+# Eyes stay where they look while the head sways: they turn back by as much as it turns (degrees).
+COUNTER = {(52, 51): (61, 62), (53, 54): (64, 63)}
+
+
+def idle_channels(start: float, end: float, seed: int) -> list[Channel]:
+    """Blinks (AU45), head sway (AU51-56) and saccades (AU61-64) of the idle layer.
+
+    Args:
+        start, end: seconds on the session clock; the channels are right from start to end, both included.
+        seed: of the character.
+
+    Returns:
+        Channels on the session clock. Blend a window of time with its own channels only.
+    """
+    channels = [
+        Channel(lid, at + np.array(BLINK_TIMES), np.array(BLINK_VALUES), layer=Layer.IDLE, source="idle")
+        for at in _blinks(start, end, seed)
+        for lid in au(45)
+    ]
+    for kind, (sides, most) in enumerate(SWAY.items()):
+        times, degrees = _poses(start, end, seed, kind + 1, SWAY_PERIOD, most)
+        channels += _turn(sides, times, degrees)
+        if sides in COUNTER:
+            channels += _turn(COUNTER[sides], times, degrees)
+    for kind, (sides, most) in enumerate(SACCADE.items()):
+        # Both directions jump at the same instants: a saccade is one movement.
+        times, degrees = _poses(start, end, seed, 10, SACCADE_PERIOD, most, direction=11 + kind)
+        held = np.repeat(times, 2)[1:]
+        held[1::2] = times[1:] + SACCADE_TIME
+        channels += _turn(sides, held, np.repeat(degrees, 2)[:-1])
+    return channels
+
+
+def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> list[Channel]:
+    """Signed degrees as two AUs; between keys they add up to the same smooth course."""
+    known = tables.by_number(tables.action_units())
+    return [
+        Channel(
+            au(number)[0],
+            times,
+            np.maximum(sign * degrees, 0.0) / known[number].degrees,
+            layer=Layer.IDLE,
+            source="idle",
+        )
+        for number, sign in zip(sides, (-1.0, 1.0), strict=True)
+    ]
+
+
+def _poses(
+    start: float, end: float, seed: int, kind: int, period: float, most: float, direction: int | None = None
+) -> tuple[Float64, Float64]:
+    """Times (k,) and degrees (k,) of the poses around start..end, at uneven times about `period` apart.
+
+    `kind` draws the times, `direction` (the same, if not given) the degrees.
+    """
+    first, last = math.floor(start / period) - 2, math.ceil(end / period) + 2
+    k = np.arange(first, last + 1)
+    times = (k + 0.7 * _uniform(seed, kind, k)) * period
+    # The mean of two draws: small poses are more common than large ones.
+    way = 100 + (kind if direction is None else direction)
+    degrees = most * (_uniform(seed, way, k) + _uniform(seed, way + 100, k) - 1.0)
+    return times, degrees
+
+
+def _blinks(start: float, end: float, seed: int) -> Float64:
+    """Onsets of the blinks that can be seen in start..end; the first comes after 0."""
+    count = 64
+    while (onsets := _onsets(seed, count))[-1] <= end:
+        count *= 2
+    return onsets[(onsets + BLINK_TIMES[-1] >= start) & (onsets <= end)]
+
+
+@lru_cache(maxsize=256)
+def _onsets(seed: int, count: int) -> Float64:
+    """The first `count` blinks of a face: (count,) seconds, rising."""
+    k = np.arange(count)
+    # Box-Muller: two uniform numbers make a normal one.
+    normal = np.sqrt(-2.0 * np.log1p(-_uniform(seed, 301, k))) * np.cos(2.0 * np.pi * _uniform(seed, 302, k))
+    gaps = np.clip(BLINK_MEDIAN * np.exp(BLINK_SPREAD * normal), BLINK_LEAST, BLINK_MOST)
+    gaps[0] *= _uniform(seed, 303, k[:1])[0]  # nobody begins a session with a blink at the same time
+    return np.cumsum(gaps)
+
+
+def _uniform(seed: int, kind: int, k: npt.NDArray[np.int64]) -> Float64:
+    """(n,) numbers in [0, 1) that depend on (seed, kind, k) alone; the mixing step of SplitMix64.
+
+    A generator of numpy is not promised to draw the same numbers in its next version.
+    """
+    mask = (1 << 64) - 1
+    z = k.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    z = z + np.uint64((seed * 0xD1B54A32D192ED03 + kind * 0x8CB92BA72F3D8DD7 + 0x632BE59BD9B4E019) & mask)
+    for _ in range(2):
+        z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        z = z ^ (z >> np.uint64(31))
+    return (z >> np.uint64(11)).astype(np.float64) * 2.0**-53
