@@ -1,0 +1,118 @@
+"""What a face's fields.npz says, made into the matrices that `deform` multiplies by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Float32, Int32
+from realizer.errors import FaceError
+from realizer.face.model import Fapu
+from realizer.tables import faps
+
+__all__: list[str] = []
+
+FAPS = 68
+# Rows after the FAPs': they are multiplied by 1 - cos and sin of an angle.
+JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN = range(FAPS, FAPS + 4)
+ROWS = FAPS + 4
+
+ARRAYS = {
+    "row": 1,  # which FAP (its number) or extra row (70..73 are JAW_COS.. + 1), ascending
+    "start": 1,  # where the row's part of vertex and move begins; one more than rows
+    "vertex": 1,
+    "move": 2,  # metres for each metre (radian) that the feature point is asked to move
+    "head": 1,  # 0..255: how far each vertex turns with the head
+    "jaw_pivot": 1,
+    "head_pivot": 1,
+    "eye_centre": 2,  # left, right
+    "lid": 1,  # vertices that must not sink into the eyeballs
+    "lid_eye": 1,  # 0 left, 1 right
+    "lid_radius": 1,  # metres
+}
+
+
+def basis_from(
+    path: Path,
+    vertices: Float32,
+    points: Mapping[str, Float32],
+    parts: Mapping[str, tuple[int, int]],
+    fapu: Fapu,
+) -> dict[str, Any]:
+    """The displacement basis.
+
+    Returns:
+        moving: (first, last + 1), the vertices that any FAP but the head's moves.
+        fields: (72, 3 x moving) float32, metres per FAPU, then the four rows of the jaw and the tongue.
+        head: (n, 1) float32 0..1; head_pivot: (3,).
+        chin: (2,) float64, y and z of 2.1 about the jaw's axis.
+        eyes: ((first, last + 1), (3,) centre) for left and right; thrust: metres per FAPU of 27 and 28.
+        lid, lid_eye, lid_radius: (k,) each.
+
+    Raises:
+        FaceError: a missing array, an index out of range, or a value that is not finite.
+    """
+    from realizer.face.load import read_arrays  # load reads the folder and comes back for its basis
+
+    stored = read_arrays(path, ARRAYS)
+    n = len(vertices)
+    for name, size in (("head", n), ("jaw_pivot", 3), ("head_pivot", 3)):
+        if len(stored[name]) != size:
+            raise FaceError(f"{path}: {name}: wanted {size} values, got {len(stored[name])}; build again")
+    for name in ("vertex", "lid"):
+        index = stored[name]
+        if len(index) and (index.min() < 0 or index.max() >= n):
+            raise FaceError(f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; build again")
+    for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
+        if not np.isfinite(stored[name]).all():
+            raise FaceError(f"{path}: {name}: wanted finite numbers, got NaN or infinity; build again")
+    first, last = int(stored["vertex"].min()), int(stored["vertex"].max()) + 1
+    fields = np.zeros((ROWS, last - first, 3), np.float32)
+    table = faps()
+    for k, row in enumerate(stored["row"].tolist()):
+        part = slice(int(stored["start"][k]), int(stored["start"][k + 1]))
+        # The rows after FAP 68 are in metres already.
+        scale = fapu.metres(table[row - 1].unit) if row <= FAPS else 1.0
+        fields[row - 1, stored["vertex"][part] - first] = stored["move"][part].astype(np.float32) * scale
+    chin = np.asarray(points["2.1"][1:], np.float64) - stored["jaw_pivot"][1:]
+    return {
+        "moving": (first, last),
+        "fields": fields.reshape(ROWS, -1),
+        "head": (stored["head"].astype(np.float32) / 255)[:, None],
+        "head_pivot": stored["head_pivot"].astype(np.float32),
+        "chin": chin,
+        "eyes": tuple(
+            (parts[name], stored["eye_centre"][k].astype(np.float32))
+            for k, name in enumerate(("left_eye", "right_eye"))
+        ),
+        "thrust": np.float32(fapu.metres("ES")),
+        "open_jaw": np.float64(fapu.metres("MNS")),
+        "lid": stored["lid"].astype(np.int32),
+        "lid_eye": stored["lid_eye"].astype(np.int32),
+        "lid_radius": stored["lid_radius"].astype(np.float32),
+    }
+
+
+def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
+    """The stored form of fields: row number -> (n, 3) becomes row, start, vertex, move.
+
+    Moves below the threshold (of what the feature point is asked to move) are left out: nobody sees them.
+    """
+    numbers, starts, vertices, moves = [], [0], [], []
+    for number in sorted(rows):
+        field = np.asarray(rows[number], np.float64)
+        least = threshold if number <= FAPS else threshold * 0.05  # these are metres from the pivot
+        index: Int32 = np.flatnonzero(np.abs(field).max(axis=1) > least).astype(np.int32)
+        numbers.append(number)
+        vertices.append(index)
+        moves.append(field[index].astype(np.float16))
+        starts.append(starts[-1] + len(index))
+    return {
+        "row": np.array(numbers, np.int32),
+        "start": np.array(starts, np.int32),
+        "vertex": np.concatenate(vertices).astype(np.int32),
+        "move": np.concatenate(moves),
+    }

@@ -1,0 +1,126 @@
+"""FAP rows in, vertices out: one matrix product, then the parts that turn and the lids that slide."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Bool, Float32, Float64
+from realizer.face.basis import FAPS, JAW_COS, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
+from realizer.face.model import Face
+from realizer.units import ANGLE_UNIT
+
+__all__ = ["deform"]
+
+OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
+# Rotated by these, the parts are driven apart from the product.
+DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49, 22, 23, 24, 25, 26, 27]
+
+
+def deform(face: Face, faps: Any) -> Float32:
+    """The face's vertices under the FAPs.
+
+    Args:
+        faps: (n, 68) FAP values in FAPU, column = FAP - 1; FAPs 1 and 2 are not looked at.
+
+    Returns:
+        (n, n_vertices, 3) float32 metres.
+
+    Raises:
+        ValueError: another shape, or values that are not finite.
+    """
+    rows = np.asarray(faps, np.float32)
+    if rows.ndim != 2 or rows.shape[1] != FAPS:
+        raise ValueError(f"faps: wanted (n, {FAPS}), got {rows.shape}")
+    if not np.isfinite(rows).all():
+        raise ValueError("faps: wanted finite values, got NaN or infinity")
+    basis = face.basis
+    out = np.empty((len(rows), *face.vertices.shape), np.float32)
+    out[:] = face.vertices
+    weights = _weights(basis, rows)
+    used = np.flatnonzero(weights.any(axis=0))
+    if len(used):
+        first, last = basis["moving"]
+        moves = weights[:, used] @ basis["fields"][used]
+        out[:, first:last] += moves.reshape(len(rows), -1, 3)
+    _turn_eyes(basis, rows, out)
+    _keep_lids_over_balls(basis, rows, out)
+    _turn_head(basis, rows, out)
+    return out
+
+
+def jaw_angle(basis: Any, opening: Any) -> Float64:
+    """Radians by which the jaw turns so that the chin (2.1) sinks by `opening` metres, as far as it can."""
+    y, z = basis["chin"]
+    # y' = y cos a - z sin a, so y - y' = opening is one sine of a shifted angle.
+    length = float(np.hypot(y, z))
+    rest = float(np.arctan2(y, z))
+    return np.arcsin(np.clip((np.asarray(opening, np.float64) - y) / length, -1, 1)) + rest
+
+
+def _weights(basis: Any, rows: Float32) -> Float32:
+    """(n, 72): what the rows of the basis are multiplied by."""
+    weights = np.zeros((len(rows), ROWS), np.float32)
+    weights[:, 2:FAPS] = rows[:, 2:]
+    weights[:, DRIVEN] = 0
+    jaw = jaw_angle(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
+    jaw[rows[:, OPEN_JAW] == 0] = 0  # the neutral face stays still to the last bit
+    weights[:, JAW_COS], weights[:, JAW_SIN] = 1 - np.cos(jaw), np.sin(jaw)
+    roll = rows[:, TONGUE_ROLL] * ANGLE_UNIT
+    weights[:, TONGUE_COS], weights[:, TONGUE_SIN] = 1 - np.cos(roll), np.sin(roll)
+    return weights
+
+
+def rotations(pitch: Float32, yaw: Float32, roll: Float32) -> Float32:
+    """(n, 3, 3) from radians: positive pitch looks down, yaw to the character's left, roll leans right."""
+    (a, b, c), (d, e, f) = np.cos([pitch, yaw, roll]), np.sin([pitch, yaw, roll])
+    zero, one = np.zeros_like(a), np.ones_like(a)
+
+    def stack(*rows: tuple[Any, Any, Any]) -> Any:
+        return np.stack([np.stack(row, -1) for row in rows], -2)
+
+    about_x = stack((one, zero, zero), (zero, a, -d), (zero, d, a))
+    about_y = stack((b, zero, e), (zero, one, zero), (-e, zero, b))
+    about_z = stack((c, -f, zero), (f, c, zero), (zero, zero, one))
+    turned: Float32 = (about_y @ about_x @ about_z).astype(np.float32)
+    return turned
+
+
+def _turn_eyes(basis: Any, rows: Float32, out: Float32) -> None:
+    angles = rows[:, EYES] * np.float32(ANGLE_UNIT)
+    for side, ((first, last), centre) in enumerate(basis["eyes"]):
+        yaw, pitch = angles[:, side], angles[:, 2 + side]
+        if yaw.any() or pitch.any():
+            turn = rotations(pitch, yaw, np.zeros_like(yaw))
+            out[:, first:last] = (out[:, first:last] - centre) @ turn.transpose(0, 2, 1) + centre
+        thrust = rows[:, THRUST][:, side]
+        if thrust.any():
+            out[:, first:last, 2] += (thrust * basis["thrust"])[:, None]
+
+
+def _keep_lids_over_balls(basis: Any, rows: Float32, out: Float32) -> None:
+    """Push lid vertices forward until they lie as far from the ball's centre as at rest: lids slide over balls."""
+    moved: Bool = rows[:, 18:22].any(axis=1) | rows[:, THRUST].any(axis=1)
+    if not moved.any():
+        return
+    lid, side = basis["lid"], basis["lid_eye"]
+    centres = np.stack([centre for _, centre in basis["eyes"]])[side]
+    frames = np.flatnonzero(moved)
+    at = out[np.ix_(frames, lid)]
+    away = at - centres
+    away[..., 2] -= (rows[frames][:, THRUST] * basis["thrust"])[:, side]
+    room = np.square(basis["lid_radius"]) - np.square(away[..., 0]) - np.square(away[..., 1])
+    push = np.sqrt(np.maximum(room, 0)) - away[..., 2]
+    at[..., 2] += np.where(room > 0, np.maximum(push, 0), 0)
+    out[np.ix_(frames, lid)] = at
+
+
+def _turn_head(basis: Any, rows: Float32, out: Float32) -> None:
+    angles = rows[:, HEAD] * np.float32(ANGLE_UNIT)
+    if not angles.any():
+        return
+    turn = rotations(*angles.T) - np.eye(3, dtype=np.float32)
+    moves = (out - basis["head_pivot"]) @ turn.transpose(0, 2, 1)
+    moves *= basis["head"]
+    out += moves

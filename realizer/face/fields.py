@@ -1,0 +1,234 @@
+"""Displacement fields of the FAPs on the base mesh: identity and expression shapes in, one field a FAP out.
+
+Every field is scaled so that its feature point moves one metre for each metre asked, in the FAP's direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from realizer.arrays import Float64
+from realizer.face.basis import JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN
+from realizer.face.hm08 import BaseMesh
+from realizer.face.lids import lid_fields
+from realizer.face.lips import Lips, lip_fields
+from realizer.face.parts import smooth
+
+__all__: list[str] = []
+
+Shape = Callable[[str], Float64]
+UP, LEFT, FORWARD = np.array([0, 1.0, 0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
+
+
+class Ground:
+    """What all fields are made from.
+
+    Attributes:
+        at: (n, 3) metres, the base mesh with its identity.
+        points: feature point -> base vertex.
+        shape: name of a face unit -> (n, 3) metres.
+        average: (n, n) sparse; a vertex's neighbours and itself in equal parts.
+    """
+
+    def __init__(self, mesh: BaseMesh, at: Float64, points: Mapping[str, int], shape: Shape) -> None:
+        self.mesh, self.at, self.points, self.shape = mesh, at, points, shape
+        n = len(at)
+        quads = mesh.quads["body"]
+        a = np.concatenate([quads[:, k] for k in range(4)])
+        b = np.concatenate([quads[:, (k + 1) % 4] for k in range(4)])
+        near = sp.csr_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (n, n))
+        near.data[:] = 1
+        near = near + sp.eye_array(n, format="csr")
+        self.average = sp.csr_matrix(sp.diags_array(1 / np.asarray(near.sum(axis=1)).ravel()) @ near)
+        self.body = np.zeros(n, bool)
+        self.body[np.unique(quads)] = True
+
+    def point(self, name: str) -> Float64:
+        """Where a feature point lies, (3,) metres."""
+        return np.asarray(self.at[self.points[name]])
+
+    def smoothed(self, field: Float64, times: int = 1) -> Float64:
+        """A field on the body with its kinks softened."""
+        for _ in range(times):
+            field = np.asarray(self.average @ field)
+        return field
+
+    def ellipsoid(self, centre: Any, radii: Any, plateau: float = 0.0) -> Float64:
+        """Influence (n,) of an ellipsoid: 1 at the centre, 0 outside, raised cosine between (Paul 2010, 4.3.3)."""
+        away = np.linalg.norm((self.at - np.asarray(centre)) / np.asarray(radii), axis=1)
+        away = np.clip((away - plateau) / (1 - plateau), 0, 1)
+        return np.where(self.body, (1 + np.cos(np.pi * away)) / 2, 0.0)
+
+
+def scaled(field: Float64, vertex: int, direction: Any) -> Float64:
+    """The field with a move of exactly 1 along the direction at the vertex."""
+    here = float(field[vertex] @ np.asarray(direction))
+    if abs(here) < 1e-9:
+        raise ValueError(f"a field that leaves its feature point's vertex {vertex} still cannot be scaled")
+    return np.asarray(field / here)
+
+
+def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:
+    """Row number (FAP number, or 70..73: `basis`) -> (n, 3) field on the base mesh; and what the lips are."""
+    lips = Lips(ground)
+    fields = lip_fields(ground, lips)
+    fields |= _jaw(ground, lips, jaw_pivot)
+    fields |= lid_fields(ground)
+    fields |= _brows(ground)
+    fields |= _cheeks(ground, lips)
+    fields |= _nose(ground, lips)
+    fields |= _ears(ground)
+    fields |= _tongue(ground)
+    return fields, lips
+
+
+def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
+    # How far the chin drags each vertex of the skin: the CC0 shape of an opening jaw, measured by its fall.
+    shape = ground.shape("jawOpen")
+    chin = ground.points["2.1"]
+    drag = np.clip(np.linalg.norm(shape, axis=1) / np.linalg.norm(shape[chin]), 0, 1)
+    drag = np.where(ground.body, drag, 0)
+    drag = ground.smoothed(drag, 2)
+    under = smooth(drag, 0.0, 0.9) * 0.5 + drag * 0.5
+    drag = under / under[chin]
+    drag = np.minimum(drag, 1)
+    tongue = np.zeros(len(ground.at))
+    tongue[np.unique(ground.mesh.quads["helper-tongue"])] = 1
+    opens = drag * (1 - lips.around) + tongue
+    arm = ground.at - pivot
+    turn_cos, turn_sin = np.zeros_like(arm), np.zeros_like(arm)
+    # Turned by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
+    turn_cos[:, 1:] = -arm[:, 1:]
+    turn_sin[:, 1], turn_sin[:, 2] = -arm[:, 2], arm[:, 1]
+    # Thrust and shift take the lower lip along; the upper one stays.
+    slides = drag * (1 - lips.upper) * (1 - 0.5 * lips.corners) + tongue
+    slides /= slides[chin]
+    return {
+        JAW_COS + 1: turn_cos * opens[:, None],
+        JAW_SIN + 1: turn_sin * opens[:, None],
+        14: slides[:, None] * FORWARD,
+        15: -slides[:, None] * LEFT,
+    }
+
+
+def _brows(ground: Ground) -> dict[int, Float64]:
+    at, points = ground.at, ground.points
+    raise_ = sum((ground.shape(name) for name in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")), np.zeros_like(at))
+    raise_ = np.where(ground.body[:, None], raise_, 0)
+    stations = [ground.point(name) for name in ("4.1", "4.3", "4.5")]
+    across = np.array([p[0] for p in stations])
+    line = [raise_[points[name], 1] for name in ("4.1", "4.3", "4.5")]
+    # 1 all along the brow, falling off above and below as the shape does.
+    local = np.interp(np.abs(at[:, 0]), across, line)
+    profile = raise_ / local[:, None]
+    profile[:, 1] = np.clip(profile[:, 1], 0, 1.25)
+    profile[:, 0] = 0
+    profile[:, 2] = np.clip(profile[:, 2], -0.6, 0.6)
+    # The lid's edge does not follow the brow: FAPs 19 and 20 own it.
+    calm = 1 - np.maximum(
+        ground.ellipsoid(ground.point("3.1"), (0.024, 0.0095, 0.03), 0.5),
+        ground.ellipsoid(ground.point("3.2"), (0.024, 0.0095, 0.03), 0.5),
+    )
+    profile = ground.smoothed(profile * calm[:, None], 2)
+    out = {}
+    for side, (names, numbers) in {
+        1: (("4.1", "4.3", "4.5"), (31, 33, 35)),
+        -1: (("4.2", "4.4", "4.6"), (32, 34, 36)),
+    }.items():
+        x = at[:, 0] * side
+        half = smooth(x, -0.012, 0.012)  # the two sides share the middle: together they lift it once
+        a, b, c = across
+        inner = half * smooth(x, b, a)
+        outer = smooth(x, b, c)
+        middle = half * (1 - smooth(x, b, a)) * (1 - outer)
+        for number, name, share in zip(numbers, names, (inner, middle, outer), strict=True):
+            out[number] = scaled(profile * share[:, None], points[name], UP)
+    for number, name, side in ((37, "4.1", 1), (38, "4.2", -1)):
+        x = at[:, 0] * side
+        reach = ground.ellipsoid(ground.point(name), (0.030, 0.022, 0.03)) * smooth(x, 0.0, across[0])
+        field = reach[:, None] * (-side * LEFT + 0.15 * FORWARD) * calm[:, None]
+        out[number] = scaled(ground.smoothed(field, 1), points[name], -side * LEFT)
+    return out
+
+
+def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:
+    """A shape's left (1) and right (-1) half, joined smoothly at the middle."""
+    return {side: shape * smooth(ground.at[:, 0] * side, -0.008, 0.008)[:, None] for side in (1, -1)}
+
+
+def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
+    points, out = ground.points, {}
+    free = (1 - lips.lips)[:, None]
+    for side, half in _halves(ground, ground.shape("cheekPuff") * free).items():
+        number, name = (39, "5.1") if side > 0 else (40, "5.2")
+        puffed = np.where(ground.body[:, None], half, 0)
+        # The whole puff goes along, forwards too; only what points inwards is kept out.
+        out[number] = scaled(ground.smoothed(puffed, 1), points[name], side * LEFT)
+    for side, (number, name, shape) in {
+        1: (41, "5.3", "cheekSquintLeft"),
+        -1: (42, "5.4", "cheekSquintRight"),
+    }.items():
+        lifted = np.where(ground.body[:, None], ground.shape(shape), 0) * free
+        eye = ground.point("3.3" if side > 0 else "3.4")
+        lifted = lifted * (1 - ground.ellipsoid(eye + [0, 0.004, 0], (0.024, 0.012, 0.03), 0.5))[:, None]
+        mound = ground.ellipsoid(ground.point(name), (0.030, 0.024, 0.035))[:, None] * (UP + 0.35 * FORWARD)
+        here = lifted[points[name], 1]
+        mixed = mound + (lifted / here if here > 1e-4 else 0)
+        out[number] = scaled(ground.smoothed(mixed * free, 1), points[name], UP)
+    return out
+
+
+def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
+    points, free = ground.points, (1 - lips.lips)[:, None]
+    out = {}
+    for number, name, side in ((61, "9.1", 1), (62, "9.2", -1)):
+        reach = ground.ellipsoid(ground.point(name), (0.011, 0.012, 0.014)) * smooth(ground.at[:, 0] * side, 0.001, 0.008)
+        out[number] = scaled(ground.smoothed(reach[:, None] * (side * LEFT), 1), points[name], side * LEFT)
+    tip = ground.point("9.3")
+    reach = ground.ellipsoid(tip - [0, 0.001, 0.006], (0.022, 0.020, 0.030), 0.15)[:, None]
+    out[63] = scaled(ground.smoothed(reach * (UP + 0.1 * FORWARD) * free, 1), points["9.3"], UP)
+    reach = ground.ellipsoid(tip - [0, -0.004, 0.008], (0.026, 0.030, 0.032), 0.2)[:, None]
+    out[64] = scaled(ground.smoothed(reach * -LEFT * free, 1), points["9.3"], -LEFT)
+    return out
+
+
+def _ears(ground: Ground) -> dict[int, Float64]:
+    points, out = ground.points, {}
+    for side, names in {1: ("10.1", "10.3", 65, 67), -1: ("10.2", "10.4", 66, 68)}.items():
+        top, back, up, pull = names
+        centre = (ground.point(top) + ground.point("10.5" if side > 0 else "10.6")) / 2
+        reach = ground.ellipsoid(centre + [0.006 * side, 0, -0.004], (0.022, 0.060, 0.036), 0.45)
+        reach = ground.smoothed(reach, 1)[:, None]
+        out[up] = scaled(reach * UP, points[top], UP)
+        # Pulled out, the ear swings about its front edge.
+        swing = reach * smooth(centre[2] - ground.at[:, 2], -0.024, 0.018)[:, None]
+        out[pull] = scaled(swing * side * LEFT, points[back], side * LEFT)
+    return out
+
+
+def _tongue(ground: Ground) -> dict[int, Float64]:
+    at = ground.at
+    mine = np.zeros(len(at), bool)
+    mine[np.unique(ground.mesh.quads["helper-tongue"])] = True
+    back, front = at[mine, 2].min(), at[mine, 2].max()
+    along = np.where(mine, np.clip((at[:, 2] - back) / (front - back), 0, 1), 0)
+    tip, body = ground.points["6.1"], ground.points["6.2"]
+    bend = smooth(along, 0.35, 1.0) * along
+    arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * mine
+    edge = smooth(along, 0.30, 0.65) * mine
+    # Rolled by a about its middle line: the borders rise, whichever side they are on.
+    turn_cos, turn_sin = np.zeros_like(at), np.zeros_like(at)
+    turn_cos[:, 0] = -at[:, 0] * edge
+    turn_sin[:, 1] = np.abs(at[:, 0]) * edge
+    return {
+        43: scaled(bend[:, None] * -LEFT, tip, -LEFT),
+        44: scaled(bend[:, None] * UP, tip, UP),
+        45: scaled((along**1.5)[:, None] * FORWARD, tip, FORWARD),
+        46: scaled(arch[:, None] * UP, body, UP),
+        TONGUE_COS + 1: turn_cos,
+        TONGUE_SIN + 1: turn_sin,
+    }

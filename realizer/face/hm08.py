@@ -1,0 +1,127 @@
+"""The MakeHuman base mesh hm08 and its shape targets (CC0): a folder of files in, arrays out."""
+
+from __future__ import annotations
+
+import gzip
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from realizer.arrays import Float64, Int32
+from realizer.errors import FaceError
+
+__all__: list[str] = []
+
+OBJ = Path("mpfb2/3dobjs/base.obj")
+DECIMETRE = 0.1  # m; the data's unit
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMesh:
+    """The base mesh.
+
+    Attributes:
+        vertices: (n, 3) decimetres.
+        uv: (n, 2) texture coordinates of the body's vertices, 0 elsewhere.
+        quads: group name -> (m, 4) vertex indices.
+    """
+
+    vertices: Float64
+    uv: Float64
+    quads: Mapping[str, Int32]
+
+    def loop(self, first: int, second: int) -> list[int]:
+        """The edge loop of the body that starts with these two vertices, as far as vertices have four edges.
+
+        Raises:
+            ValueError: the two do not share an edge.
+        """
+        return walk(self._edges(), first, second)
+
+    def _edges(self) -> dict[frozenset[int], list[frozenset[int]]]:
+        edges: dict[frozenset[int], list[frozenset[int]]] = defaultdict(list)
+        for quad in self.quads["body"].tolist():
+            for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
+                edges[frozenset((a, b))].append(frozenset(quad))
+        return edges
+
+
+def walk(edges: Mapping[frozenset[int], list[frozenset[int]]], first: int, second: int) -> list[int]:
+    """Vertices of an edge loop, each once, from `first` in the direction of `second`."""
+    if frozenset((first, second)) not in edges:
+        raise ValueError(f"vertices {first} and {second} share no edge")
+    near: dict[int, set[int]] = defaultdict(set)
+    for edge in edges:
+        a, b = tuple(edge)
+        near[a].add(b)
+        near[b].add(a)
+    out = [first, second]
+    while True:
+        beside = set().union(*edges[frozenset(out[-2:])])
+        onward = near[out[-1]] - beside
+        if len(onward) != 1 or onward == {first}:
+            return out
+        out.append(onward.pop())
+
+
+def read_base(data: Path) -> BaseMesh:
+    """The base mesh below `data` (the folder that holds `mpfb2`).
+
+    Raises:
+        FaceError: no such file.
+    """
+    path = data / OBJ
+    if not path.is_file():
+        raise FaceError(f"{path}: wanted the MakeHuman base mesh, found no such file")
+    vertices: list[list[float]] = []
+    texture: list[list[float]] = []
+    quads: dict[str, list[list[int]]] = defaultdict(list)
+    corners: list[tuple[int, int]] = []
+    group = ""
+    for line in path.read_text("ascii").splitlines():
+        word, *rest = line.split() or [""]
+        if word == "v":
+            vertices.append([float(x) for x in rest[:3]])
+        elif word == "vt":
+            texture.append([float(x) for x in rest[:2]])
+        elif word == "g":
+            group = rest[0]
+        elif word == "f":
+            pairs = [(int(a) - 1, int(b) - 1) for a, b, *_ in (corner.split("/") for corner in rest)]
+            quads[group].append([a for a, _ in pairs][:4])
+            if group == "body":
+                corners += pairs
+    uv = np.zeros((len(vertices), 2))
+    for vertex, place in corners:
+        uv[vertex] = texture[place]
+    return BaseMesh(
+        np.array(vertices), uv, {name: np.array(rows, np.int32) for name, rows in quads.items()}
+    )
+
+
+def read_target(data: Path, name: str, n_vertices: int) -> Float64:
+    """One shape target as displacements, (n_vertices, 3) decimetres.
+
+    Args:
+        data: the folder that holds `mpfb2` and `faceunits01`.
+        name: path below `mpfb2/targets`, or a face unit such as `jawOpen`, without `.target`.
+
+    Raises:
+        FaceError: no such target.
+    """
+    folders = (data / "mpfb2/targets", data / "faceunits01/targets/faceunits")
+    places = [folder / f"{name}.target{end}" for folder in folders for end in ("", ".gz")]
+    path = next((place for place in places if place.is_file()), None)
+    if path is None:
+        raise FaceError(f"{name}: wanted a shape target below {folders[0]} or {folders[1]}, found none")
+    raw = path.read_bytes()
+    text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("ascii")
+    rows = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    out = np.zeros((n_vertices, 3))
+    index = np.array([int(row[0]) for row in rows], np.intp)
+    inside = index < n_vertices
+    out[index[inside]] = np.array([row[1:4] for row in rows], float).reshape(-1, 3)[inside]
+    return out

@@ -1,0 +1,167 @@
+"""A face's name in, a checked `Face` out: finds the folder, reads its four files."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Float32
+from realizer.errors import FaceError
+from realizer.face.basis import basis_from
+from realizer.face.features import fapu_of, read_features
+from realizer.face.model import Face
+
+__all__ = ["FaceInfo", "list_faces", "load_face"]
+
+DEFAULT = "ada"  # what the name "default" means
+VARIABLE = "REALIZER_FACES"
+MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}  # array -> dimensions
+
+
+@dataclass(frozen=True, slots=True)
+class FaceInfo:
+    """A face folder: its name, where it lies, and what its face.toml says."""
+
+    name: str
+    path: Path
+    source: str
+    licence: str
+    says: str
+
+
+def load_face(name: str = "default", directory: Path | str | None = None) -> Face:
+    """The face of that name.
+
+    Args:
+        name: a folder with faces in it, or "default".
+        directory: where to look first; else what REALIZER_FACES names, `faces` beside the package, and the
+            faces that came with the package.
+
+    Raises:
+        FaceError: no such face, or a folder that cannot be used; the text says which file and what to change.
+    """
+    return _load(folder_of(name, directory))
+
+
+def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
+    """Every face folder that `load_face` would find, by name; the first place that has a name wins."""
+    found: dict[str, FaceInfo] = {}
+    for place in _places(directory):
+        for folder in sorted(place.iterdir()) if place.is_dir() else ():
+            if (folder / "face.toml").is_file() and folder.name not in found:
+                head = read_head(folder)
+                found[folder.name] = FaceInfo(
+                    folder.name, folder, head["source"], head["licence"], head.get("says", "")
+                )
+    return tuple(found[name] for name in sorted(found))
+
+
+def folder_of(name: str, directory: Path | str | None = None) -> Path:
+    """The folder of a face.
+
+    Raises:
+        FaceError: none of that name.
+    """
+    if name == "default":
+        name = DEFAULT
+    if not name or Path(name).name != name:
+        raise FaceError(f"face: wanted a face's name, got {name!r}")
+    places = list(_places(directory))
+    for place in places:
+        if (place / name).is_dir():
+            return place / name
+    known = ", ".join(info.name for info in list_faces(directory)) or "none"
+    raise FaceError(f"face {name!r}: no such folder in {', '.join(map(str, places))}; there are: {known}")
+
+
+def read_head(folder: Path) -> dict[str, Any]:
+    """What face.toml says.
+
+    Raises:
+        FaceError: no such file, not TOML, or a key is missing.
+    """
+    path = folder / "face.toml"
+    try:
+        head = tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise FaceError(f"{path}: wanted this file with name, source, licence and parts, found none") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FaceError(f"{path}: {error}") from None
+    for key, kind in {"name": str, "source": str, "licence": str, "parts": dict}.items():
+        if not isinstance(head.get(key), kind):
+            raise FaceError(f"{path}: wanted {key} = a {kind.__name__}, got {head.get(key)!r}")
+    return head
+
+
+def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
+    """The arrays of an .npz file.
+
+    Args:
+        wanted: name -> number of dimensions.
+
+    Raises:
+        FaceError: no such file, a missing array, or one of another shape.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+    except FileNotFoundError:
+        raise FaceError(f"{path}: wanted this file, found none; build the face again") from None
+    except (OSError, ValueError) as error:
+        raise FaceError(f"{path}: {error}; build the face again") from None
+    for name, dimensions in wanted.items():
+        if name not in arrays:
+            raise FaceError(f"{path}: wanted an array {name!r}, found {', '.join(sorted(arrays))}")
+        if arrays[name].ndim != dimensions:
+            raise FaceError(f"{path}: {name}: wanted {dimensions} dimensions, got {arrays[name].shape}")
+    return arrays
+
+
+def _places(directory: Path | str | None) -> Iterator[Path]:
+    if directory is not None:
+        yield Path(directory)
+    if os.environ.get(VARIABLE):
+        yield Path(os.environ[VARIABLE])
+    package = Path(__file__).parents[1]
+    yield package.parent / "faces"  # a checkout
+    yield package / "_faces"  # the wheel's copy
+
+
+@lru_cache(maxsize=16)
+def _load(folder: Path) -> Face:
+    head = read_head(folder)
+    mesh = read_arrays(folder / "mesh.npz", MESH)
+    points = read_features(folder / "features.csv")
+    vertices = np.ascontiguousarray(mesh["vertices"], np.float32)
+    feature_points = {name: point.vertex for name, point in points.items()}
+    places = {name: np.array(point.place, np.float32) for name, point in points.items()}
+    fapu = fapu_of(places, folder / "features.csv")
+    parts = {name: (int(a), int(b)) for name, (a, b) in head["parts"].items()}
+    return Face(
+        name=head["name"],
+        source=head["source"],
+        licence=head["licence"],
+        vertices=vertices,
+        triangles=np.ascontiguousarray(mesh["triangles"], np.int32),
+        colours=np.ascontiguousarray(mesh["colours"], np.uint8),
+        occlusion=_unit(mesh["occlusion"]),
+        gloss=_unit(mesh["gloss"]),
+        parts=parts,
+        feature_points=feature_points,
+        points=places,
+        fapu=fapu,
+        basis=basis_from(folder / "fields.npz", vertices, places, parts, fapu),
+        cameras=head.get("cameras", {}),
+    )
+
+
+def _unit(stored: Any) -> Float32:
+    """Bytes 0..255 as 0..1."""
+    return (np.asarray(stored, np.float32) / 255).astype(np.float32)

@@ -1,0 +1,238 @@
+"""The parts that the base mesh lacks: eyeballs, teeth, brows, lashes, hair, a collar. Numbers in, triangles out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Float64, Int32
+from realizer.face.patch import Patch, vertex_normals
+
+__all__: list[str] = []
+
+
+@dataclass(eq=False)
+class Part:
+    """A part of a face that is being built.
+
+    Attributes:
+        patch: where its vertices come from on the base mesh, or None.
+        vertices: (n, 3) metres; triangles: (m, 3); colours: (n, 3) sRGB 0..255; gloss: (n,) 0..1.
+        occlusion: (n,) 0..1, or None: to be baked.
+        fields: row number -> (n, 3), where the part brings its own.
+    """
+
+    name: str
+    patch: Patch | None
+    vertices: Float64
+    triangles: Int32
+    colours: Float64
+    gloss: Float64
+    occlusion: Float64 | None = None
+    fields: dict[int, Float64] = field(default_factory=dict)
+
+
+def smooth(x: Any, low: float, high: float) -> Any:
+    """0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
+    t = np.clip((np.asarray(x, float) - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def grid(rows: int, columns: int, closed: bool = False) -> Int32:
+    """Triangles of a sheet of rows x columns vertices (row-major); closed joins the last column to the first."""
+    last = columns if closed else columns - 1
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(last), indexing="ij")
+    a = (r * columns + c).ravel()
+    b = (r * columns + (c + 1) % columns).ravel()
+    return np.concatenate([np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)]).astype(
+        np.int32
+    )
+
+
+PUPIL, IRIS = 2.05, 6.35  # mm, radii on the ball
+SEGMENTS = 36
+
+
+def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[float]], inward: float) -> Part:
+    """A ball with pupil, iris, dark ring and white, finest where the eye looks; its pole looks forward.
+
+    Args:
+        radius: metres.
+        look: sRGB colours: pupil, iris_inner, iris_middle, iris_outer, ring, white, corner.
+        inward: +1 where the nose lies at +x, -1 at -x: the white reddens there.
+    """
+    # Radii in mm on the flat of the eye, then angles: close together where the colour jumps.
+    flat = [1.0, PUPIL - 0.05, PUPIL + 0.18, 3.2, 4.4, 5.4, 5.9, IRIS, IRIS + 0.45, 8.2, 10.2, 12.0]
+    names = ["pupil", "pupil", "iris_inner", "iris_inner", "iris_middle", "iris_outer", "ring", "ring", "white"]
+    angles = [float(np.arcsin(r / 1000 / radius)) for r in flat] + [1.15, 1.4, 1.75]
+    turn = np.arange(SEGMENTS) * 2 * np.pi / SEGMENTS
+    points, colours = [np.array([[0, 0, 1.0]])], [np.array([look["pupil"]], float)]
+    for k, angle in enumerate(angles):
+        points.append(
+            np.stack(
+                [np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.full(SEGMENTS, np.cos(angle))], 1
+            )
+        )
+        base = np.array(look[names[k]] if k < len(names) else look["white"], float)
+        ring = np.repeat(base[None], SEGMENTS, 0)
+        if k < len(names) and names[k].startswith("iris"):
+            # Spokes: every iris has them, and they say which way the eye turns.
+            ring *= (1 + 0.10 * np.cos(turn * 9 + k) + 0.06 * np.cos(turn * 18 + 2.0 * k))[:, None]
+        if k >= len(names):
+            red = smooth(points[-1][:, 0] * inward, 0.35, 0.95)[:, None] * 0.8
+            red = np.maximum(red, smooth(-points[-1][:, 0] * inward, 0.55, 1.0)[:, None] * 0.5)
+            ring = ring * (1 - red) + np.array(look["corner"], float) * red
+        colours.append(ring)
+    ball = np.concatenate(points)
+    vertices = centre + radius * ball
+    fan = np.stack([np.zeros(SEGMENTS, int), 1 + np.arange(SEGMENTS), 1 + (np.arange(SEGMENTS) + 1) % SEGMENTS], 1)
+    sheet = grid(len(angles), SEGMENTS, closed=True) + 1
+    part = Part(name, None, vertices, np.concatenate([fan, sheet]).astype(np.int32), np.concatenate(colours),
+                np.full(len(vertices), 1.0))
+    # Dilation: the pupil's edge moves out, the iris gives way up to its rim.
+    out = np.hypot(ball[:, 0], ball[:, 1]) * radius * 1000
+    share = np.where(out < PUPIL + 0.2, out / PUPIL, np.clip((IRIS - out) / (IRIS - PUPIL - 0.2), 0, 1))
+    ways = np.zeros_like(ball)
+    ways[:, :2] = ball[:, :2] / np.maximum(np.hypot(ball[:, 0], ball[:, 1]), 1e-9)[:, None]
+    # A unit of IRISD widens the pupil, both edges together, by that much: half at each edge.
+    part.fields[29 if name == "left_eye" else 30] = ways * (share * 0.5)[:, None]
+    return part
+
+
+UPPER = (8.4, 6.8, 7.6, 7.0, 6.6, 9.5)  # mm: widths of the teeth of one side, from the middle
+LOWER = (5.4, 5.9, 6.7, 7.0, 7.0, 10.0)
+
+
+def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[str, list[float]]) -> Part:
+    """An arch of twelve teeth with gums.
+
+    Args:
+        front: (3,) the biting edge between the two middle teeth.
+        width, depth: metres; half axes of the arch (an ellipse).
+    """
+    up = 1.0 if name == "upper_teeth" else -1.0
+    sizes = UPPER if up > 0 else LOWER
+    crown = (9.8, 8.8, 9.6, 8.0, 7.4, 6.6) if up > 0 else (8.2, 8.4, 9.0, 7.8, 7.2, 6.4)
+    lift = (0.0, 0.7, 0.1, 0.6, 0.9, 1.1) if up > 0 else (0.0, 0.0, 0.0, 0.3, 0.5, 0.6)
+    # Arc length along the ellipse, by small steps from the middle.
+    t = np.linspace(0, np.pi * 0.62, 2000)
+    x, z = width * np.sin(t), depth * (np.cos(t) - 1)
+    run = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
+    # Three ridges a tooth: gap, two on the crown; the gaps stand back and are darker.
+    stations: list[tuple[float, int, bool]] = []
+    at = 0.0
+    for k, size in enumerate(sizes):
+        size /= 1000
+        stations += [(at, k, True), (at + 0.16 * size, k, False), (at + 0.5 * size, k, False), (at + 0.84 * size, k, False)]
+        at += size
+    stations.append((at, len(sizes) - 1, True))
+    side = [(-s, k, gap) for s, k, gap in stations[:0:-1]] + stations
+    rows = []
+    tints = []
+    white, root, gum = (np.array(colours[key], float) for key in ("tooth", "root", "gum"))
+    for s, k, gap in side:
+        sign = np.sign(s) or 1.0
+        px, pz = sign * np.interp(abs(s), run, x), np.interp(abs(s), run, z)
+        tangent = np.array([np.interp(abs(s) + 1e-4, run, x) - abs(px), np.interp(abs(s) + 1e-4, run, z) - pz])
+        tangent /= np.hypot(*tangent)
+        normal = np.array([-tangent[1] * sign, tangent[0]])  # outwards, in x and z
+        back = 0.0007 if gap else 0.0
+        edge = (lift[k] + (0.5 if gap else 0.0)) / 1000
+        height = crown[k] / 1000
+        dark = (0.72 if gap else 1.0) * (1 - 0.05 * k)
+        # From behind the biting edge over the front to the gum.
+        for dy, dn, tint in (
+            (edge + 0.004, -0.0030, white * dark * 0.8),
+            (edge + 0.0002, -0.0014, white * dark),
+            (edge, -0.0002, white * dark),
+            (height * 0.45, 0.0004, white * dark),
+            (height * 0.86 - (0.001 if gap else 0), 0.0000, root * dark),
+            (height - (0.0016 if gap else 0), 0.0004, gum),
+            (height + 0.0045, 0.0002, gum * 0.85),
+        ):
+            rows.append([front[0] + px + normal[0] * (dn - back), front[1] + up * dy, front[2] + pz + normal[1] * (dn - back)])
+            tints.append(tint)
+    vertices = np.array(rows)
+    triangles = grid(len(side), 7)
+    if up < 0:
+        triangles = triangles[:, [0, 2, 1]]
+    gloss = np.full(len(vertices), 0.75)
+    # Light reaches the front teeth between open lips and not the back of the mouth.
+    depth_in = (front[2] - vertices[:, 2]) / depth
+    occlusion = 0.86 * smooth(depth_in, 0.75, 0.02) + 0.12
+    occlusion *= np.tile([0.4, 0.8, 1, 1, 0.8, 0.55, 0.4], len(side))
+    return Part(name, None, vertices, triangles, np.array(tints), gloss, occlusion)
+
+
+def brow_curve(points: dict[str, Float64], side: float) -> tuple[Any, Any]:
+    """x stations and heights of a brow's middle line from the inner end to the outer, |x|."""
+    a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
+    x = np.abs([a[0] - np.sign(a[0]) * 0.001, (a[0] + b[0]) / 2, b[0], c[0] + np.sign(c[0]) * 0.0015])
+    y = np.array([a[1], (a[1] + b[1]) / 2 + 0.0012, b[1], c[1]])
+    return x, y
+
+
+def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, colour: list[float]) -> Part:
+    """A brow: the skin along the feature points, cut to a tapered shape and lifted off a little."""
+    vertices = patch.positions(base)
+    x, y = brow_curve(points, side)
+    near = (vertices[:, 0] * side > 0.004) & (vertices[:, 1] > 0.004) & (vertices[:, 1] < 0.04) & (vertices[:, 2] > -0.02)
+    piece = patch.kept(near[patch.triangles].all(axis=1))
+    piece = piece.subdivided()[0].subdivided()[0]
+
+    def height(at: Float64) -> Float64:
+        across = at[:, 0] * side
+        t = (across - x[0]) / (x[-1] - x[0])
+        middle = np.interp(across, x, _spline(x, y)(x)) if len(x) < 3 else _spline(x, y)(np.clip(across, x[0], x[-1]))
+        half = 0.0041 * smooth(t, -0.05, 0.16) * (1 - 0.82 * smooth(t, 0.42, 1.02))
+        outside = np.maximum(np.maximum(-t, t - 1), 0) * 0.05
+        return half - np.abs(at[:, 1] - middle) - outside
+
+    piece = piece.clipped(height(piece.positions(base)))[0]
+    at = piece.positions(base)
+    ups = vertex_normals(at, piece.triangles)
+    inner = np.clip(height(at), 0, 0.003)
+    piece = piece.moved(ups * (0.0003 + 0.25 * inner)[:, None])
+    hair = 1 + 0.16 * np.sin(at[:, 0] * 2600 + at[:, 1] * 1500)
+    t = np.clip((at[:, 0] * side - x[0]) / (x[-1] - x[0]), 0, 1)
+    # Thinner, hence lighter, at the inner end and along the edge.
+    thin = (1 - smooth(inner, 0.0, 0.0016)) * 0.42 + 0.30 * (1 - smooth(t, 0.0, 0.22))
+    tint = np.array(colour, float) * hair[:, None]
+    tint = tint * (1 - thin[:, None]) + np.array([178, 134, 112.0]) * thin[:, None]
+    return Part("brows", piece, piece.positions(base), piece.triangles, tint, np.full(len(piece), 0.05))
+
+
+def _spline(x: Any, y: Any) -> Any:
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(x, y)
+
+
+def lashes(base: Float64, margin: list[int], centre: Float64, colour: list[float]) -> Part:
+    """A thin dark strip along the upper lid, from the inner corner to the outer; longer outwards.
+
+    Args:
+        margin: base vertices of the lid's edge, from inner to outer corner.
+    """
+    import scipy.sparse as sp
+
+    at = base[margin]
+    t = np.linspace(0, 1, len(margin))
+    out = at - centre
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    side = np.sign(centre[0])
+    length = 0.0010 + 0.0030 * smooth(t, 0.05, 0.75) * (1 - 0.35 * smooth(t, 0.9, 1.0))
+    way = out * 0.8 + np.array([0.30 * side, 0.30, 0.35]) * smooth(t, 0, 0.8)[:, None] + np.array([0, 0, 0.3])
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    root = out * 0.00025
+    rows = np.concatenate([margin, margin])
+    offset = np.concatenate([root, root + way * length[:, None]])
+    mix = sp.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), rows)), (len(rows), len(base)))
+    triangles = grid(2, len(margin))
+    if side < 0:
+        triangles = triangles[:, [0, 2, 1]]
+    patch = Patch(mix, offset, triangles)
+    tint = np.repeat(np.array([colour], float), len(rows), 0)
+    return Part("lashes", patch, patch.positions(base), triangles, tint, np.zeros(len(rows)), np.full(len(rows), 0.9))
