@@ -212,6 +212,16 @@ class Player:
             self._stop(playing, now)
         return [p.block.id for p in stopped]
 
+    def withdraw(self, block: Block, now: float) -> None:
+        """Give up a block that was announced and will not be submitted; its end is reported."""
+        self._announced.discard(block.id)
+        self._outbox.append(BlockProgress(f"{block.id}:end", now, character_id=block.character_id))
+
+    @property
+    def alive(self) -> int:
+        """How many blocks play or wait for their start."""
+        return len(self._alive())
+
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
         """Declare where targets are; documents planned from now on look there."""
         self.world = replace(self.world, scene=scene)

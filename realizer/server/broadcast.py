@@ -1,0 +1,235 @@
+"""Streams out: what every subscription is due at `now`, and when the next one is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from realizer.player import Player
+from realizer.server.connection import (
+    Connection,
+    FrameSubscription,
+    PictureSubscription,
+    SoundSubscription,
+    View,
+)
+from realizer.server.effects import Draw, Effect, Send
+from realizer.server.streams import AHEAD, EPSILON, PACKET, Sound, Timeline, encode, first_at, last_at
+from realizer.server.wire import FrameKind, pack
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+
+__all__: list[str] = []
+
+# Frames later than this are not sent at all: what a stalled process owes is not worth catching up with.
+LATE = 0.5  # s
+# A picture that was not drawn by then never will be.
+DRAW_DEADLINE = 10.0  # s
+
+
+class Broadcast:
+    """The timelines, sounds and views of one session, each computed once for all who get it.
+
+    Args:
+        face: (character index) -> the face its meshes are made of.
+        face_name: (character index) -> its name, for pictures.
+    """
+
+    def __init__(
+        self, player: Player, face: Callable[[int], Face], face_name: Callable[[int], str]
+    ) -> None:
+        self.player = player
+        self._face = face
+        self._face_name = face_name
+        self._timelines: dict[tuple[int, float], Timeline] = {}
+        self._sounds: dict[tuple[int | None, int], Sound] = {}
+        self._views: dict[tuple[object, ...], View] = {}
+        self._draws = 0
+
+    def timeline(self, index: int, fps: float) -> Timeline:
+        """The frames of one character at one rate."""
+        key = (index, fps)
+        if key not in self._timelines:
+            self._timelines[key] = Timeline(self.player, index, fps, lambda: self._face(index))
+        return self._timelines[key]
+
+    def frames(
+        self, stream: str, encoding: str, index: int, name: str | None, fps: float, now: float
+    ) -> FrameSubscription:
+        """A subscription to fap, au or mesh, from `now` on."""
+        timeline = self.timeline(index, fps)
+        return FrameSubscription(stream, encoding, timeline, index, name, first_at(now, fps))
+
+    def sound(self, index: int | None, rate: int, now: float) -> SoundSubscription:
+        """A subscription to sound, from `now` on; of one character or of all."""
+        sound = self._sounds.setdefault((index, rate), Sound(self.player, rate, index))
+        return SoundSubscription(sound, index or 0, math.ceil((now - EPSILON) / PACKET), self.player.revision)
+
+    def pictures(
+        self, index: int, fps: float, size: tuple[int, int], camera: str, quality: int, now: float
+    ) -> PictureSubscription:
+        """A subscription to pictures, from `now` on."""
+        timeline = self.timeline(index, fps)
+        face = self._face_name(index)
+        view = View(timeline, index, face, size, camera, quality, first_at(now, fps))
+        view = self._views.setdefault(view.key, view)
+        return PictureSubscription(view, first_at(now, fps))
+
+    def face_changed(self, index: int) -> None:
+        """The face of a character is another one: meshes and pictures follow from the next frame on."""
+        for (character, _), timeline in self._timelines.items():
+            if character == index:
+                timeline.forget()
+        for view in self._views.values():
+            if view.index == index:
+                view.face = self._face_name(index)
+
+    def due(self, connections: Iterable[Connection], now: float) -> list[Effect]:
+        """Every frame, packet and drawing whose time has come."""
+        connections = list(connections)
+        effects: list[Effect] = []
+        self._send_sound(connections, now, effects)
+        self._send_frames(connections, now, effects)
+        self._draw(connections, now, effects)
+        return effects
+
+    def next_deadline(self, connections: Iterable[Connection]) -> float | None:
+        """When `due` will next have something; None where nobody gets anything."""
+        deadlines: list[float] = []
+        for connection in connections:
+            for subscription in connection.subscriptions.values():
+                match subscription:
+                    case FrameSubscription(timeline=timeline, next=number):
+                        deadlines.append(number / timeline.fps)
+                    case SoundSubscription():
+                        deadlines += self._sound_deadline(subscription)
+                    case PictureSubscription(view=view):
+                        busy = view.busy is not None
+                        deadlines.append(view.begun + DRAW_DEADLINE if busy else view.next / view.timeline.fps)
+        return min(deadlines, default=None)
+
+    def drawn(
+        self, draw: int, picture: bytes | None, connections: Iterable[Connection]
+    ) -> tuple[list[Effect], list[Connection]]:
+        """A picture is there, or (None) cannot be: what to send, and who looked at it."""
+        view = next((v for v in self._views.values() if v.busy == draw), None)
+        if view is None:
+            return [], []
+        view.busy = None
+        effects: list[Effect] = []
+        lookers = []
+        for connection in connections:
+            for subscription in connection.subscriptions.values():
+                if not isinstance(subscription, PictureSubscription) or subscription.view is not view:
+                    continue
+                lookers.append(connection)
+                if picture is None or view.drawing < subscription.next:
+                    continue
+                connection.dropped += view.drawing - subscription.next
+                subscription.next = view.drawing + 1
+                if connection.slow:
+                    connection.dropped += 1
+                    continue
+                time = view.drawing / view.timeline.fps
+                data = pack(FrameKind.PICTURE, view.drawing, time, picture, character=view.index)
+                effects.append(Send(connection.id, data))
+        return effects, lookers
+
+    # inside -------------------------------------------------------------------------------------
+
+    def _send_frames(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
+        groups: dict[int, list[tuple[Connection, FrameSubscription]]] = {}
+        for connection in connections:
+            for subscription in connection.subscriptions.values():
+                if isinstance(subscription, FrameSubscription):
+                    oldest = first_at(now - LATE, subscription.timeline.fps)
+                    if subscription.next < oldest:
+                        connection.dropped += oldest - subscription.next
+                        subscription.next = oldest
+                    if subscription.next <= last_at(now, subscription.timeline.fps):
+                        groups.setdefault(id(subscription.timeline), []).append((connection, subscription))
+        for group in groups.values():
+            timeline = group[0][1].timeline
+            newest = last_at(now, timeline.fps)
+            window = timeline.window(min(s.next for _, s in group), newest)
+            messages: dict[tuple[str, str, str | None, int], str | bytes] = {}
+            for connection, s in group:
+                if connection.slow:
+                    connection.dropped += newest + 1 - s.next
+                    s.next = newest + 1
+                    continue
+                for number in range(s.next, newest + 1):
+                    key = (s.stream, s.encoding, s.name, number)
+                    if key not in messages:
+                        messages[key] = encode(window, s.stream, s.encoding, number, s.index, s.name)
+                    effects.append(Send(connection.id, messages[key]))
+                s.next = newest + 1
+
+    def _send_sound(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
+        for connection in connections:
+            for subscription in connection.subscriptions.values():
+                if isinstance(subscription, SoundSubscription):
+                    self._send_packets(connection, subscription, now, effects)
+
+    def _send_packets(
+        self, connection: Connection, subscription: SoundSubscription, now: float, effects: list[Effect]
+    ) -> None:
+        sound = subscription.sound
+        current = math.floor((now + EPSILON) / PACKET)
+        if subscription.revision != self.player.revision:
+            subscription.revision = self.player.revision
+            # What was sent ahead may no longer be true: take it back from the first packet that changed.
+            for number, pcm in sorted(subscription.sent, key=lambda pair: pair[0]):
+                if number >= current and sound.packet(number) != pcm:
+                    forget = pack(
+                        FrameKind.SOUND, number, number * PACKET, b"", character=subscription.index, forget=True
+                    )
+                    effects.append(Send(connection.id, forget))
+                    subscription.next = number
+                    break
+        span = sound.span()
+        last = math.floor((now + AHEAD + EPSILON) / PACKET)
+        if span is None or subscription.next > last:
+            return
+        for number in range(max(subscription.next, current), last + 1):
+            pcm = sound.packet(number)
+            subscription.sent.append((number, pcm))
+            if pcm is None:
+                continue
+            if connection.slow:
+                connection.dropped += 1
+                continue
+            data = pack(FrameKind.SOUND, number, number * PACKET, pcm, character=subscription.index)
+            effects.append(Send(connection.id, data))
+        subscription.next = last + 1
+
+    def _sound_deadline(self, subscription: SoundSubscription) -> list[float]:
+        span = subscription.sound.span()
+        if subscription.revision != self.player.revision:
+            return [-math.inf]
+        if span is None or span[1] <= subscription.next * PACKET:
+            return []
+        return [max(subscription.next * PACKET, math.floor(span[0] / PACKET) * PACKET) - AHEAD]
+
+    def _draw(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
+        wanted = {
+            s.view.key: s.view
+            for c in connections
+            for s in c.subscriptions.values()
+            if isinstance(s, PictureSubscription)
+        }
+        self._views = wanted
+        for view in wanted.values():
+            fps = view.timeline.fps
+            if view.busy is not None and now >= view.begun + DRAW_DEADLINE:
+                view.busy = None
+            newest = last_at(now, fps)
+            if view.busy is not None or newest < view.next:
+                continue
+            window = view.timeline.window(newest, newest)
+            self._draws += 1
+            view.busy, view.drawing, view.begun, view.next = self._draws, newest, now, newest + 1
+            faps = window.faps.values[newest - window.first]
+            effects.append(Draw(self._draws, view.face, faps, view.size, view.camera, view.quality))

@@ -1,0 +1,93 @@
+"""What a session keeps of one connection: its streams, its place in the feedback log, how far it lags."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from realizer.server.streams import Sound, Timeline
+
+__all__: list[str] = []
+
+# Bytes that wait to be sent above which a connection loses frames: two thirds of a second of a mesh.
+SLOW = 512 * 1024
+# And above which it has stopped reading: it is closed, and can come back with `seen`.
+STUCK = 32 * 2**20
+
+
+@dataclass(eq=False)
+class FrameSubscription:
+    """fap, au or mesh frames: `next` is the frame to send."""
+
+    stream: str
+    encoding: str
+    timeline: Timeline
+    index: int
+    name: str | None
+    next: int
+
+
+@dataclass(eq=False)
+class SoundSubscription:
+    """Sound packets: `next` is the packet to send, `sent` the last few that went out, to know what changed."""
+
+    sound: Sound
+    index: int
+    next: int
+    revision: int
+    sent: deque[tuple[int, bytes | None]] = field(default_factory=lambda: deque(maxlen=8))
+
+
+@dataclass(eq=False)
+class View:
+    """A picture that is drawn once for everybody who looks at it; `busy` while it is being drawn."""
+
+    timeline: Timeline
+    index: int
+    face: str
+    size: tuple[int, int]
+    camera: str
+    quality: int
+    next: int
+    busy: int | None = None
+    drawing: int = 0  # the frame that is being drawn
+    begun: float = 0.0
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What two subscriptions must share to see the same picture."""
+        return (self.index, self.timeline.fps, self.face, self.size, self.camera, self.quality)
+
+
+@dataclass(eq=False)
+class PictureSubscription:
+    """Pictures of a view; `next` is the oldest frame that is still of use."""
+
+    view: View
+    next: int
+
+
+Subscription = FrameSubscription | SoundSubscription | PictureSubscription
+
+
+@dataclass(eq=False)
+class Connection:
+    """One client of a session.
+
+    Attributes:
+        place: seq of the next feedback to send.
+        backlog: bytes that wait to be sent, as the shell told.
+        dropped: frames, pictures and sound packets it did not get because it was slow.
+        subscriptions: (stream, character) -> what it gets.
+    """
+
+    id: int
+    place: int
+    feedback: bool = True
+    backlog: int = 0
+    dropped: int = 0
+    subscriptions: dict[tuple[str, str | None], Subscription] = field(default_factory=dict)
+
+    @property
+    def slow(self) -> bool:
+        return self.backlog > SLOW

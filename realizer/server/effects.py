@@ -1,0 +1,62 @@
+"""What a session wants done, as values: the shell sends, speaks, draws and closes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from realizer.arrays import Float32
+from realizer.speech.utterance import Say
+
+__all__: list[str] = []
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """One WebSocket message to one connection."""
+
+    connection: int
+    data: str | bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Speak:
+    """Let a voice say it and answer `session.spoken(id, utterance or error, now)`."""
+
+    id: int
+    say: Say
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draw:
+    """Draw one picture and answer `session.drawn(id, jpeg or error, now)`.
+
+    `faps` is (68,) float32 in FAPU; `size` is width, height.
+    """
+
+    id: int
+    face: str
+    faps: Float32
+    size: tuple[int, int]
+    camera: str
+    quality: int
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Take a connection to another session and let it have the feedback after `seen`; then say welcome."""
+
+    connection: int
+    session: str
+    seen: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """Close a connection, with the code and the reason of the WebSocket close."""
+
+    connection: int
+    code: int
+    reason: str
+
+
+Effect = Send | Speak | Draw | Move | Close

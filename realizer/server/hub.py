@@ -1,0 +1,98 @@
+"""Sessions by name: connections join, make, leave and outlive them. No sockets, no clock."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Callable
+
+from realizer.errors import RealizerError
+from realizer.server.effects import Effect, Move
+from realizer.server.session import Session
+
+__all__ = ["Hub", "HubError"]
+
+SESSION_ID = re.compile(r"[A-Za-z0-9._~-]{1,64}")
+
+
+class HubError(RealizerError):
+    """A connection that cannot be had; `status` is the HTTP status to answer with."""
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+class Hub:
+    """All sessions of the service.
+
+    Args:
+        make: (id, now, named) -> Session.
+        most: how many sessions there may be.
+    """
+
+    def __init__(self, make: Callable[[str, float, bool], Session], most: int) -> None:
+        self._make = make
+        self._most = most
+        self.sessions: dict[str, Session] = {}
+        self._of: dict[int, Session] = {}
+
+    def check(self, name: str | None) -> None:
+        """Whether a connection may join or make a session.
+
+        Raises:
+            HubError: 400 for a bad name, 503 where there are too many.
+        """
+        if name is not None and not SESSION_ID.fullmatch(name):
+            words = f"session: wanted 1..64 letters, digits or . _ ~ -, got {name[:80]!r}"
+            raise HubError(400, words)
+        if (name is None or name not in self.sessions) and len(self.sessions) >= self._most:
+            raise HubError(503, f"{self._most} sessions are open: wanted fewer")
+
+    def open(self, connection: int, name: str | None, now: float, seen: int | None = None) -> Session:
+        """Let a connection join the named session, or make it; without a name, one of its own.
+
+        Raises:
+            HubError: as `check`.
+        """
+        self.check(name)
+        id = secrets.token_urlsafe(9) if name is None else name
+        session = self.sessions.get(id)
+        if session is None:
+            session = self.sessions[id] = self._make(id, now, name is not None)
+        session.connect(connection, now, seen)
+        self._of[connection] = session
+        return session
+
+    def session_of(self, connection: int) -> Session | None:
+        """The session a connection is in."""
+        return self._of.get(connection)
+
+    def leave(self, connection: int, now: float) -> None:
+        """A connection is gone."""
+        session = self._of.pop(connection, None)
+        if session is not None:
+            session.disconnect(connection, now)
+            if session.closed:
+                self.sessions.pop(session.id, None)
+
+    def effects(self, session: Session, now: float) -> list[Effect]:
+        """What is to be done for a session; connections that move to another one are moved here."""
+        effects: list[Effect] = []
+        for effect in session.outgoing():
+            if isinstance(effect, Move):
+                self.leave(effect.connection, now)
+                there = self.open(effect.connection, effect.session, now)
+                there.welcome(effect.connection, now)
+                if effect.seen is not None:
+                    there.resume(effect.connection, effect.seen)
+                effects += there.outgoing()
+            else:
+                effects.append(effect)
+        return effects
+
+    def sweep(self, now: float) -> None:
+        """Close the sessions nobody has been in for too long."""
+        for session in [s for s in self.sessions.values() if s.expired(now)]:
+            session.close()
+            del self.sessions[session.id]

@@ -1,0 +1,274 @@
+"""Control messages: JSON text in gives a model, or the error to answer with; replies go out as JSON."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+__all__ = [
+    "STREAMS",
+    "SUPPORTED",
+    "CharacterMessage",
+    "Control",
+    "ErrorMessage",
+    "Gap",
+    "Hello",
+    "Ping",
+    "Pong",
+    "SceneMessage",
+    "SetMessage",
+    "StateMessage",
+    "StateQuery",
+    "Stop",
+    "Subscribe",
+    "Subscribed",
+    "Unsubscribe",
+    "Welcome",
+    "parse_control",
+]
+
+# Version of the protocol that `hello` and `welcome` name.
+PROTOCOL = 1
+# Longest control message: a scene of a few thousand objects.
+MAX_CONTROL = 256 * 1024  # bytes
+
+Stream = Literal["feedback", "fap", "au", "mesh", "audio", "video"]
+# stream -> the encodings it has, the default first.
+STREAMS: dict[str, tuple[str, ...]] = {
+    "feedback": ("text",),
+    "fap": ("binary", "json"),
+    "au": ("binary", "json"),
+    "mesh": ("binary",),
+    "audio": ("binary",),
+    "video": ("binary",),
+}
+
+
+class Message(BaseModel):
+    """What all messages share: no unknown fields, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Hello(Message):
+    """Says who is there; asks for `welcome`, and for the feedback after `seen` of a named session."""
+
+    type: Literal["hello"]
+    version: int = PROTOCOL
+    session: str | None = Field(None, pattern=r"^[A-Za-z0-9._~-]{1,64}$")
+    seen: int | None = Field(None, ge=0, description="seq of the last feedback that arrived")
+
+
+class Subscribe(Message):
+    """Asks for a stream; answered by `subscribed`. The same stream of the same character is replaced."""
+
+    type: Literal["subscribe"]
+    stream: Stream
+    encoding: Literal["binary", "json", "text"] | None = None
+    fps: float | None = Field(None, gt=0, le=240, description="None: the service's own rate")
+    character: str | None = Field(None, max_length=256)
+    size: tuple[int, int] = Field((512, 512), description="video: width, height in pixels")
+    camera: str = Field("front", max_length=64, description="video")
+    quality: int = Field(85, ge=1, le=100, description="video: of the JPEG")
+    rate: int = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
+
+
+class Unsubscribe(Message):
+    """Ends a stream."""
+
+    type: Literal["unsubscribe"]
+    stream: Stream
+    character: str | None = Field(None, max_length=256)
+
+
+class Point(Message):
+    """Metres: origin between the eyes, +x the character's left, +y up, +z forward."""
+
+    x: float = Field(ge=-1e4, le=1e4)
+    y: float = Field(ge=-1e4, le=1e4)
+    z: float = Field(ge=-1e4, le=1e4)
+
+
+class SceneMessage(Message):
+    """Declares where targets are; None forgets the scene."""
+
+    type: Literal["scene"]
+    objects: dict[str, Point] | None = Field(max_length=10_000)
+
+
+class CharacterMessage(Message):
+    """Gives a character its face and its voice."""
+
+    type: Literal["character"]
+    id: str = Field(min_length=1, max_length=256)
+    face: str | None = Field(None, max_length=64)
+    voice: str | None = Field(None, max_length=64)
+
+
+class SetMessage(Message):
+    """Holds AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go of one."""
+
+    type: Literal["set"]
+    aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] = Field({}, description='"12" or "12L"')
+    faps: dict[str, Annotated[float, Field(ge=-1e5, le=1e5)] | None] = Field({}, description="name or number")
+    character: str | None = Field(None, max_length=256)
+
+
+class Stop(Message):
+    """Ends blocks gracefully: those named, or all."""
+
+    type: Literal["stop"]
+    blocks: list[str] | None = None
+
+
+class StateQuery(Message):
+    """Asks for `state`."""
+
+    type: Literal["state"]
+
+
+class Ping(Message):
+    """Asks for `pong`, which carries the session's time."""
+
+    type: Literal["ping"]
+    id: int | str | None = None
+
+
+Control = (
+    Hello | Subscribe | Unsubscribe | SceneMessage | CharacterMessage | SetMessage | Stop | StateQuery | Ping
+)
+SUPPORTED: tuple[str, ...] = (
+    "hello",
+    "subscribe",
+    "unsubscribe",
+    "scene",
+    "character",
+    "set",
+    "stop",
+    "state",
+    "ping",
+)
+_ADAPTER: TypeAdapter[Control] = TypeAdapter(Annotated[Control, Field(discriminator="type")])
+
+
+class Reply(BaseModel):
+    """A message out."""
+
+    model_config = ConfigDict(frozen=True)
+
+    def text(self) -> str:
+        """As it goes over the wire; fields that are None are left out."""
+        return self.model_dump_json(exclude_none=True)
+
+
+class Welcome(Reply):
+    """The answer to `hello`."""
+
+    type: Literal["welcome"] = "welcome"
+    version: int = PROTOCOL
+    session: str
+    time: float = Field(description="seconds on the session clock")
+    seq: int = Field(description="seq of the newest feedback, 0 where there is none")
+    capabilities: dict[str, Any]
+    limits: dict[str, float]
+
+
+class Subscribed(Reply):
+    """A stream runs from `frame` on; what its values mean."""
+
+    type: Literal["subscribed"] = "subscribed"
+    stream: str
+    encoding: str
+    character: str | None = None
+    index: int = Field(0, description="the low byte of the flags of binary frames")
+    fps: float | None = None
+    frame: int | None = None
+    names: list[str] | None = Field(None, description="fap and au: one a value")
+    face: str | None = Field(None, description="mesh and video; the rest mesh is at /faces/NAME")
+    vertices: int | None = None
+    scale: float | None = Field(None, description="mesh: metres = int16 x scale + offset")
+    offset: list[float] | None = None
+    rate: int | None = Field(None, description="audio: samples a second")
+    size: list[int] | None = None
+    media_type: str | None = None
+
+
+class StateMessage(Reply):
+    """What plays, what waits, which AUs are up."""
+
+    type: Literal["state"] = "state"
+    session: str
+    time: float
+    blocks: list[dict[str, Any]]
+    characters: list[dict[str, Any]]
+    voice: dict[str, Any]
+    connections: int
+    dropped: int = Field(description="frames this connection was too slow for")
+
+
+class ErrorMessage(Reply):
+    """Why a control message was not followed. It changes nothing else."""
+
+    type: Literal["error"] = "error"
+    code: str
+    message: str
+    where: str | None = None
+
+
+class Gap(Reply):
+    """Feedback after `seen` is no longer (or was never) there; the next one is `first`."""
+
+    type: Literal["gap"] = "gap"
+    seen: int
+    first: int
+
+
+class Pong(Reply):
+    """The answer to `ping`."""
+
+    type: Literal["pong"] = "pong"
+    id: int | str | None = None
+    time: float = Field(description="seconds on the session clock")
+
+
+def parse_control(text: str) -> Control | ErrorMessage:
+    """A control message, or the error to answer with: code bad-json, too-large, unsupported or invalid."""
+    if len(text) > MAX_CONTROL:
+        return ErrorMessage(
+            code="too-large",
+            message=f"wanted a control message of at most {MAX_CONTROL} bytes, got {len(text)}",
+        )
+    try:
+        message = json.loads(text)
+    except RecursionError:
+        return ErrorMessage(code="bad-json", message="wanted a flat JSON object, got one nested too deeply")
+    except ValueError as error:
+        return ErrorMessage(code="bad-json", message=f"wanted a JSON object with a type: {error}")
+    kind = message.get("type")
+    if kind not in SUPPORTED:
+        return ErrorMessage(
+            code="unsupported",
+            message=f"wanted a type of {', '.join(SUPPORTED)}; got {_short(kind)}",
+            where="type",
+        )
+    if kind == "subscribe" and message.get("stream") not in tuple(STREAMS):
+        return ErrorMessage(
+            code="unsupported",
+            message=f"wanted a stream of {', '.join(STREAMS)}; got {_short(message.get('stream'))}",
+            where="subscribe.stream",
+        )
+    try:
+        return _ADAPTER.validate_python(message)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        return ErrorMessage(
+            code="invalid", message=f"{first['msg']}; got {_short(first['input'])}", where=where
+        )
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 80 else text[:77] + "..."

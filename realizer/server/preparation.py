@@ -1,0 +1,114 @@
+"""Blocks between their arrival and their planning: they wait for their voice, and for what they refer to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from bml_schema import Block, SyncRef
+from bml_schema.behaviours import Speech
+from bml_schema.nodes import Synchronize
+from realizer.speech.utterance import Say, Utterance
+
+__all__: list[str] = []
+
+
+@dataclass(eq=False)
+class Waiting:
+    """A block in preparation.
+
+    Attributes:
+        says: speak id -> (behaviour, what it says): what the voice still owes.
+        utterances: behaviour -> what the voice has made.
+        after: blocks in preparation that must be planned first.
+    """
+
+    block: Block
+    character: int
+    since: float
+    says: dict[int, tuple[str, Say]]
+    utterances: dict[str, Utterance] = field(default_factory=dict)
+    after: set[Waiting] = field(default_factory=set)
+
+
+class Preparation:
+    """The blocks that wait, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Waiting] = []
+
+    def __len__(self) -> int:
+        return len(self.waiting)
+
+    def add(self, block: Block, character: int, says: dict[int, tuple[str, Say]], now: float) -> Waiting:
+        """Let a block wait for its voice, and for the earlier blocks it depends on.
+
+        It depends on blocks whose sync points it names, on one with its own id, and, where it is appended,
+        on all of its character. A replacing block waits for nobody: `replaced_by` says what it ends.
+        """
+        named = {ref.block for ref in _references(block)}
+        after = {
+            w
+            for w in self.waiting
+            if block.composition != "REPLACE"
+            and (
+                w.block.id in named
+                or w.block.id == block.id
+                or (w.character == character and (block.composition == "APPEND" or w.block.composition == "REPLACE"))
+            )
+        }
+        waiting = Waiting(block, character, now, says, after=after)
+        self.waiting.append(waiting)
+        return waiting
+
+    def spoken(self, speak: int, utterance: Utterance) -> None:
+        """The voice has made one utterance; one nobody waits for any more is dropped."""
+        for waiting in self.waiting:
+            if speak in waiting.says:
+                behaviour, _ = waiting.says.pop(speak)
+                waiting.utterances[behaviour] = utterance
+
+    def said(self, speak: int) -> Say | None:
+        """What a speak id asked for; None where nobody waits for it."""
+        return next((w.says[speak][1] for w in self.waiting if speak in w.says), None)
+
+    def ready(self) -> Waiting | None:
+        """The first block that waits for nothing, taken out; None where all wait."""
+        for waiting in self.waiting:
+            if not waiting.says and not waiting.after:
+                self.remove([waiting])
+                return waiting
+        return None
+
+    def replaced_by(self, waiting: Waiting) -> list[Waiting]:
+        """The blocks in preparation that came before a replacing block of their character."""
+        return [w for w in self.waiting if w.character == waiting.character and w.since <= waiting.since]
+
+    def overdue(self, before: float) -> Iterator[int]:
+        """Speak ids asked for before that time and not answered."""
+        return iter([speak for w in self.waiting if w.since < before for speak in w.says])
+
+    def deadline(self, patience: float) -> float | None:
+        """When the first voice that owes something will have taken longer than `patience` seconds."""
+        return min((w.since + patience for w in self.waiting if w.says), default=None)
+
+    def remove(self, gone: Iterable[Waiting]) -> None:
+        """Take blocks out; nobody waits for them any more."""
+        ids = {id(w) for w in gone}
+        self.waiting = [w for w in self.waiting if id(w) not in ids]
+        for waiting in self.waiting:
+            waiting.after = {w for w in waiting.after if id(w) not in ids}
+
+
+def _references(block: Block) -> Iterator[SyncRef]:
+    for behaviour in block.behaviours:
+        yield from behaviour.syncs.values()
+        if isinstance(behaviour, Speech) and behaviour.text is not None:
+            for part in behaviour.text.parts:
+                if not isinstance(part, str) and part.ref is not None:
+                    yield part.ref
+    for constraint in block.constraints:
+        for part in constraint.parts:
+            yield from part.refs
+            if not isinstance(part, Synchronize):
+                yield part.ref

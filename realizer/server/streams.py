@@ -1,0 +1,199 @@
+"""A player's face and sound, computed ahead: frame k of a rate and packet n of a sound are slices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.arrays import Float32, Int16, Int32
+from realizer.pipeline import CUT, resample
+from realizer.player import Player, Speaking
+from realizer.server.wire import FrameKind, json_frame, pack
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+
+__all__: list[str] = []
+
+# Frames computed in one call. The cost of a call is flat up to some 100 frames; a longer window is thrown
+# away more often when a plan changes.
+WINDOW = 2.0  # s
+# A sound packet, and how far ahead of its time it is sent.
+PACKET = 0.02  # s
+AHEAD = 0.1  # s
+# Rounding of k / fps on a clock of days.
+EPSILON = 1e-6  # s
+
+
+def first_at(now: float, fps: float) -> int:
+    """The first frame whose time is not before `now`."""
+    return math.ceil((now - EPSILON) * fps)
+
+
+def last_at(now: float, fps: float) -> int:
+    """The newest frame whose time has come."""
+    return math.floor((now + EPSILON) * fps)
+
+
+class Window:
+    """Frames `first` .. `first + n - 1` of one character; FAPs and mesh are made when first asked for."""
+
+    def __init__(self, first: int, fps: float, aus: AUFrames, face: Callable[[], Face]) -> None:
+        self.first = first
+        self.fps = fps
+        self.aus = aus
+        self._face = face
+
+    @property
+    def end(self) -> int:
+        return self.first + len(self.aus.times)
+
+    @cached_property
+    def faps(self) -> FAPFrames:
+        """In FAPU."""
+        return to_fap(self.aus)
+
+    @cached_property
+    def integers(self) -> Int32:
+        """(n, 68) int32."""
+        return np.ascontiguousarray(self.faps.integers().astype("<i4"))
+
+    @cached_property
+    def intensities(self) -> Float32:
+        """(n, n_au) float32, 0..1."""
+        return np.ascontiguousarray(self.aus.aus.astype("<f4"))
+
+    @cached_property
+    def mesh(self) -> Int16:
+        """(n, n_vertices, 3) int16."""
+        from realizer.face import deform, quantise
+
+        face = self._face()
+        return np.ascontiguousarray(quantise(face, deform(face, self.faps.values)).astype("<i2"))
+
+
+class Timeline:
+    """One character at one rate: frames in windows, dropped when the player's plan changes.
+
+    Args:
+        face: what meshes are made of; called when the first mesh is asked for.
+    """
+
+    def __init__(self, player: Player, character: int, fps: float, face: Callable[[], Face]) -> None:
+        self.player = player
+        self.character = character
+        self.fps = fps
+        self._face = face
+        self._window: Window | None = None
+        self._revision = -1
+
+    def window(self, first: int, last: int) -> Window:
+        """A window that holds frames first .. last, and more to come."""
+        window = self._window
+        if (
+            window is None
+            or self._revision != self.player.revision
+            or first < window.first
+            or last >= window.end
+        ):
+            count = max(math.ceil(WINDOW * self.fps), last - first + 1)
+            times = np.arange(first, first + count) / self.fps
+            aus = self.player.frames(times, self.character)
+            window = self._window = Window(first, self.fps, aus, self._face)
+            self._revision = self.player.revision
+        return window
+
+    def forget(self) -> None:
+        """Compute anew what comes next: the face has changed."""
+        self._window = None
+
+
+def encode(window: Window, stream: str, encoding: str, frame: int, character: int, name: str | None) -> str | bytes:
+    """Frame `frame` of the window as one WebSocket message."""
+    row, time = frame - window.first, frame / window.fps
+    if encoding == "json":
+        if stream == "fap":
+            return json_frame("fap", frame, time, window.integers[row].tolist(), name)
+        rounded = [round(v, 4) for v in window.intensities[row].tolist()]
+        return json_frame("au", frame, time, rounded, name)
+    kind, values = {
+        "fap": (FrameKind.FAP, lambda: window.integers),
+        "au": (FrameKind.AU, lambda: window.intensities),
+        "mesh": (FrameKind.MESH, lambda: window.mesh),
+    }[stream]
+    return pack(kind, frame, time, values()[row].tobytes(), character=character)
+
+
+class Sound:
+    """What a player says, in packets of 20 ms; packet n begins at n x 0.02 s on the session clock."""
+
+    def __init__(self, player: Player, rate: int, character: int | None) -> None:
+        self.player = player
+        self.rate = rate
+        self.character = character
+        self._samples = round(PACKET * rate)
+        self._cache: dict[int, tuple[Speaking, Float32]] = {}
+
+    def speaking(self) -> list[Speaking]:
+        """What sounds or will sound, in order of its start."""
+        return [
+            s
+            for s in self.player.speech()
+            if s.utterance.pcm is not None and self.character in (None, s.character)
+        ]
+
+    def span(self) -> tuple[float, float] | None:
+        """(first, last) seconds of all that sounds or will sound; None where nothing does."""
+        speaking = self.speaking()
+        if not speaking:
+            return None
+        return min(s.start for s in speaking), max(_end(s) for s in speaking)
+
+    def packet(self, number: int) -> bytes | None:
+        """The PCM of one packet; None in silence."""
+        first = number * self._samples
+        mix: Float32 | None = None
+        for speaking in self.speaking():
+            if _end(speaking) * self.rate <= first or speaking.start * self.rate >= first + self._samples:
+                continue
+            pcm = self._pcm(speaking)
+            offset = round(speaking.start * self.rate)
+            here = slice(max(0, first - offset), max(0, first + self._samples - offset))
+            piece = pcm[here]
+            if not len(piece):
+                continue
+            if mix is None:
+                mix = np.zeros(self._samples, np.float32)
+            at = max(0, offset - first)
+            mix[at : at + len(piece)] += piece
+        if mix is None:
+            return None
+        return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
+
+    def _pcm(self, speaking: Speaking) -> Float32:
+        """(n,) float32 at the stream's rate, cut and faded where it is cut off; as a film has it."""
+        known = self._cache.get(id(speaking))
+        if known is not None and known[0] is speaking:
+            return known[1]
+        utterance = speaking.utterance
+        assert utterance.pcm is not None
+        pcm = resample(utterance.pcm, utterance.sample_rate, self.rate)
+        if speaking.until < speaking.start + utterance.duration:
+            kept = max(0, round((speaking.until + CUT - speaking.start) * self.rate))
+            pcm = pcm[:kept].copy()
+            ramp = min(len(pcm), round(CUT * self.rate))
+            pcm[len(pcm) - ramp :] *= np.linspace(1, 0, ramp, dtype=np.float32)
+        alive = {id(s) for s in self.player.speech()}
+        self._cache = {key: value for key, value in self._cache.items() if key in alive}
+        self._cache[id(speaking)] = (speaking, pcm)
+        return pcm
+
+
+def _end(speaking: Speaking) -> float:
+    return min(speaking.start + speaking.utterance.duration, speaking.until + CUT)
