@@ -37,9 +37,7 @@ class Broadcast:
         face_name: (character index) -> its name, for pictures.
     """
 
-    def __init__(
-        self, player: Player, face: Callable[[int], Face], face_name: Callable[[int], str]
-    ) -> None:
+    def __init__(self, player: Player, face: Callable[[int], Face], face_name: Callable[[int], str]) -> None:
         self.player = player
         self._face = face
         self._face_name = face_name
@@ -107,7 +105,9 @@ class Broadcast:
                         deadlines += self._sound_deadline(subscription)
                     case PictureSubscription(view=view):
                         busy = view.busy is not None
-                        deadlines.append(view.begun + DRAW_DEADLINE if busy else view.next / view.timeline.fps)
+                        deadlines.append(
+                            view.begun + DRAW_DEADLINE if busy else view.next / view.timeline.fps
+                        )
         return min(deadlines, default=None)
 
     def drawn(
@@ -184,7 +184,12 @@ class Broadcast:
             for number, pcm in sorted(subscription.sent, key=lambda pair: pair[0]):
                 if number >= current and sound.packet(number) != pcm:
                     forget = pack(
-                        FrameKind.SOUND, number, number * PACKET, b"", character=subscription.index, forget=True
+                        FrameKind.SOUND,
+                        number,
+                        number * PACKET,
+                        b"",
+                        character=subscription.index,
+                        forget=True,
                     )
                     effects.append(Send(connection.id, forget))
                     subscription.next = number

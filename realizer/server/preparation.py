@@ -54,7 +54,10 @@ class Preparation:
             and (
                 w.block.id in named
                 or w.block.id == block.id
-                or (w.character == character and (block.composition == "APPEND" or w.block.composition == "REPLACE"))
+                or (
+                    w.character == character
+                    and (block.composition == "APPEND" or w.block.composition == "REPLACE")
+                )
             )
         }
         waiting = Waiting(block, character, now, says, after=after)

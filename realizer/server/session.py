@@ -318,7 +318,9 @@ class Session:
         if self.ending:
             return "the service is ending and takes no more documents"
         if len(block.behaviours) > limits.max_behaviours:
-            return f"wanted at most {limits.max_behaviours} behaviours in a block, got {len(block.behaviours)}"
+            return (
+                f"wanted at most {limits.max_behaviours} behaviours in a block, got {len(block.behaviours)}"
+            )
         if len(self._preparation) + self.player.alive >= limits.max_blocks:
             return f"{limits.max_blocks} blocks play or wait: wanted fewer at a time"
         known = self.player.characters

@@ -114,7 +114,9 @@ class Timeline:
         self._window = None
 
 
-def encode(window: Window, stream: str, encoding: str, frame: int, character: int, name: str | None) -> str | bytes:
+def encode(
+    window: Window, stream: str, encoding: str, frame: int, character: int, name: str | None
+) -> str | bytes:
     """Frame `frame` of the window as one WebSocket message."""
     row, time = frame - window.first, frame / window.fps
     if encoding == "json":

@@ -1,0 +1,105 @@
+"""What the service's port answers over HTTP: the page, faces as GLB, the light, the examples, its health."""
+
+from __future__ import annotations
+
+import functools
+import json
+import mimetypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import files
+from urllib.parse import unquote
+
+from realizer.errors import FaceError, RealizerError
+
+__all__ = ["Answer", "Site"]
+
+JSON = "application/json; charset=utf-8"
+TEXT = "text/plain; charset=utf-8"
+NOT_BUILT = """The page was not bundled when this package was built.
+Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
+The WebSocket at /ws works without it.
+"""
+# The page loads nothing from elsewhere, and may talk to WebSockets only where it came from.
+POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One HTTP answer."""
+
+    status: int
+    media_type: str
+    body: bytes
+    headers: tuple[tuple[str, str], ...] = ()
+
+
+class Site:
+    """Answers GET requests; what is costly is made once.
+
+    Args:
+        health: what `/healthz` tells beside "ok".
+    """
+
+    def __init__(self, health: Callable[[], dict[str, object]]) -> None:
+        self._health = health
+        self._static = files("realizer.server").joinpath("static")
+
+    def answer(self, target: str) -> Answer:
+        """The answer to `GET target`. May block: reading a face takes a moment the first time."""
+        path = unquote(target.partition("?")[0])
+        if path == "/healthz":
+            return Answer(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
+        if path == "/examples.json":
+            return Answer(200, JSON, _examples())
+        if path == "/look.json":
+            return Answer(200, JSON, _look())
+        if path.startswith("/faces/"):
+            return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
+        return self._file("index.html" if path == "/" else path[1:])
+
+    def _face(self, name: str) -> Answer:
+        try:
+            return Answer(200, "model/gltf-binary", _glb(name), (("Cache-Control", "no-cache"),))
+        except FaceError as error:
+            return Answer(404, TEXT, f"{error}\n".encode())
+        except RealizerError as error:
+            return Answer(500, TEXT, f"{error}\n".encode())
+
+    def _file(self, name: str) -> Answer:
+        """A file of the bundle; only names in its one folder, so nothing else can be asked for."""
+        names = {f.name for f in self._static.iterdir()} if self._static.is_dir() else set()
+        if name in names and not name.startswith("."):
+            media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
+            if media_type.startswith("text/") or media_type.endswith("svg+xml"):
+                media_type += "; charset=utf-8"
+            headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", POLICY))
+            return Answer(200, media_type, self._static.joinpath(name).read_bytes(), headers)
+        if name == "index.html":
+            return Answer(503, TEXT, NOT_BUILT.encode())
+        return Answer(404, TEXT, f"/{name} is not here; there are / /ws /faces/NAME /healthz\n".encode())
+
+
+@functools.cache
+def _examples() -> bytes:
+    from realizer.examples import examples
+
+    rows = [
+        {"name": name, "title": name.replace("-", " ").capitalize(), "bml": text}
+        for name, text in examples().items()
+    ]
+    return json.dumps(rows, ensure_ascii=False).encode()
+
+
+@functools.cache
+def _look() -> bytes:
+    from realizer.render.light import preset
+
+    return json.dumps(preset().to_json()).encode()
+
+
+@functools.lru_cache(8)
+def _glb(name: str) -> bytes:
+    from realizer.face import load_face, to_glb
+
+    return to_glb(load_face(name))

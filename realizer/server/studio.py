@@ -1,0 +1,85 @@
+"""Voices and renderers behind threads: a Speak or a Draw in, an utterance or a JPEG out. Blocks."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+from realizer.errors import RealizerError, RenderError, VoiceError
+from realizer.server.effects import Draw, Speak
+from realizer.speech.utterance import Utterance, Voice
+
+if TYPE_CHECKING:
+    from realizer.render import Renderer
+
+__all__: list[str] = []
+
+# Pictures of different faces, sizes and cameras each have a process; more than these are not kept.
+RENDERERS = 4
+
+
+class Studio:
+    """The engines. `speakers` and `drawers` are the threads that may call `speak` and `draw`."""
+
+    def __init__(self) -> None:
+        # Two texts can be spoken at a time: one long text must not hold up the short ones of all others.
+        self.speakers = ThreadPoolExecutor(2, "voice")
+        self.drawers = ThreadPoolExecutor(1, "renderer")
+        self._voices: dict[str | None, Voice] = {}
+        self._renderers: dict[tuple[str, tuple[int, int], str], Renderer] = {}
+        self._lock = threading.Lock()
+        self._said: set[str] = set()
+
+    def speak(self, order: Speak) -> Utterance | RealizerError:
+        """What a voice made of it; or why it could not, which is also said once on stderr."""
+        try:
+            return self._voice(order.say.voice).say(order.say)
+        except VoiceError as error:
+            self._tell(str(error))
+            return error
+        except Exception as error:
+            self._tell(f"{type(error).__name__}: {error}")
+            return VoiceError(f"the voice failed: {error}")
+
+    def draw(self, order: Draw) -> bytes | RealizerError:
+        """A JPEG; or why there is none."""
+        try:
+            return self._renderer(order).jpeg(order.faps, order.quality)
+        except RealizerError as error:
+            return error
+        except Exception as error:
+            return RenderError(f"the picture could not be drawn: {error}")
+
+    def close(self) -> None:
+        """End all engines; what waits for them is dropped."""
+        self.speakers.shutdown(wait=False, cancel_futures=True)
+        self.drawers.shutdown(wait=False, cancel_futures=True)
+        for voice in self._voices.values():
+            voice.close()
+        for renderer in self._renderers.values():
+            renderer.close()
+
+    def _voice(self, name: str | None) -> Voice:
+        from realizer.speech import find_voice
+
+        with self._lock:
+            if name not in self._voices:
+                self._voices[name] = find_voice(name)
+            return self._voices[name]
+
+    def _renderer(self, order: Draw) -> Renderer:
+        from realizer.render import Renderer
+
+        key = (order.face, order.size, order.camera)
+        if key not in self._renderers:
+            if len(self._renderers) >= RENDERERS:
+                self._renderers.pop(next(iter(self._renderers))).close()
+            self._renderers[key] = Renderer(order.face, order.size, order.camera)
+        return self._renderers[key]
+
+    def _tell(self, fault: str) -> None:
+        if fault not in self._said:
+            self._said.add(fault)
+            print(f"realizer: {fault}; going on without sound", file=sys.stderr)
