@@ -1,0 +1,261 @@
+"""The behaviours of BML 1.0 core, and faceFacs: one class per element, and the vocabulary that lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from bml_schema.nodes import Behaviour, Part, core, extension
+from bml_schema.shape import attribute, child, children, mixed, node, sync_ref
+from bml_schema.sync_refs import SyncRef
+from bml_schema.values import integer, name, number, one_of, word
+
+__all__ = [
+    "VOCABULARY",
+    "Face",
+    "FaceFacs",
+    "FaceLexeme",
+    "FaceShift",
+    "Gaze",
+    "GazeShift",
+    "Gesture",
+    "Head",
+    "HeadDirectionShift",
+    "Locomotion",
+    "Pointing",
+    "Pose",
+    "Posture",
+    "PostureShift",
+    "Speech",
+    "SpeechText",
+    "Stance",
+    "Sync",
+    "Wait",
+]
+
+HOLD: Final = ("start", "ready", "relax", "end")
+STROKE: Final = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
+PEAK: Final = ("start", "attackPeak", "relax", "end")
+
+DIRECTIONS: Final = ("RIGHT", "LEFT", "UP", "DOWN", "UPRIGHT", "UPLEFT", "DOWNLEFT", "DOWNRIGHT")
+HANDS: Final = ("LEFT_HAND", "RIGHT_HAND", "BOTH_HANDS")
+SIDES: Final = ("LEFT", "RIGHT", "BOTH")
+STANCES: Final = ("SITTING", "CROUCHING", "STANDING", "LYING")
+BODY_PARTS: Final = ("ARMS", "LEFT_ARM", "RIGHT_ARM", "LEGS", "LEFT_LEG", "RIGHT_LEG", "HEAD", "WHOLEBODY")
+
+_AMOUNT = number(0, 1)
+# How far attackPeak exceeds the sustained amount; -1 would be no peak at all.
+_OVERSHOOT = number(-1, 10)
+_ANGLE = number(-360, 360)
+
+
+@node
+class Gaze(Behaviour):
+    """Look at something for a while."""
+
+    tag = core("gaze")
+    sync_points = HOLD
+    target: str = attribute(word)
+    influence: str | None = attribute(word, default=None)
+    offset_angle: float = attribute(_ANGLE, default=0.0)
+    offset_direction: str = attribute(one_of(*DIRECTIONS), default="RIGHT")
+
+
+@node
+class GazeShift(Behaviour):
+    """Look at something from now on."""
+
+    tag = core("gazeShift")
+    target: str = attribute(word)
+    influence: str | None = attribute(word, default=None)
+    offset_angle: float = attribute(_ANGLE, default=0.0)
+    offset_direction: str = attribute(one_of(*DIRECTIONS), default="RIGHT")
+
+
+@node
+class Head(Behaviour):
+    """Move the head rhythmically: NOD, SHAKE; with repetition n it has stroke:1 .. stroke:n."""
+
+    tag = core("head")
+    sync_points = STROKE
+    lexeme: str = attribute(word)
+    # More than 100 nods are a mistake, and each has sync points to schedule and report.
+    repetition: int = attribute(integer(1, 100), default=1)
+    amount: float = attribute(_AMOUNT, default=0.5)
+
+
+@node
+class HeadDirectionShift(Behaviour):
+    """Turn the head towards something from now on."""
+
+    tag = core("headDirectionShift")
+    target: str = attribute(word)
+
+
+@node
+class FaceLexeme(Behaviour):
+    """A facial expression by name; inside <face> it has no timing and may have no id."""
+
+    tag = core("faceLexeme")
+    sync_points = PEAK
+    lexeme: str = attribute(word)
+    amount: float = attribute(_AMOUNT, default=0.5)
+    overshoot: float = attribute(_OVERSHOOT, default=0.0)
+
+
+@node
+class FaceFacs(Behaviour):
+    """One FACS action unit; inside <face> it has no timing and may have no id."""
+
+    tag = extension("faceFacs")
+    sync_points = PEAK
+    au: int = attribute(integer(1, 999))
+    side: str = attribute(one_of(*SIDES), default="BOTH")
+    amount: float = attribute(_AMOUNT, default=0.5)
+    overshoot: float = attribute(_OVERSHOOT, default=0.0)
+
+
+@node
+class Face(Behaviour):
+    """Several expressions and action units that share one timing."""
+
+    tag = core("face")
+    sync_points = PEAK
+    amount: float = attribute(_AMOUNT, default=0.5)
+    overshoot: float = attribute(_OVERSHOOT, default=0.0)
+    parts: tuple[FaceLexeme | FaceFacs, ...] = children(FaceLexeme, FaceFacs, least=1)
+
+
+@node
+class FaceShift(Behaviour):
+    """Several expressions and action units that are the resting face from now on."""
+
+    tag = core("faceShift")
+    amount: float = attribute(_AMOUNT, default=0.5)
+    overshoot: float = attribute(_OVERSHOOT, default=0.0)
+    parts: tuple[FaceLexeme | FaceFacs, ...] = children(FaceLexeme, FaceFacs, least=1)
+
+
+@node
+class Sync(Part):
+    """A named point between two words; `ref` says when it is to be, if anything does."""
+
+    tag = core("sync")
+    id: str = attribute(name)
+    ref: SyncRef | None = attribute(sync_ref, default=None)
+
+
+@node
+class SpeechText(Part):
+    """What is said: strings and Syncs in order, blanks kept, neighbouring strings joined."""
+
+    tag = core("text")
+    parts: tuple[str | Sync, ...] = mixed(Sync, default=())
+
+    def __str__(self) -> str:
+        return "".join(p for p in self.parts if isinstance(p, str))
+
+
+@node
+class Speech(Behaviour):
+    """Say something; each <sync id> in the text is a sync point too."""
+
+    tag = core("speech")
+    marks = True
+    text: SpeechText | None = child(SpeechText, default=None)
+
+    @property
+    def marked(self) -> tuple[str, ...]:
+        """Ids of the syncs in the text, in order."""
+        return tuple(p.id for p in self.text.parts if isinstance(p, Sync)) if self.text else ()
+
+    def fault(self) -> str:
+        seen = set(self.sync_points)
+        for id in self.marked:
+            if id in seen:
+                return f'sync: wanted an id of its own, got "{id}" again'
+            seen.add(id)
+        return ""
+
+
+@node
+class Wait(Behaviour):
+    """Do nothing for some seconds, or as long as its start and end say."""
+
+    tag = core("wait")
+    duration: float = attribute(number(0, 86400, wanted="seconds, 0..86400"), default=0.0)
+
+
+@node
+class Gesture(Behaviour):
+    """A gesture of the arms by name."""
+
+    tag = core("gesture")
+    sync_points = STROKE
+    lexeme: str = attribute(word)
+    mode: str | None = attribute(one_of(*HANDS), default=None)
+
+
+@node
+class Pointing(Behaviour):
+    """Point at something."""
+
+    tag = core("pointing")
+    sync_points = STROKE
+    target: str = attribute(word)
+    mode: str | None = attribute(one_of(*HANDS), default=None)
+
+
+@node
+class Stance(Part):
+    """How the body stands, sits or lies."""
+
+    tag = core("stance")
+    type: str = attribute(one_of(*STANCES))
+
+
+@node
+class Pose(Part):
+    """How one part of the body is held."""
+
+    tag = core("pose")
+    part: str = attribute(one_of(*BODY_PARTS))
+    lexeme: str = attribute(word)
+
+
+@node
+class Posture(Behaviour):
+    """Take a posture for a while."""
+
+    tag = core("posture")
+    sync_points = HOLD
+    stance: Stance | None = child(Stance, default=None)
+    poses: tuple[Pose, ...] = children(Pose, default=())
+
+
+@node
+class PostureShift(Behaviour):
+    """Take a posture from now on."""
+
+    tag = core("postureShift")
+    stance: Stance | None = child(Stance, default=None)
+    poses: tuple[Pose, ...] = children(Pose, default=())
+
+
+@node
+class Locomotion(Behaviour):
+    """Go somewhere."""
+
+    tag = core("locomotion")
+    target: str = attribute(word)
+    manner: str = attribute(word, default="WALK")
+
+
+# Which class an element becomes; extensions add theirs: {**VOCABULARY, Wink.tag: Wink}.
+VOCABULARY: Final[Mapping[str, type[Behaviour]]] = {
+    cls.tag: cls
+    for cls in (
+        *(Gaze, GazeShift, Head, HeadDirectionShift, FaceLexeme, FaceFacs, Face, FaceShift, Speech, Wait),
+        *(Gesture, Pointing, Posture, PostureShift, Locomotion),
+    )
+}

@@ -1,0 +1,287 @@
+"""Text that holds documents in, Blocks out: decoding, limits, well-formedness, several documents."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from lxml import etree
+
+from bml_schema.behaviours import VOCABULARY
+from bml_schema.errors import BMLError, BMLSyntaxError, shown
+from bml_schema.nodes import Behaviour, Block
+from bml_schema.parser import MOST_BEHAVIOURS, read_block
+
+__all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "element", "parse", "read"]
+
+MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
+MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
+
+Vocabulary = Mapping[str, type[Behaviour]]
+
+# What decides where a document begins and ends, and what may hide such marks.
+_MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml(?=[\s>])")
+_REST_OF_TAG = re.compile(r"""(?:[^<>"']|"[^<"]*"|'[^<']*')*+>""")
+_REST_OF_DOCTYPE = re.compile(r"""(?:[^<>"'\[]|"[^<"]*"|'[^<']*')*+[>\[]""")
+_CLOSERS = {
+    "<!--": re.compile("-->"),
+    "<![CDATA[": re.compile(r"\]\]>"),
+    "<?": re.compile(r"\?>"),
+    "<!DOCTYPE": re.compile(r"\]\s*>"),
+}
+_BLANKS = " \t\r\n\ufeff"
+_ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
+_ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
+# Some of Python's codecs are slow or strange enough to be an attack.
+_CODECS = {"utf-8", "utf-16", "ascii", "iso8859-1", "iso8859-15", "cp1252"}
+
+
+def parse(
+    text: str | bytes,
+    vocabulary: Vocabulary = VOCABULARY,
+    *,
+    strict: bool = False,
+    most_bytes: int = MOST_BYTES,
+    most_behaviours: int = MOST_BEHAVIOURS,
+) -> Block:
+    """The block of a text that holds exactly one document.
+
+    Args:
+        text: the document; with or without namespace, any prefix; blanks, BOM, declaration and comments
+            before it are allowed. Bytes in UTF-8, UTF-16 or Latin.
+        vocabulary: Clark tag -> node class; extensions add theirs.
+        strict: the first Problem is an error.
+        most_bytes, most_behaviours: more are refused.
+
+    Returns:
+        The block. What was dropped from it is in its `problems`.
+
+    Raises:
+        BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big, not one document.
+    """
+    first: Block | BMLError | None = None
+    for found in read(text, vocabulary, most_bytes=most_bytes, most_behaviours=most_behaviours):
+        if first is not None:
+            raise BMLError("wanted one document, got several") if isinstance(first, Block) else first
+        first = found
+        if isinstance(first, BMLError):
+            break
+    if first is None:
+        raise BMLSyntaxError("wanted a <bml> document, got an empty text")
+    if isinstance(first, BMLError):
+        raise first
+    if strict and first.problems:
+        problem = first.problems[0]
+        said = problem.text.partition(f"{problem.path}: ")[2] or problem.text
+        raise BMLError(said, line=problem.line, path=problem.path, block=first.id)
+    return first
+
+
+def read(
+    text: str | bytes,
+    vocabulary: Vocabulary = VOCABULARY,
+    *,
+    most_bytes: int = MOST_BYTES,
+    most_behaviours: int = MOST_BEHAVIOURS,
+    most_documents: int = MOST_DOCUMENTS,
+) -> Iterator[Block | BMLError]:
+    """The blocks of a text with any number of documents, in order.
+
+    After a broken stretch reading goes on at the next `<bml`. Lines are counted over the whole text.
+
+    Yields:
+        A Block for each document, a BMLError for each stretch that gave none. Raises nothing.
+    """
+    try:
+        text = _decoded(text) if isinstance(text, bytes) else text
+    except BMLError as wrong:
+        yield wrong
+        return
+    for n, stretch in enumerate(_stretches(text)):
+        if n == most_documents:
+            said = f"wanted at most {n} documents in one text; the rest is not read"
+            yield BMLError(said, line=_line(text, stretch.start))
+            return
+        try:
+            yield _block(text, stretch, vocabulary, most_bytes, most_behaviours)
+        except BMLError as wrong:
+            yield wrong
+
+
+class _Stretch(NamedTuple):
+    """text[start:end] is a document whose start tag is `tag`, or `fault` says why it cannot be one."""
+
+    start: int
+    end: int
+    tag: str = ""
+    fault: str = ""
+
+
+class _Mark(NamedTuple):
+    """text[start:end] is a start tag, an end tag, or something between documents: "open", "close", "skip"."""
+
+    kind: str
+    start: int
+    end: int
+
+
+def _marks(text: str) -> Iterator[_Mark]:
+    """Tags of <bml>, DOCTYPEs, comments and processing instructions; linear in the text whatever it holds."""
+    never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
+    position = 0
+    while found := _MARKS.search(text, position):
+        start, position = found.span()
+        opener = found[0]
+        if opener.startswith("</"):
+            position = (text.find(">", position) + 1) or position
+            yield _Mark("close", start, position)
+            continue
+        if opener not in _CLOSERS:
+            rest = _REST_OF_TAG.match(text, position)
+            position = rest.end() if rest else position
+            closed = rest is not None and text[position - 2] == "/"
+            yield _Mark("open", start, position)
+            if closed:
+                yield _Mark("close", position, position)
+            continue
+        if opener == "<!DOCTYPE":
+            rest = _REST_OF_DOCTYPE.match(text, position)
+            position = rest.end() if rest else position
+            if rest is None or text[position - 1] == ">":
+                yield _Mark("doctype", start, position)
+                continue
+        end = None if opener in never else _CLOSERS[opener].search(text, position)
+        if end is not None:
+            position = end.end()
+        else:
+            never.add(opener)
+        if opener == "<!DOCTYPE":
+            yield _Mark("doctype", start, position)
+        elif end is not None and opener != "<![CDATA[":
+            yield _Mark("skip", start, position)
+
+
+def _stretches(text: str) -> Iterator[_Stretch]:
+    """Documents and what stands between them that should not, in order."""
+    marks = list(_marks(text))
+    ends: dict[int, int] = {}
+    opened: list[int] = []
+    for n, mark in enumerate(marks):
+        if mark.kind == "open":
+            opened.append(n)
+        elif mark.kind == "close" and opened:
+            ends[opened.pop()] = mark.end
+    opens = [m.start for m in marks if m.kind == "open"]
+    here = junk = (
+        0  # how far reading got; where the junk begins that was not told of yet, if text[junk:here] is
+    )
+    loose = False
+    doctype = False
+    seen = 0
+    for n, mark in enumerate([*marks, _Mark("end", len(text), len(text))]):
+        seen += mark.kind == "open"
+        if mark.start < here:
+            continue
+        if text[here : mark.start].strip(_BLANKS) and not loose:
+            junk, loose = here, True
+        here = mark.end
+        if mark.kind == "close" and not loose:
+            junk, loose = mark.start, True
+        if mark.kind == "doctype" and not doctype:
+            junk, doctype = (junk if loose else mark.start), True
+        if mark.kind not in ("open", "end"):
+            continue
+        if doctype and mark.kind == "end":
+            yield _Stretch(junk, mark.start, fault=_NO_DTD)
+        elif loose and not doctype:
+            yield _Stretch(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
+        if mark.kind == "end":
+            return
+        start = junk if doctype else mark.start
+        end = ends.get(n) or (opens[seen] if seen < len(opens) else len(text))
+        here = max(end, mark.end) if n in ends else end
+        yield _Stretch(start, end, text[mark.start : mark.end], _NO_DTD if doctype else "")
+        loose = doctype = False
+
+
+_NO_DTD = "wanted a document without DTD and entities, got <!DOCTYPE"
+
+
+def _not_bml(text: str) -> str:
+    return f"wanted <bml>, got {shown(text.strip(_BLANKS))}"
+
+
+def _block(
+    text: str, stretch: _Stretch, vocabulary: Vocabulary, most_bytes: int, most_behaviours: int
+) -> Block:
+    line = _line(text, stretch.start)
+    named = _ID.search(stretch.tag)
+    id = (named[1] or named[2]) if named else None
+    if stretch.fault:
+        raise BMLSyntaxError(stretch.fault, line=line, block=id)
+    data = _encoded(text[stretch.start : stretch.end], line, id)
+    if len(data) > most_bytes:
+        raise BMLError(
+            f"wanted at most {most_bytes} bytes in a document, got {len(data)}", line=line, block=id
+        )
+    root = element(data, lines_before=line - 1, block=id)
+    return read_block(root, vocabulary, lines_before=line - 1, most_behaviours=most_behaviours)
+
+
+_PARSER = etree.XMLParser(
+    resolve_entities=False,
+    load_dtd=False,
+    no_network=True,
+    dtd_validation=False,
+    huge_tree=False,
+    remove_comments=True,
+    remove_pis=True,
+    encoding="utf-8",
+)
+
+
+def element(data: bytes, *, lines_before: int = 0, block: str | None = None) -> etree._Element:
+    """The root of one document in UTF-8 without prolog; BMLSyntaxError if it is not well-formed."""
+    try:
+        return etree.fromstring(data, _PARSER)
+    except etree.XMLSyntaxError as wrong:
+        line = (wrong.lineno or 1) + lines_before
+        said = re.sub(r",? line \d+, column \d+.*", "", wrong.msg or "no XML", flags=re.DOTALL)
+        if "xcessive depth" in said:
+            said = "elements nested too deep, wanted at most 256"
+        raise BMLSyntaxError(f"not well-formed: {said}", line=line, block=block) from None
+
+
+def _encoded(document: str, line: int, block: str | None) -> bytes:
+    try:
+        return document.encode()
+    except UnicodeEncodeError as wrong:
+        line += document.count("\n", 0, wrong.start)
+        got = f"U+{ord(document[wrong.start]):04X}"
+        said = f"wanted characters XML can hold, got {got}"
+        raise BMLSyntaxError(said, line=line, block=block) from None
+
+
+def _decoded(data: bytes) -> str:
+    """Text of bytes, by BOM, declaration, or as UTF-8."""
+    named = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
+    encoding = named[1].decode() if named else "utf-8"
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    try:
+        if codecs.lookup(encoding).name not in _CODECS:
+            raise LookupError(encoding)
+        return data.decode(encoding)
+    except LookupError:
+        raise BMLSyntaxError(f"encoding: wanted UTF-8, UTF-16 or Latin, got {shown(encoding)}") from None
+    except UnicodeDecodeError as wrong:
+        line = data.count(b"\n", 0, wrong.start) + 1
+        raise BMLSyntaxError(
+            f"wanted {encoding}, got the byte 0x{data[wrong.start]:02X}", line=line
+        ) from None
+
+
+def _line(text: str, position: int) -> int:
+    return text.count("\n", 0, position) + 1

@@ -1,0 +1,125 @@
+"""What can be wrong with a document: an error when no block came of it, a problem when only a part went.
+
+BMLError               no block: too big, no usable id, not a <bml>
+└── BMLSyntaxError     not well-formed XML, or XML we refuse to read (DTD, entities)
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import islice
+from typing import NamedTuple
+
+__all__ = [
+    "BEHAVIOR_TYPE_NOT_SUPPORTED",
+    "CUSTOM_BEHAVIOR_NOT_SUPPORTED",
+    "PARSING_FAILURE",
+    "BMLError",
+    "BMLSyntaxError",
+    "Place",
+    "Problem",
+    "at",
+    "did_you_mean",
+    "shown",
+]
+
+# Warning types of the standard, in its (American) spelling.
+PARSING_FAILURE = "PARSING_FAILURE"
+BEHAVIOR_TYPE_NOT_SUPPORTED = "BEHAVIOR_TYPE_NOT_SUPPORTED"
+CUSTOM_BEHAVIOR_NOT_SUPPORTED = "CUSTOM_BEHAVIOR_NOT_SUPPORTED"
+
+
+class Place(NamedTuple):
+    """Where something stands: 1-based line in the text (where its start tag ends), and element path."""
+
+    line: int
+    path: str
+
+
+def at(line: int | None, path: str, text: str) -> str:
+    """One sentence with its place: `line 3, /bml/head[1]: amount: wanted 0..1, got 7`."""
+    where = ", ".join(filter(None, (f"line {line}" if line else "", path)))
+    return f"{where}: {text}" if where else text
+
+
+class BMLError(Exception):
+    """A stretch of text that gave no block.
+
+    Attributes:
+        text: what was wanted and what came, without the place.
+        line: 1-based line in the text that was read, None if there is none to name.
+        path: element path such as "/bml", "" where the text is not well-formed.
+        block: the block's id if it could be read, else None.
+    """
+
+    def __init__(
+        self, text: str, *, line: int | None = None, path: str = "", block: str | None = None
+    ) -> None:
+        super().__init__(at(line, path, text))
+        self.text = text
+        self.line = line
+        self.path = path
+        self.block = block
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Errors cross process borders (batch workers); keyword arguments do not survive the default.
+        return _again, (type(self), self.text, self.line, self.path, self.block)
+
+
+def _again(kind: type[BMLError], text: str, line: int | None, path: str, block: str | None) -> BMLError:
+    return kind(text, line=line, path=path, block=block)
+
+
+class BMLSyntaxError(BMLError):
+    """The text is not well-formed XML, or brings a DTD or entities."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """A part of a document that was dropped while parsing; becomes one BML warning.
+
+    Attributes:
+        id: "block:behaviour" ("block:path" for a behaviour without id), a constraint's id, or the block's.
+        type: BML warning type, such as PARSING_FAILURE.
+        text: what was wanted and what came, with line and path in front.
+        line, path: where.
+        lost: what vanished with it: "behaviour:sync" for a reference, a constraint's id or path.
+        fatal: the whole block goes, because it was inside <required>.
+    """
+
+    id: str
+    type: str
+    text: str
+    line: int
+    path: str
+    lost: tuple[str, ...] = ()
+    fatal: bool = False
+
+    def __str__(self) -> str:
+        return self.text
+
+
+_LONGEST_SHOWN = 60  # characters of a value in a message; enough to find it, never a flood
+
+
+def shown(value: str) -> str:
+    """A value as it stands in a message: numbers bare, everything else quoted, long ones cut."""
+    if len(value) > _LONGEST_SHOWN:
+        value = value[:_LONGEST_SHOWN] + "..."
+    return value if re.fullmatch(r"[+-]?[0-9.]+", value) else f'"{value}"'
+
+
+_MOST_CHOICES = 500  # difflib is slow; a suggestion is not worth more than about a millisecond
+
+
+def did_you_mean(word: str, choices: Iterable[str]) -> str:
+    """`, did you mean "nod1"?` if one of the first 500 choices is close, else ""."""
+    if len(word) > _LONGEST_SHOWN:
+        return ""
+    near = difflib.get_close_matches(
+        word, [c for c in islice(choices, _MOST_CHOICES) if len(c) <= _LONGEST_SHOWN], n=1
+    )
+    return f', did you mean "{near[0]}"?' if near else ""

@@ -1,0 +1,37 @@
+"""Text in, XML character data or attribute value out, such that it reads back as the same text."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["escape", "escape_value", "legal"]
+
+# Everything XML 1.0 has no way to write (production 2, Char).
+_ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_DATA = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
+# Readers turn bare line ends and tabs of attributes into blanks.
+_ATTRIBUTE = str.maketrans(
+    {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\r": "&#13;", "\n": "&#10;", "\t": "&#9;"}
+)
+
+
+def _checked(text: str) -> str:
+    bad = _ILLEGAL.search(text)
+    if bad:
+        raise ValueError(f"wanted characters XML can hold, got U+{ord(bad[0]):04X} at {bad.start()}")
+    return text
+
+
+def escape(text: str) -> str:
+    """Character data; ValueError for characters XML cannot hold."""
+    return _checked(text).translate(_DATA)
+
+
+def escape_value(text: str) -> str:
+    """The inside of a double-quoted attribute; ValueError for characters XML cannot hold."""
+    return _checked(text).translate(_ATTRIBUTE)
+
+
+def legal(text: str) -> str:
+    """The text with every character XML cannot hold replaced by U+FFFD."""
+    return _ILLEGAL.sub("\ufffd", text)

@@ -1,0 +1,165 @@
+"""What a node class says about its XML: dataclass fields in, a table of attributes and children out.
+
+A node class is a few lines::
+
+    @node
+    class Wink(Behaviour):
+        tag = "{urn:bml-realizer:1}wink"
+        sync_points = ("start", "attackPeak", "relax", "end")
+        side: str = attribute(one_of("LEFT", "RIGHT"))
+        amount: float = attribute(number(0, 1), default=1.0)
+
+`parse(text, {**VOCABULARY, Wink.tag: Wink})` then reads it and `write` writes it: ids, sync points,
+descriptions, faults and round trip come with the base class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, TypeVar, dataclass_transform
+
+from bml_schema.values import Value
+
+__all__ = ["Shape", "attribute", "child", "children", "mixed", "node", "shape_of", "sync_ref", "text"]
+
+_KEY = "bml"
+_T = TypeVar("_T")
+
+# The one value that cannot be read alone: it needs the ids of the block.
+sync_ref = Value("a sync reference", lambda text: text, str, "syncReference")
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """One XML attribute: field it goes to, its name in XML, what it may hold."""
+
+    field: str
+    name: str
+    value: Value
+    required: bool
+    default: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Child:
+    """One kind of child elements: field they go to, classes by tag, how many there may and must be."""
+
+    field: str
+    classes: tuple[type[Any], ...]
+    many: bool
+    least: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """All an element may hold, as the parser and the writer need it.
+
+    Attributes:
+        attributes: XML name -> Attribute.
+        children: in order of declaration.
+        by_tag: Clark tag -> (Child, class); `by_local`: the same by local name, for documents that leave an
+            extension's own children in the core namespace.
+        mixed: field of the mixed content (text and children in order), or "".
+        text: field of the character data, or "".
+        names: names of all fields.
+    """
+
+    attributes: Mapping[str, Attribute]
+    required: tuple[Attribute, ...]
+    children: tuple[Child, ...]
+    by_tag: Mapping[str, tuple[Child, type[Any]]]
+    by_local: Mapping[str, tuple[Child, type[Any]]]
+    mixed: str = ""
+    text: str = ""
+    names: frozenset[str] = frozenset()
+
+
+def attribute(value: Value, *, default: Any = MISSING, default_factory: Any = MISSING, name: str = "") -> Any:
+    """An XML attribute, required without a default; `name` if it is not the field's name in camelCase."""
+    return field(
+        default=default, default_factory=default_factory, metadata={_KEY: ("attribute", value, name)}
+    )
+
+
+def child(cls: type[Any], *, default: Any = MISSING) -> Any:
+    """One child element; without a default it is required."""
+    return field(default=default, metadata={_KEY: ("child", (cls,), default is MISSING)})
+
+
+def children(*classes: type[Any], least: int = 0, default: Any = MISSING) -> Any:
+    """Child elements of some classes, as a tuple in document order; at least `least` of them."""
+    return field(default=default, metadata={_KEY: ("children", classes, least)})
+
+
+def mixed(*classes: type[Any], default: Any = MISSING) -> Any:
+    """The whole content: a tuple of strings and nodes in document order, blanks kept."""
+    return field(default=default, metadata={_KEY: ("mixed", classes, 0)})
+
+
+def text(*, default: Any = MISSING) -> Any:
+    """The character data of an element without children, blanks kept."""
+    return field(default=default, metadata={_KEY: ("text", (), 0)})
+
+
+@dataclass_transform(
+    kw_only_default=True,
+    frozen_default=True,
+    field_specifiers=(attribute, child, children, mixed, text, field),
+)
+def node(cls: type[_T]) -> type[_T]:
+    """A frozen, slotted, keyword-only dataclass: a node class."""
+    return dataclass(frozen=True, slots=True, kw_only=True)(cls)
+
+
+def local(tag: str) -> str:
+    """The name behind the namespace of a Clark tag."""
+    return tag.rpartition("}")[2]
+
+
+def camel(name: str) -> str:
+    """offset_angle -> offsetAngle."""
+    head, *tail = name.split("_")
+    return head + "".join(t.capitalize() for t in tail)
+
+
+def shape_of(cls: type[Any]) -> Shape:
+    """The shape of a node class, read once from its fields."""
+    shape = _SHAPES.get(cls)
+    if shape is None:
+        shape = _SHAPES[cls] = _shape(cls)
+    return shape
+
+
+_SHAPES: dict[type[Any], Shape] = {}
+
+
+def _shape(cls: type[Any]) -> Shape:
+    attributes: dict[str, Attribute] = {}
+    kinds: list[Child] = []
+    content = {"mixed": "", "text": ""}
+    for f in fields(cls):
+        if _KEY not in f.metadata:
+            continue
+        kind, what, more = f.metadata[_KEY]
+        if kind == "attribute":
+            optional = f.default is not MISSING or f.default_factory is not MISSING
+            default = f.default if f.default is not MISSING else None
+            xml = more or camel(f.name)
+            attributes[xml] = Attribute(f.name, xml, what, not optional, default)
+            continue
+        if kind in content:
+            content[kind] = f.name
+        if kind != "text":
+            kinds.append(Child(f.name, what, kind != "child", int(more)))
+    by_tag = {c.tag: (k, c) for k in kinds for c in k.classes}
+    return Shape(
+        attributes=attributes,
+        required=tuple(a for a in attributes.values() if a.required),
+        children=tuple(kinds),
+        by_tag=by_tag,
+        by_local={local(tag): found for tag, found in by_tag.items()},
+        mixed=content["mixed"],
+        text=content["text"],
+        names=frozenset(f.name for f in fields(cls)),
+    )

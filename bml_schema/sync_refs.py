@@ -1,0 +1,187 @@
+"""Sync references: `b1:head1:stroke + 0.5` in, SyncRef out, and back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from bml_schema.errors import did_you_mean, shown
+from bml_schema.values import MOST_SECONDS, NUMBER, decimal, unwanted
+
+__all__ = ["Names", "Points", "SyncRef", "read_sync_ref"]
+
+# Sync points of the core. A name in the middle of three that is one of these is no behaviour's id.
+_POINTS = frozenset({"start", "ready", "strokeStart", "stroke", "strokeEnd", "attackPeak", "relax", "end"})
+_LONGEST = 1000  # characters of a reference: two ids of 256, a sync id, an offset
+_WANTED = 'a number of seconds or a reference such as "behaviour:sync + 0.5"'
+_UNSIGNED = re.compile(r"[0-9]+(?:\.[0-9]*)?|\.[0-9]+")
+_OFFSET_LIKE = re.compile(r".*[+-]\s*(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SyncRef:
+    """A point in time, as a document says it.
+
+    Attributes:
+        block: another block's id; None for the own block.
+        behaviour: a behaviour's id, "bml" for the block itself, None for a plain number.
+        sync: sync point name; None for a plain number.
+        index: n of "stroke:n", counted from 1; None without.
+        offset: seconds after that point; for a plain number, seconds after block start.
+    """
+
+    block: str | None = None
+    behaviour: str | None = None
+    sync: str | None = None
+    index: int | None = None
+    offset: float = 0.0
+
+    def __str__(self) -> str:
+        if self.behaviour is None or self.sync is None:
+            return decimal(self.offset)
+        point = ":".join(filter(None, (self.block, self.behaviour, self.sync)))
+        if self.index is not None:
+            point = f"{point}:{self.index}"
+        # Blanks around the sign, because ids may hold hyphens; "+ 0" where the name ends like an offset.
+        if self.offset or _OFFSET_LIKE.fullmatch(point):
+            point += f" {'-' if self.offset < 0 else '+'} {decimal(abs(self.offset))}"
+        return point
+
+
+class Points(NamedTuple):
+    """The sync points of one behaviour, and how many strokes it has ("stroke:n")."""
+
+    names: Collection[str]
+    strokes: int = 1
+
+
+@dataclass(slots=True)
+class Names:
+    """What references of one block can name: its id, and the sync points of each behaviour id.
+
+    Points are None for an element of unknown kind: whatever is said of it vanishes with it.
+    """
+
+    block: str
+    points: dict[str, Points | None] = field(default_factory=dict)
+    suggestions: int = 10  # "did you mean" is slow; a document full of faults gets the first few
+
+    def suggest(self, word: str, choices: Iterable[str]) -> str:
+        """`, did you mean ...?` or "", the latter always once the document used its suggestions up."""
+        if self.suggestions <= 0:
+            return ""
+        self.suggestions -= 1
+        return did_you_mean(word, choices)
+
+
+def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
+    """The reference a text stands for.
+
+    Ids may hold hyphens and dots: a reading whose names exist goes before one that cuts an offset off.
+    References into other blocks are not checked; one into the own block by its id loses the id.
+
+    Args:
+        text: value of an attribute.
+        names: what the own block holds; None checks the grammar only.
+
+    Raises:
+        ValueError: not a reference, or one to something the own block does not hold. The text says what
+            was wanted and what came.
+
+    Source: BML 1.0, sync references.
+    """
+    text = text.strip()
+    if NUMBER.fullmatch(text):
+        return SyncRef(offset=_seconds(text))
+    if len(text) > _LONGEST:
+        raise ValueError(f"wanted at most {_LONGEST} characters, got {len(text)}")
+    readings = [r for r in (_point(text, ""), _with_offset(text)) if r is not None]
+    if not readings:
+        raise ValueError(unwanted(_WANTED, text, shown(text)))
+    if names is None:
+        return readings[-1]
+    readings = [_own(r, names) for r in readings]
+    for reading in readings:
+        if reading.block is None and not _missing(reading, names):
+            return _single_stroke(reading, names)
+    likely = readings[-1]
+    if likely.block is None:
+        raise ValueError(_missing(likely, names, say=True))
+    return likely
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not abs(value) <= MOST_SECONDS:
+        raise ValueError(f"wanted at most {MOST_SECONDS:g} seconds, got {shown(text)}")
+    return value
+
+
+def _with_offset(text: str) -> SyncRef | None:
+    cut = max(text.rfind("+"), text.rfind("-"))
+    tail = text[cut + 1 :].strip()
+    if cut < 0 or not _UNSIGNED.fullmatch(tail):
+        return None
+    return _point(text[:cut], text[cut] + tail)
+
+
+def _point(text: str, offset: str) -> SyncRef | None:
+    """[block:]source:sync[:index] with an offset such as "-0.5" or ""; None if it does not have that form."""
+    parts = [p.strip() for p in text.split(":")]
+    if not all(parts):
+        return None
+    index: int | None = None
+    if len(parts) in (3, 4) and parts[-2] in _POINTS:
+        if parts[-2] != "stroke" or not re.fullmatch(r"0{0,9}[1-9][0-9]{0,5}", parts[-1]):
+            return None
+        index = int(parts.pop())
+    if len(parts) not in (2, 3):
+        return None
+    *block, behaviour, sync = parts
+    return SyncRef(
+        block=block[0] if block else None,
+        behaviour=behaviour,
+        sync=sync,
+        index=index,
+        offset=_seconds(offset) if offset else 0.0,
+    )
+
+
+def _own(ref: SyncRef, names: Names) -> SyncRef:
+    if ref.block != names.block:
+        return ref
+    return SyncRef(behaviour=ref.behaviour, sync=ref.sync, index=ref.index, offset=ref.offset)
+
+
+def _single_stroke(ref: SyncRef, names: Names) -> SyncRef:
+    """stroke:1 of a behaviour with one stroke is its stroke."""
+    points = names.points.get(ref.behaviour or "")
+    if ref.index != 1 or points is None or points.strokes != 1:
+        return ref
+    return SyncRef(behaviour=ref.behaviour, sync=ref.sync, offset=ref.offset)
+
+
+def _missing(ref: SyncRef, names: Names, say: bool = False) -> str:
+    """Why a reference into the own block leads nowhere; "" if it leads somewhere."""
+    source, sync = ref.behaviour or "", ref.sync or ""
+    if source == "bml":
+        return (
+            "" if sync == "start" and ref.index is None else f'wanted "bml:start", got {shown(f"bml:{sync}")}'
+        )
+    if source not in names.points:
+        if not say:
+            return "unknown"
+        near = ', did you mean "bml:start"?' if source == names.block else names.suggest(source, names.points)
+        return f"no behaviour {shown(source)} in this block{near}"
+    points = names.points[source]
+    if points is None:
+        return ""
+    if sync not in points.names:
+        return f"no sync point {shown(sync)} on {shown(source)}" + (
+            names.suggest(sync, points.names) if say else ""
+        )
+    if ref.index is not None and ref.index > points.strokes:
+        return f"wanted stroke:1..{points.strokes} of {shown(source)}, got stroke:{ref.index}"
+    return ""

@@ -1,0 +1,149 @@
+"""Text of an attribute in, Python value out, and back; with the words for what is wanted."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+__all__ = [
+    "MOST_SECONDS",
+    "NUMBER",
+    "Value",
+    "decimal",
+    "flag",
+    "integer",
+    "name",
+    "number",
+    "one_of",
+    "seconds",
+    "string",
+    "unwanted",
+    "word",
+]
+
+MOST_SECONDS = 86400.0  # a day; longer times in a document are a unit mistake or an attack
+_MOST_DIGITS = 400  # the smallest float written without exponent has 345 characters
+_MOST_NAME = 256  # characters; ids come back in feedback start tags, which clients cut at 4096
+
+# No exponent, NaN or infinity: the standard's numbers are plain decimals.
+NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+_FANCY = re.compile(r"[+-]?(?:nan|inf|infinity|[0-9.]+e[+-]?[0-9]+)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """What an attribute may hold.
+
+    Attributes:
+        wanted: the end of the sentence "wanted ...".
+        read: text -> value; ValueError if it is not one.
+        write: value -> text, such that read(write(v)) == v.
+        type: XSD type the test of nodes against XSD looks for.
+        words: the closed set, if it is one.
+        low, high: the range of a number.
+    """
+
+    wanted: str
+    read: Callable[[str], Any]
+    write: Callable[[Any], str] = str
+    type: str = "string"
+    words: tuple[str, ...] = ()
+    low: float | None = None
+    high: float | None = None
+
+
+def decimal(value: float) -> str:
+    """A number without exponent that reads back as the same float; ValueError for NaN and infinity."""
+    if not math.isfinite(value):
+        raise ValueError(f"wanted a finite number, got {value}")
+    text = repr(float(value))
+    if "e" in text:
+        text = format(Decimal(text), "f")
+    return text.removesuffix(".0")
+
+
+def unwanted(wanted: str, got: str, shown: str) -> str:
+    """`wanted 0..1, got 7`, with a hint where a number is written in a way BML does not have."""
+    hint = " (a plain decimal number, no exponent, NaN or infinity)" if _FANCY.fullmatch(got.strip()) else ""
+    return f"wanted {wanted}{hint}, got {shown}"
+
+
+def number(low: float, high: float, *, wanted: str = "") -> Value:
+    """A decimal number in low..high."""
+
+    def read(text: str) -> float:
+        text = text.strip()
+        if len(text) > _MOST_DIGITS or not NUMBER.fullmatch(text):
+            raise ValueError(text)
+        value = float(text)
+        if not low <= value <= high:
+            raise ValueError(text)
+        return value
+
+    return Value(wanted or f"{low:g}..{high:g}", read, decimal, "decimal", low=low, high=high)
+
+
+def integer(low: int, high: int) -> Value:
+    """A whole number in low..high."""
+
+    def read(text: str) -> int:
+        text = text.strip()
+        if len(text) > 20 or not re.fullmatch(r"[+-]?[0-9]+", text):
+            raise ValueError(text)
+        value = int(text)
+        if not low <= value <= high:
+            raise ValueError(text)
+        return value
+
+    return Value(f"a whole number {low}..{high}", read, str, "integer", low=low, high=high)
+
+
+def one_of(*words: str, any_case: bool = False) -> Value:
+    """One of a closed set of words; with any_case, "merge" is read as MERGE."""
+    known = frozenset(words)
+
+    def read(text: str) -> str:
+        text = text.strip()
+        if any_case:
+            text = text.upper()
+        if text not in known:
+            raise ValueError(text)
+        return text
+
+    listed = ", ".join(words[:-1]) + f" or {words[-1]}" if len(words) > 1 else words[0]
+    return Value(listed, read, str, "words", words=words)
+
+
+def _read_word(text: str) -> str:
+    text = text.strip()
+    if not text:
+        raise ValueError(text)
+    return text
+
+
+def _read_name(text: str) -> str:
+    text = text.strip()
+    if not text or text == "bml" or len(text) > _MOST_NAME or ":" in text or len(text.split()) > 1:
+        raise ValueError(text)
+    return text
+
+
+def _read_flag(text: str) -> bool:
+    text = text.strip()
+    if text not in ("true", "1", "false", "0"):
+        raise ValueError(text)
+    return text in ("true", "1")
+
+
+# An open set: the members of the standard must exist, others may.
+word = Value("a word", _read_word)
+string = Value("text", str)
+flag = Value("true or false", _read_flag, lambda v: "true" if v else "false", "boolean")
+seconds = number(-MOST_SECONDS, MOST_SECONDS, wanted=f"seconds, at most {MOST_SECONDS:g}")
+# Ids hold no colon, because references and feedback ids are joined with it, and no blank, because
+# "a - 1" must always mean an offset. "bml" is the block itself in references.
+name = Value(f'a name of at most {_MOST_NAME} characters without blanks or ":", other than "bml"', _read_name)

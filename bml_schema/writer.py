@@ -1,0 +1,158 @@
+"""A Block in, BML text out, such that parse(write(block)) == block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from lxml import etree
+
+from bml_schema.escape import escape, escape_value
+from bml_schema.nodes import (
+    CORE,
+    EXTENSIONS,
+    Behaviour,
+    Block,
+    Constraint,
+    Description,
+    Required,
+)
+from bml_schema.shape import Attribute, shape_of, sync_ref
+from bml_schema.sync_refs import SyncRef
+
+__all__ = ["OWN", "Writer", "write"]
+
+OWN = "urn:bml-realizer:1"  # what we add to BML ourselves
+_XML = "http://www.w3.org/XML/1998/namespace"
+# Prefixes people know; any other namespace becomes ns1, ns2, ...
+_PREFIXES: Mapping[str, str] = {
+    EXTENSIONS: "ext",
+    OWN: "realizer",
+    "http://www.asap-project.org/bmla": "bmla",
+    "http://hmi.ewi.utwente.nl/bmlt": "bmlt",
+    "http://www.w3.org/2001/XMLSchema-instance": "xsi",
+}
+
+
+def write(block: Block) -> str:
+    """The document of a block, in the core namespace, one behaviour a line.
+
+    Raises:
+        ValueError: a node made by hand holds what XML or BML cannot: a control character, NaN, or a
+            description that is not well-formed.
+    """
+    return Writer().block(block) + "\n"
+
+
+class Writer:
+    """Writes elements, and keeps the namespaces they needed for the root to declare."""
+
+    def __init__(self) -> None:
+        self.prefixes: dict[str, str] = {}
+
+    def block(self, block: Block) -> str:
+        lines = [line for child in block.children for line in self._child(child, "  ")]
+        values = self._attributes(block)
+        start = f'<bml xmlns="{CORE}"{self.declarations()}{values}'
+        return "\n".join((start + ">", *lines, "</bml>")) if lines else start + "/>"
+
+    def declarations(self) -> str:
+        """xmlns attributes for every namespace used so far."""
+        return "".join(f' xmlns:{p}="{escape_value(uri)}"' for uri, p in self.prefixes.items())
+
+    def behaviour(self, node: Behaviour, indent: str = "") -> str:
+        """One behaviour; its namespaces are in `declarations` afterwards."""
+        return self._element(node, indent)
+
+    def _child(self, node: Behaviour | Required | Constraint, indent: str) -> Iterable[str]:
+        if isinstance(node, Required):
+            yield f"{indent}<required>"
+            for child in node.children:
+                yield from self._child(child, indent + "  ")
+            yield f"{indent}</required>"
+        elif isinstance(node, Constraint):
+            yield f"{indent}<constraint{self._attributes(node)}>"
+            for part in node.parts:
+                yield f"{indent}  <{self.name(part.tag)}{self._attributes(part)}>"
+                yield from (f"{indent}    <sync{_value('ref', str(ref))}/>" for ref in part.refs)
+                yield f"{indent}  </{self.name(part.tag)}>"
+            yield f"{indent}</constraint>"
+        else:
+            yield self._element(node, indent)
+
+    def _element(self, node: Any, indent: str) -> str:
+        shape = shape_of(type(node))
+        name = self.name(node.tag)
+        start = f"<{name}{self._attributes(node)}"
+        if shape.mixed:
+            inside = "".join(
+                escape(p) if isinstance(p, str) else self._element(p, "") for p in getattr(node, shape.mixed)
+            )
+            return f"{indent}{start}>{inside}</{name}>"
+        if shape.text:
+            return f"{indent}{start}>{escape(getattr(node, shape.text))}</{name}>"
+        inner: list[str] = []
+        for kind in shape.children:
+            value = getattr(node, kind.field)
+            for child in value if kind.many else filter(None, [value]):
+                inner.append(self._element(child, indent + "  "))
+        for description in getattr(node, "descriptions", ()):
+            inner.append(f"{indent}  {self._description(description)}")
+        if not inner:
+            return f"{indent}{start}/>"
+        return "\n".join((f"{indent}{start}>", *inner, f"{indent}</{name}>"))
+
+    def _description(self, node: Description) -> str:
+        try:
+            inside = etree.fromstring(f"<x>{node.content}</x>".encode(), _PLAIN)
+        except (etree.XMLSyntaxError, UnicodeEncodeError) as wrong:
+            raise ValueError(f"description: wanted well-formed content, got {node.content[:60]!r}") from wrong
+        values = self._attributes(node)
+        if any(not str(e.tag).startswith("{") for e in inside.iterdescendants()):
+            # Elements without namespace must not fall into the core one.
+            return f'<bml:description xmlns:bml="{CORE}" xmlns=""{values}>{node.content}</bml:description>'
+        return f"<description{values}>{node.content}</description>"
+
+    def _attributes(self, node: Any) -> str:
+        shape = shape_of(type(node))
+        out = ""
+        for spec in shape.attributes.values():
+            value = getattr(node, spec.field)
+            if spec.required or value != spec.default:
+                out += self._attribute(spec, value)
+        for point in _ordered(node):
+            out += _value(point, str(node.syncs[point]))
+        for name, text in getattr(node, "foreign", {}).items():
+            out += _value(self.name(name), text)
+        return out
+
+    def _attribute(self, spec: Attribute, value: Any) -> str:
+        if value is None or (value == "" and spec.field == "id"):
+            return ""
+        return _value(spec.name, str(value) if spec.value is sync_ref else spec.value.write(value))
+
+    def name(self, clark: str) -> str:
+        """Clark name -> name with a prefix, which is declared on the root."""
+        space, _, local = clark.rpartition("}")
+        space = space.removeprefix("{")
+        if not space or space == CORE:
+            return local
+        if space == _XML:
+            return f"xml:{local}"
+        if space not in self.prefixes:
+            self.prefixes[space] = _PREFIXES.get(space, f"ns{len(self.prefixes) + 1}")
+        return f"{self.prefixes[space]}:{local}"
+
+
+_PLAIN = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
+
+
+def _value(name: str, text: str) -> str:
+    return f' {name}="{escape_value(text)}"'
+
+
+def _ordered(node: Any) -> list[str]:
+    """The sync points a node gives, in chronological order."""
+    syncs: Mapping[str, SyncRef] = getattr(node, "syncs", {})
+    known = [p for p in node.sync_points if p in syncs] if syncs else []
+    return known + [p for p in syncs if p not in known]
