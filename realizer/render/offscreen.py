@@ -22,7 +22,7 @@ NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
 class Canvas:
     """A head on the graphics card (or its stand-in in software), drawn again and again.
 
-    Belongs to the thread that made it, as its GL context does. Light is worked out a vertex, in numpy, and
+    Belongs to the thread that made it, as its GL context does; one at a time in a process. Light is worked out a vertex, in numpy, and
     drawn flat: four times as fast as a lit shader on a software GL.
     """
 

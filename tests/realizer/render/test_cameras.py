@@ -1,0 +1,80 @@
+"""Cameras by where they put hairline and chin."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from realizer.errors import RenderError
+from realizer.render.cameras import PRESETS, camera_for, camera_names
+
+SIZES = [(512, 512), (640, 480), (300, 500)]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_front_puts_hairline_to_chin_in_the_middle_half_with_its_centre_at_47_percent(balls, size):
+    face, _ = balls
+    (x, hairline), (_, chin) = camera_for(face).project([face.points["11.1"], face.points["2.1"]], size)
+    assert (chin - hairline) / size[1] == pytest.approx(0.5)
+    assert (chin + hairline) / 2 / size[1] == pytest.approx(0.47)
+    assert x == pytest.approx(size[0] / 2)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_puts_hairline_and_chin_where_it_says(balls, name):
+    face, _ = balls
+    places = camera_for(face, name).project([face.points["11.1"], face.points["2.1"]], (400, 1000))[:, 1] / 1000
+    assert places == pytest.approx([PRESETS[name].hairline, PRESETS[name].chin])
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_whole_head_is_between_near_and_far(balls, name):
+    face, _ = balls
+    camera = camera_for(face, name)
+    depths = (camera.position - face.vertices) @ camera.towards
+    assert camera.near < depths.min()
+    assert depths.max() < camera.far
+
+
+def test_three_quarter_and_profile_show_the_right_cheek_turned_away_from_the_left(balls):
+    """The nose points to the picture's right: the camera stands at the character's right."""
+    face, _ = balls
+    for name in ("three-quarter", "profile"):
+        nose, back = camera_for(face, name).project([[0, 0, 0.02], [0, 0, -0.15]], (512, 512))[:, 0]
+        assert nose > back + 30
+
+
+def test_the_character_s_left_is_on_the_picture_s_right(balls):
+    face, _ = balls
+    left, right = camera_for(face).project([[0.03, 0, 0], [-0.03, 0, 0]], (512, 512))[:, 0]
+    assert left > right
+
+
+def test_a_face_may_bring_its_own_camera(balls):
+    face, _ = balls
+    face = replace(face, cameras={"hero": {"yaw": 20, "distance": 1.2}})
+    assert "hero" in camera_names(face)
+    assert camera_for(face, "hero").position[0] > 0.3
+
+
+def test_an_unknown_camera_lists_the_known_ones(balls):
+    with pytest.raises(RenderError, match=r"front, three-quarter, profile, close, got 'top'"):
+        camera_for(balls[0], "top")
+
+
+def test_the_page_s_camera_sees_the_same(balls):
+    """Rebuilt from the JSON the way a WebGL library does it."""
+    face, _ = balls
+    camera = camera_for(face, "three-quarter")
+    table = json.loads(json.dumps(camera.to_json()))
+    back = np.subtract(table["position"], table["target"])
+    back /= np.linalg.norm(back)
+    right = np.cross(table["up"], back)
+    right /= np.linalg.norm(right)
+    point = face.points["11.1"]
+    local = np.array([right, np.cross(back, right), back]) @ (point - table["position"])
+    scale = 256 / np.tan(np.radians(table["fovy"]) / 2)
+    seen = [256 + scale * local[0] / -local[2], 256 - scale * local[1] / -local[2]]
+    assert camera.project(point, (512, 512))[0] == pytest.approx(seen, abs=0.05)

@@ -1,0 +1,105 @@
+"""Light by its laws: brighter towards the key, nothing burnt, and a table a page can be handed."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from realizer.render.light import Shader, linear, preset, srgb, unit
+
+FRONT = np.array([0, 0, 1], np.float32)
+SKIN = (206, 158, 132)
+
+
+def shade(normal, colour=SKIN, occlusion=1.0, gloss=0.0):
+    shader = Shader(
+        preset(),
+        np.array([colour], np.uint8),
+        np.array([occlusion], np.float32),
+        np.array([gloss], np.float32),
+        FRONT,
+    )
+    return shader(unit(normal)[None])[0]
+
+
+def formula(normal, colour, occlusion, gloss):
+    """The docstring of `Light`, word for word."""
+    light = preset()
+    n, v = unit(normal).astype(float), FRONT.astype(float)
+
+    def lamp(lamp):
+        wrap = np.array(lamp.wrap)
+        return np.array(lamp.colour) * np.maximum(0, (n @ unit(lamp.direction) + wrap) / (1 + wrap))
+
+    edge = lamp(light.rim) * (1 - max(0, n @ v)) ** light.rim_power
+    half = (1 + n[1]) / 2
+    ambient = (np.array(light.ground) * (1 - half) + np.array(light.sky) * half) * occlusion
+    reach = 1 - light.shadow * (1 - occlusion)
+    power = light.dull * (light.sharp / light.dull) ** gloss
+    facing = max(0, n @ unit(unit(light.key.direction) + v))
+    shine = gloss * light.highlight * facing**power * np.array(light.key.colour)
+    albedo = linear(np.array(colour, np.uint8))
+    x = light.exposure * (albedo * ((lamp(light.key) + lamp(light.fill) + edge) * reach + ambient) + shine * reach)
+    knee = light.knee
+    return srgb(np.where(x < knee, x, 1 - (1 - knee) * np.exp(-(x - knee) / (1 - knee))))
+
+
+directions = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+
+
+@given(
+    normal=directions,
+    colour=st.tuples(*[st.integers(0, 255)] * 3),
+    occlusion=st.floats(0, 1),
+    gloss=st.sampled_from([0.0, 0.2, 0.7, 1.0]),
+)
+def test_one_matrix_product_is_the_published_formula(normal, colour, occlusion, gloss):
+    assert shade(normal, colour, occlusion, gloss) == pytest.approx(
+        formula(normal, colour, occlusion, gloss), abs=1.5 / 255
+    )
+
+
+def test_the_side_towards_the_key_is_brighter():
+    key = preset().key.direction
+    assert (shade(key) > shade((-key[0], key[1], key[2]))).all()
+
+
+def test_the_shaded_side_keeps_colour():
+    """Not a grey zombie: away from the key, skin is still warm and well above black."""
+    red, green, blue = shade((0.9, -0.2, 0.4))
+    assert red > green > blue
+    assert red > 0.3
+
+
+@pytest.mark.parametrize("colour", [(206, 158, 132), (240, 205, 185), (90, 58, 42)])
+def test_no_skin_is_burnt_out(colour):
+    around = [(x, y, 1.0) for x in np.linspace(-1, 1, 9) for y in np.linspace(-1, 1, 9)]
+    brightest = np.max([shade(n, colour) for n in around], axis=0)
+    assert brightest[0] < 0.985
+    assert brightest[2] < brightest[0] - 0.02
+
+
+def test_a_glossy_eye_has_a_highlight_and_dull_skin_has_none():
+    half = unit(unit(preset().key.direction) + FRONT)
+    aside = unit(half + np.array([0.5, 0, 0], np.float32))
+    assert shade(half, (40, 30, 25), gloss=1.0).min() > shade(aside, (40, 30, 25), gloss=1.0).max() + 0.4
+    assert shade(half, (40, 30, 25)).max() - shade(aside, (40, 30, 25)).min() < 0.2
+
+
+def test_a_hidden_corner_is_darker():
+    assert (shade(FRONT, occlusion=0.2) < shade(FRONT, occlusion=1.0) - 0.1).all()
+
+
+@given(st.integers(0, 255))
+def test_srgb_to_linear_and_back_is_the_same_byte(value):
+    assert round(float(srgb(linear(np.array([value], np.uint8)))[0] * 255)) == value
+
+
+def test_the_page_gets_every_coefficient_as_plain_numbers():
+    table = json.loads(json.dumps(preset().to_json()))
+    assert set(table) == set(preset().__dataclass_fields__)
+    for lamp in ("key", "fill", "rim"):
+        assert np.linalg.norm(table[lamp]["direction"]) == pytest.approx(1, abs=1e-5)
