@@ -1,4 +1,4 @@
-"""The eight steps without a clock: BML documents in, one Realization (schedule, frames, sound, feedback) out."""
+"""The eight steps without a clock: BML documents in, a Realization of frames, sound and feedback out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bml_schema import Block, BMLError, read
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Int16
+from realizer.arrays import Float32, Int16
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
 from realizer.errors import VoiceError
@@ -235,7 +235,7 @@ def warning_of(error: BMLError) -> Warning:
 
 
 def speak(says: Mapping[str, Say], voice: Voice | str | None = None) -> dict[str, Utterance]:
-    """Let a voice say everything a block wants; where it fails the silent voice takes over, said on stderr."""
+    """Let a voice say what a block wants; where it fails the silent voice takes over, said on stderr."""
     if not says:
         return {}
     from realizer.speech import SilentVoice, find_voice
@@ -251,9 +251,9 @@ def speak(says: Mapping[str, Say], voice: Voice | str | None = None) -> dict[str
     return utterances
 
 
-def resample(pcm: Int16, rate: int, wanted: int) -> np.ndarray[Any, np.dtype[np.float32]]:
+def resample(pcm: Int16, rate: int, wanted: int) -> Float32:
     """PCM at another rate, (n,) float32; linear, after a box filter where the rate falls."""
-    samples = pcm.astype(np.float32)
+    samples: Float32 = pcm.astype(np.float32)
     if rate == wanted:
         return samples
     if wanted < rate:

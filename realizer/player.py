@@ -5,22 +5,14 @@ Knows no clock and no I/O: every call is told `now`, in seconds on the session c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from bml_schema import Block, SyncRef
-from bml_schema.feedback import (
-    BlockProgress,
-    Feedback,
-    PredictedBehaviour,
-    PredictedBlock,
-    PredictionFeedback,
-    SyncPointProgress,
-    WarningFeedback,
-)
+from bml_schema import Block, Feedback, SyncRef, WarningFeedback
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
@@ -30,6 +22,7 @@ from realizer.arrays import Float64
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
 from realizer.planning import plan
+from realizer.reporting import Event, acknowledgement, events, prediction, progress
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Say, Utterance
 
@@ -90,18 +83,6 @@ class Character:
     direct: dict[str, Channel] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, order=True)
-class Event:
-    """One feedback and when it is due; the order of the fields is the order of report."""
-
-    time: float
-    block: int
-    phase: int  # 0 start, 1 sync point, 2 end
-    behaviour: int
-    point: int
-    feedback: Feedback = field(compare=False)
-
-
 class Player:
     """The blocks of one session and what they show.
 
@@ -153,13 +134,7 @@ class Player:
         """Acknowledge a block: planning has begun. `submit` does it where it was not done before."""
         if block.id not in self._announced:
             self._announced.add(block.id)
-            self._outbox.append(
-                PredictionFeedback(
-                    character_id=block.character_id,
-                    blocks=(PredictedBlock(id=block.id, global_start=self._start_of(block, now)),),
-                    behaviours=(),
-                )
-            )
+            self._outbox.append(acknowledgement(block, self._start_of(block, now)))
 
     def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
         """Plan a block and let it play as its composition says.
@@ -172,6 +147,7 @@ class Player:
         Returns:
             The schedule; `schedule.failed` when the whole block was refused.
         """
+        self._collect(now)
         self.announce(block, now)
         self._announced.discard(block.id)
         character = self._character(block.character_id)
@@ -195,7 +171,9 @@ class Player:
 
     def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
         """Report a document, block or behaviour that cannot be played."""
-        self._outbox.append(WarningFeedback(warning.id, warning.type, warning.text, character_id=character))
+        self._outbox.append(
+            WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character)
+        )
 
     def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
         """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
@@ -206,6 +184,7 @@ class Player:
         Returns:
             The ids of the blocks that were stopped.
         """
+        self._collect(now)
         wanted = None if block_ids is None else set(block_ids)
         stopped = [p for p in self._alive() if wanted is None or p.block.id in wanted]
         for playing in stopped:
@@ -215,7 +194,7 @@ class Player:
     def withdraw(self, block: Block, now: float) -> None:
         """Give up a block that was announced and will not be submitted; its end is reported."""
         self._announced.discard(block.id)
-        self._outbox.append(BlockProgress(f"{block.id}:end", now, character_id=block.character_id))
+        self._outbox.append(progress(block, "end", now, "REVOKED"))
 
     @property
     def alive(self) -> int:
@@ -256,15 +235,9 @@ class Player:
 
     def due(self, now: float) -> list[Feedback]:
         """Feedback whose time has come, in the order of report, each once."""
-        out, self._outbox = self._outbox, []
-        count = sum(1 for event in self._events if event.time <= now)
-        for event in self._events[:count]:
-            out.append(event.feedback)
-        del self._events[:count]
-        for playing in self._playing:
-            playing.started = playing.started or playing.schedule.start <= now
-            playing.done = playing.done or playing.ended <= now
+        self._collect(now)
         self._forget(now)
+        out, self._outbox = self._outbox, []
         return out
 
     def next_deadline(self) -> float | None:
@@ -335,6 +308,15 @@ class Player:
         return {"time": now, "blocks": blocks, "characters": faces}
 
     # inside -------------------------------------------------------------------------------------
+
+    def _collect(self, now: float) -> None:
+        """Move what is due to the outbox, so that nothing later can overtake it."""
+        count = bisect_right(self._events, now, key=lambda event: event.time)
+        self._outbox += [event.feedback for event in self._events[:count]]
+        del self._events[:count]
+        for playing in self._playing:
+            playing.started = playing.started or playing.schedule.start <= now
+            playing.done = playing.done or playing.ended <= now
 
     def _alive(self) -> list[Playing]:
         return [p for p in self._playing if not p.done]
@@ -412,35 +394,27 @@ class Player:
         )
         self._playing.append(playing)
         self._characters[character].shifts += shifts
-        self._outbox.append(_prediction(block, schedule))
+        self._outbox.append(prediction(block, schedule))
         for warning in schedule.warnings:
             self.refuse(warning, now, block.character_id)
-        self._events = sorted([*self._events, *_events(block, schedule, number)])
+        self._events = sorted([*self._events, *events(block, schedule, number)])
         self._changed(min(now, start))
 
     def _stop(self, playing: Playing, now: float) -> None:
         """Cut a block off at `now`: what plays fades, what waits never comes, its end is reported."""
         self._events = [e for e in self._events if e.block != playing.number]
-        progress = BlockProgress(f"{playing.block.id}:end", now, character_id=playing.block.character_id)
-        if not playing.started and playing.schedule.start <= now:
-            # Its start was due but not yet asked for.
-            begin = BlockProgress(
-                f"{playing.block.id}:start", playing.schedule.start, character_id=playing.block.character_id
-            )
-            self._outbox.append(begin)
-        self._outbox.append(progress)
+        status = "INTERRUPTED" if playing.started else "REVOKED"
+        self._outbox.append(progress(playing.block, "end", now, status))
         relax = HUSH if playing.speech else RELAX
         playing.channels = tuple(
             c.faded(now, now + (relax if c.layer is Layer.SPEECH else RELAX))
             for c in playing.channels
             if c.times[0] < now
         )
-        late = {id(s) for s in playing.shifts if s.begin >= now}
+        unbegun = {id(s) for s in playing.shifts if s.begin >= now}
         shifts = self._characters[playing.character].shifts
-        shifts[:] = [s for s in shifts if id(s) not in late]
-        playing.speech = tuple(
-            replace(s, until=min(s.until, now)) for s in playing.speech if s.start < now
-        )
+        shifts[:] = [s for s in shifts if id(s) not in unbegun]
+        playing.speech = tuple(replace(s, until=min(s.until, now)) for s in playing.speech if s.start < now)
         playing.ended, playing.done = now, True
         self._changed(now)
 
@@ -490,31 +464,3 @@ def _region(target: Target) -> str:
     if number.isdigit():
         return {5: "head", 6: "eyes"}.get(int(number) // 10, "face") if int(number) > 50 else "face"
     return target.name if target.name in ("eyes", "head") else "face"
-
-
-def _prediction(block: Block, schedule: Schedule) -> PredictionFeedback:
-    nodes = {node.id: node for node in block.behaviours}
-    return PredictionFeedback(
-        character_id=block.character_id,
-        blocks=(PredictedBlock(id=block.id, global_start=schedule.start, global_end=schedule.end),),
-        behaviours=tuple(
-            PredictedBehaviour(nodes[b], f"{block.id}:{b}", times) for b, times in schedule.behaviours.items()
-        ),
-    )
-
-
-def _events(block: Block, schedule: Schedule, number: int) -> Sequence[Event]:
-    """Every feedback of a block that goes as planned (BML 1.0): start, each sync point, end."""
-    who, start = block.character_id, schedule.start
-    events = [
-        Event(start, number, 0, 0, 0, BlockProgress(f"{block.id}:start", start, character_id=who)),
-        Event(schedule.end, number, 2, 0, 0, BlockProgress(f"{block.id}:end", schedule.end, character_id=who)),
-    ]
-    order = {node.id: index for index, node in enumerate(block.behaviours)}
-    for behaviour, times in schedule.behaviours.items():
-        for index, (point, time) in enumerate(times.items()):
-            progress = SyncPointProgress(
-                f"{block.id}:{behaviour}:{point}", time, start + time, character_id=who
-            )
-            events.append(Event(start + time, number, 1, order[behaviour], index, progress))
-    return events

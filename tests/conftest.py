@@ -15,4 +15,6 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--update-golden", action="store_true", help="write tests/golden anew, then review the diff")
+    parser.addoption(
+        "--update-golden", action="store_true", help="write tests/golden anew, then review the diff"
+    )

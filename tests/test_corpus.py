@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.pipeline import Realization, realize
 from realizer.speech import SilentVoice
@@ -53,7 +54,9 @@ def test_case(case: Path) -> None:
         if key in wanted:
             assert any(str(wanted[key]) in w.text for w in played.warnings), [w.text for w in played.warnings]
     if "line" in wanted:
-        assert any(f"line {wanted['line']}" in w.text for w in played.warnings), [w.text for w in played.warnings]
+        assert any(f"line {wanted['line']}" in w.text for w in played.warnings), [
+            w.text for w in played.warnings
+        ]
     schedule = played.schedules[0]
     for behaviour in wanted.get("dropped", ()):
         assert behaviour not in schedule.times

@@ -5,8 +5,9 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-import bml_schema
 import pytest
+
+import bml_schema
 import realizer
 
 # Extension points and doors that are public by their module's name, not from the package root.

@@ -7,8 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import bml_schema
 import pytest
+
+import bml_schema
 import realizer
 
 ROOTS = {"bml_schema": Path(bml_schema.__path__[0]), "realizer": Path(realizer.__path__[0])}
@@ -48,7 +49,8 @@ MAY: dict[str, set[str]] = {
         "realizer.speech.utterance",
         "realizer.tables",
     },
-    "realizer.planning": VALUES | {"bml_schema", "realizer.animation", "realizer.behaviours", "realizer.scheduling"},
+    "realizer.planning": VALUES
+    | {"bml_schema", "realizer.animation", "realizer.behaviours", "realizer.scheduling"},
     "realizer.player": VALUES
     | {
         "bml_schema",
@@ -136,7 +138,9 @@ def test_heavy_libraries_have_one_door(name: str, path: Path) -> None:
 
 def test_the_command_line_starts_without_the_heavy_libraries() -> None:
     code = "import sys, realizer, realizer.cli; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     heavy = {"scipy", "trimesh", "pyrender", "av", "clarabel", "websockets", "asyncio", "PIL"}
     assert not heavy & {name.split(".")[0] for name in loaded}
 
@@ -144,8 +148,10 @@ def test_the_command_line_starts_without_the_heavy_libraries() -> None:
 def test_a_document_is_scheduled_without_loading_what_draws() -> None:
     code = (
         "import sys, realizer\n"
-        "realizer.schedule('<bml id=\"b\"><head id=\"h\" lexeme=\"NOD\"/></bml>')\n"
+        'realizer.schedule(\'<bml id="b"><head id="h" lexeme="NOD"/></bml>\')\n'
         "print(*sys.modules)"
     )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert not {"scipy", "trimesh", "pyrender", "av", "PIL"} & {name.split(".")[0] for name in loaded}

@@ -14,7 +14,9 @@ FILM, FRAMES = Path("demo.mp4"), Path("demo.fap")
 
 @click.command()
 @click.option("--once", is_flag=True, help="End when the examples have been played.")
-@click.option("--port", default=8765, show_default=True, help="Of the page; a free one is taken if it is in use.")
+@click.option(
+    "--port", default=8765, show_default=True, help="Of the page; a free one is taken if it is in use."
+)
 @click.option("--voice", metavar="NAME", help="A voice of `realizer voices`.")
 @click.option("--face", default="default", show_default=True, help="A face of `realizer faces list`.")
 def demo(once: bool, port: int, voice: str | None, face: str) -> None:

@@ -67,5 +67,3 @@ def _page() -> Iterator[Finding]:
     there = files("realizer.server").joinpath("static", "index.html").is_file()
     fix = "the page is not built; install from a wheel, or have npm and run pip install -e ."
     yield there, "page", "served at http://HOST:PORT/" if there else fix
-
-

@@ -17,14 +17,18 @@ __all__: list[str] = []
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-documents = click.argument("documents", nargs=-1, required=True, metavar="DOC...", type=click.Path(allow_dash=True))
+documents = click.argument(
+    "documents", nargs=-1, required=True, metavar="DOC...", type=click.Path(allow_dash=True)
+)
 
 
 def playing(command: Command) -> Command:
     """--voice, --scene and --strict."""
     for option in (
         click.option("--strict", is_flag=True, help="Exit 1 if any behaviour was dropped."),
-        click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z."),
+        click.option(
+            "--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z."
+        ),
         click.option("--voice", metavar="NAME", help="A voice of `realizer voices`."),
     ):
         command = option(command)

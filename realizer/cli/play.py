@@ -16,9 +16,13 @@ __all__: list[str] = []
 
 @click.command()
 @options.documents
-@click.option("-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding. Default: JSON here.")
+@click.option(
+    "-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding. Default: JSON here."
+)
 @click.option("--fps", default=25.0, show_default=True, type=click.FloatRange(0, 240, min_open=True))
-@click.option("--at", type=click.FloatRange(0), metavar="SECONDS", help="With .png: the picture of that instant.")
+@click.option(
+    "--at", type=click.FloatRange(0), metavar="SECONDS", help="With .png: the picture of that instant."
+)
 @click.option("--face", default="default", show_default=True, help="A face of `realizer faces list`.")
 @click.option("--size", default="512x512", show_default=True, callback=options.size, help="Of pictures.")
 @click.option("--camera", default="front", show_default=True, help="front, three-quarter, profile or close.")

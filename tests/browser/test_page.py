@@ -1,4 +1,4 @@
-"""The page in a real browser, against the real service: the face lives, a document plays, nothing complains."""
+"""The page in a real browser, against the real service: the face lives and documents play."""
 
 from __future__ import annotations
 
@@ -83,7 +83,10 @@ def test_the_face_is_there_and_alive(page) -> None:  # type: ignore[no-untyped-d
             const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
             const pixels = new Uint8Array(w * h * 4);
             gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-            const at = (x, y) => [...pixels.slice(4 * (Math.floor(y * h) * w + Math.floor(x * w)), 4 * (Math.floor(y * h) * w + Math.floor(x * w)) + 3)];
+            const at = (x, y) => {
+                const first = 4 * (Math.floor(y * h) * w + Math.floor(x * w));
+                return [...pixels.slice(first, first + 3)];
+            };
             return { cheek: at(0.5, 0.47), corner: at(0.02, 0.98) };
         }"""
     )

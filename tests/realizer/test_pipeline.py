@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from bml_schema import BMLError
 from realizer import realize, schedule
 from realizer.examples import examples
@@ -78,7 +79,9 @@ def test_without_idle_an_empty_stretch_is_neutral() -> None:
 
 
 def test_long_documents_have_no_seam_between_windows() -> None:
-    document = '<bml id="b"><faceLexeme id="f" lexeme="SMILE" start="8" attackPeak="10" relax="12" end="14"/></bml>'
+    document = (
+        '<bml id="b"><faceLexeme id="f" lexeme="SMILE" start="8" attackPeak="10" relax="12" end="14"/></bml>'
+    )
     values = realize(document, idle=False).faps.values
     assert np.abs(np.diff(values, axis=0)).max() < 40
 
@@ -91,7 +94,9 @@ def test_schedule_of_a_document_that_is_no_block_is_an_error() -> None:
 def test_sound_is_mixed_where_it_belongs() -> None:
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False)
     tone = Utterance(0.5, (), (), {}, 8000, np.full(4000, 1000, np.int16))
-    object.__setattr__(played, "speaking", (Speaking(1.0, float("inf"), tone, 0), Speaking(1.2, 1.3, tone, 0)))
+    object.__setattr__(
+        played, "speaking", (Speaking(1.0, float("inf"), tone, 0), Speaking(1.2, 1.3, tone, 0))
+    )
     sound = played.sound(16000)
     assert len(sound) == 32000
     assert sound[:16000].max() == 0

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from bml_schema import Block, parse
 from bml_schema.feedback import (
     BlockProgress,
@@ -12,8 +15,6 @@ from bml_schema.feedback import (
     SyncPointProgress,
     WarningFeedback,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from realizer.player import Player
