@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.curves import sample, weights
+from realizer.animation.curves import sample, smooth, weights
 from realizer.animation.frames import AUFrames
 from realizer.animation.targets import AU_NAMES, PRESENCES, axis, region
 from realizer.arrays import Bool, Float64
@@ -38,7 +38,7 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     times = np.asarray(times, np.float64)
     alive = _alive(channels, times)
     sampled = sample(alive, times)
-    sums, _ = _columns()
+    sums = _sums()
     shape = (len(axis()), len(times))
     base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for channel, row in zip(alive, sampled, strict=True):
@@ -62,8 +62,9 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     # Base states and expressions: the stronger one shows; rotations add up.
     values = np.where(sums[:, None], base + over, np.maximum(base, over))
     _override(values, alive, sampled, times)
-    limited = _limited()
-    values[limited] = np.clip(values[limited], 0.0, 1.0)
+    # AUs come first on the axis, presences last; the FAPs between them have limits of their own.
+    for limited in (values[: len(AU_NAMES())], values[-len(PRESENCES) :]):
+        np.clip(limited, 0.0, 1.0, out=limited)
     return AUFrames(times, np.ascontiguousarray(values.T, np.float32))
 
 
@@ -79,8 +80,13 @@ def _override(values: Float64, channels: list[Channel], sampled: Float64, times:
     rows = [i for i, channel in enumerate(channels) if channel.layer is Layer.DIRECT]
     if not rows:
         return
-    sums, _ = _columns()
+    sums = _sums()
     there = weights([channels[i] for i in rows], times)
+    # What is set while nothing was held takes over as it rises, so that the face does not jump to 0 first.
+    for k, i in enumerate(rows):
+        if channels[i].values[0] == 0.0 and len(channels[i].times) > 1:
+            begin, reached = channels[i].times[:2]
+            there[k] *= smooth(np.clip((times - begin) / max(reached - begin, 1e-9), 0.0, 1.0))
     direct: dict[int, tuple[Float64, Float64]] = {}
     for i, weight in zip(rows, there, strict=True):
         column = channels[i].target.column
@@ -95,19 +101,12 @@ def _override(values: Float64, channels: list[Channel], sampled: Float64, times:
 
 
 @cache
-def _columns() -> tuple[Bool, int]:
-    """(n_targets,) True where channels add up; number of AU columns."""
-    n_aus = len(AU_NAMES())
+def _sums() -> Bool:
+    """(n_targets,) True where channels add up."""
     sums = np.ones(len(axis()), bool)
     known = tables.by_number(tables.action_units())
-    sums[:n_aus] = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
-    return sums, n_aus
-
-
-@cache
-def _limited() -> list[int]:
-    """Columns that stay within 0..1: the AUs and the presences."""
-    return [*range(len(AU_NAMES())), *(axis()[name].column for name in PRESENCES)]
+    sums[: len(AU_NAMES())] = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
+    return sums
 
 
 @cache

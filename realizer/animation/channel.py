@@ -31,7 +31,8 @@ class Channel:
 
     Attributes:
         target: the column it drives.
-        times: (k,) float64 seconds, rising; from block start when expanded, on the session clock in the player.
+        times: (k,) float64 seconds, rising; from block start when expanded, on the session clock in the
+            player.
         values: (k,) float64; AU and presence 0..1, FAP in its FAPU.
         curve: name in `animation.curves`: "smooth" (velocity zero at each key) or "linear".
         layer: where it is blended.

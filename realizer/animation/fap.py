@@ -79,7 +79,8 @@ class Demand:
         """The strongest positive and the strongest negative demand, each (68, n), of AUs (n_au, n)."""
         shape = (68, aus.shape[1])
         positive, negative = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-        live = np.flatnonzero(aus.any(axis=1)[self.column])
+        up = np.asarray(aus.any(axis=1), bool)
+        live = np.flatnonzero(up[self.column])
         if not len(live):
             return positive, negative
         hinges = self.slope[live, None] * np.maximum(aus[self.column[live]] - self.knot[live, None], 0)
@@ -98,7 +99,7 @@ class Demand:
 
 
 def _close_lids(positive: Float32, negative: Float32, closed: Float32) -> None:
-    """Take away what holds an eye open as far as its upper lid closes, in place: a blink of wide eyes shuts them."""
+    """Take away what holds an eye open as far as its upper lid closes, in place: wide eyes blink shut."""
     for upper, lower in LIDS:
         if closed[upper] > 0 and negative[[upper, lower]].any():
             open_ = 1 - np.minimum(positive[upper] / closed[upper], 1)

@@ -67,17 +67,21 @@ def idle_channels(start: float, end: float, seed: int) -> list[Channel]:
 
 def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> list[Channel]:
     """Signed degrees as two AUs; between keys they add up to the same smooth course."""
-    known = tables.by_number(tables.action_units())
     return [
         Channel(
             au(number)[0],
             times,
-            np.maximum(sign * degrees, 0.0) / known[number].degrees,
+            np.maximum(sign * degrees, 0.0) / _degrees(number),
             layer=Layer.IDLE,
             source="idle",
         )
         for number, sign in zip(sides, (-1.0, 1.0), strict=True)
     ]
+
+
+@lru_cache(maxsize=32)
+def _degrees(number: int) -> float:
+    return tables.by_number(tables.action_units())[number].degrees
 
 
 def _poses(

@@ -24,7 +24,7 @@ class Target:
 
 @cache
 def axis() -> dict[str, Target]:
-    """Name -> Target of every column: the AUs (one column a side where they have sides), 68 FAPs, presences."""
+    """Name -> Target of every column: AUs (one column a side where they have sides), 68 FAPs, presences."""
     names = [*_au_names(), *(row.name for row in tables.faps()), *PRESENCES]
     return {name: Target(name, column) for column, name in enumerate(names)}
 
@@ -38,7 +38,7 @@ def _au_names() -> tuple[str, ...]:
     return tuple(names)
 
 
-def AU_NAMES() -> tuple[str, ...]:  # noqa: N802
+def AU_NAMES() -> tuple[str, ...]:
     """Names of the AU columns, in order: the `au.names` of the JSON."""
     return _au_names()
 

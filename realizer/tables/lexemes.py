@@ -62,7 +62,11 @@ def head_lexemes() -> Mapping[str, HeadLexeme]:
     """
     return {
         name: HeadLexeme(
-            name, *(_pose(name, row, pose) for pose in ("ready", "stroke", "back")), decay=float(row["decay"])
+            name,
+            ready=_pose(name, row, "ready"),
+            stroke=_pose(name, row, "stroke"),
+            back=_pose(name, row, "back"),
+            decay=float(row["decay"]),
         )
         for name, row in _rows("head").items()
     }
@@ -93,7 +97,9 @@ def _aus(name: str, row: Mapping[str, Any]) -> dict[tuple[int, str], float]:
         if match is None or au is None or (match[2] and not au.sides):
             raise TableError(f"{FILE}, face.{name}: wanted an action unit such as 12 or 12L, got {cell!r}")
         if not 0 < amount <= 1:
-            raise TableError(f"{FILE}, face.{name}, {cell}: wanted an intensity above 0 and to 1, got {amount}")
+            raise TableError(
+                f"{FILE}, face.{name}, {cell}: wanted an intensity above 0 and to 1, got {amount}"
+            )
         aus[au.au, SIDES[match[2]]] = float(amount)
     return aus
 

@@ -82,6 +82,6 @@ def _gap(name: str, cell: Mapping[str, Any]) -> Gap:
     gap = Gap(**cell)
     if not (gap.preferred >= gap.least >= 0 and gap.stiffness > 0 and gap.source):
         raise TableError(
-            f"{FILE}, {name}, {gap.name}: wanted preferred >= least >= 0, stiffness > 0 and a source, got {cell}"
+            f"{FILE}, {name}, {gap.name}: wanted preferred >= least >= 0, stiffness > 0, a source; got {cell}"
         )
     return gap

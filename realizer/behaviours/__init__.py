@@ -1,0 +1,18 @@
+"""What behaviours there are: each module brings the kinds of a family; this is the only list of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from realizer.behaviours import bodily, face, gaze, head, speech, wait
+from realizer.behaviours.kind import Kind
+
+__all__ = ["KINDS", "MODULES", "VOCABULARY"]
+
+MODULES = (face, gaze, head, speech, wait, bodily)
+
+# Clark tag of an element -> what it brings; -> the class a parser makes of it.
+KINDS: Mapping[str, Kind] = MappingProxyType({kind.tag: kind for module in MODULES for kind in module.KINDS})
+VOCABULARY: Mapping[str, type[Any]] = MappingProxyType({tag: kind.node for tag, kind in KINDS.items()})

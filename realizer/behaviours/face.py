@@ -1,0 +1,149 @@
+"""faceLexeme, faceFacs, face, faceShift: words and action units -> AU channels that rise, hold and relax."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import TypeAlias
+
+import numpy as np
+
+from bml_schema import Face, FaceFacs, FaceLexeme, FaceShift
+from realizer import tables
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import Target, au
+from realizer.arrays import Float64
+from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.preferred import preferred
+from realizer.scheduling.timing import Timing
+from realizer.tables.lexemes import face_lexemes
+
+__all__ = ["KINDS"]
+
+Part: TypeAlias = FaceLexeme | FaceFacs
+Compound: TypeAlias = Face | FaceShift
+
+# s; after an overshoot the face settles this fast, or in half of the hold if that is shorter.
+SETTLE = 0.25
+
+
+def timing_of_lexeme(node: FaceLexeme, world: World) -> Timing:
+    return preferred("faceLexeme", node.lexeme)
+
+
+def timing_of_facs(node: FaceFacs, world: World) -> Timing:
+    return preferred("faceFacs")
+
+
+def timing_of_face(node: Face, world: World) -> Timing:
+    return preferred("face")
+
+
+def timing_of_shift(node: FaceShift, world: World) -> Timing:
+    return preferred("faceShift")
+
+
+def expand_part(node: Part, times: Float64, world: World) -> tuple[Channel, ...]:
+    """0 at start, (1 + overshoot) amount at attackPeak, settling to amount, held to relax, 0 at end."""
+    return _rise_and_fall({t: {node.overshoot: v} for t, v in _targets(node).items()}, times, node.id)
+
+
+def expand_face(node: Face, times: Float64, world: World) -> tuple[Channel, ...]:
+    """Its parts at one time; where several move one AU the stronger one shows."""
+    asked: dict[Target, dict[float, float]] = {}
+    for part in node.parts:
+        for target, value in _targets(part).items():
+            # (1 + o)(1 + p) - 1: the compound's overshoot is laid over its parts'.
+            overshoot = (1 + node.overshoot) * (1 + part.overshoot) - 1
+            curve = asked.setdefault(target, {})
+            curve[overshoot] = max(curve.get(overshoot, 0.0), value * node.amount)
+    return _rise_and_fall(asked, times, node.id)
+
+
+def expand_shift(node: FaceShift, times: Float64, world: World) -> tuple[Channel, ...]:
+    """From start to end the new base face rises, and stays."""
+    values: dict[Target, float] = {}
+    for part in node.parts:
+        for target, value in _targets(part).items():
+            values[target] = max(values.get(target, 0.0), value * node.amount)
+    return tuple(
+        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=node.id)
+        for target, value in values.items()
+    )
+
+
+def check_part(node: Part, world: World) -> tuple[Fault, ...]:
+    """An unknown lexeme or AU is fatal; a side of an AU that has none is not."""
+    return _faults((node,))
+
+
+def check_compound(node: Compound, world: World) -> tuple[Fault, ...]:
+    return _faults(node.parts)
+
+
+def _rise_and_fall(
+    asked: Mapping[Target, Mapping[float, float]], times: Float64, source: str
+) -> tuple[Channel, ...]:
+    """Channels of target -> {overshoot: value}; times (4,) of start, attackPeak, relax, end."""
+    start, peak, relax, end = times
+    settled = peak + min(SETTLE, (relax - peak) / 2)
+    channels = []
+    for target, curves in asked.items():
+        for overshoot, value in curves.items():
+            keys = [(start, 0.0), (peak, (1 + overshoot) * value), (relax, value), (end, 0.0)]
+            if overshoot and settled > peak:
+                keys.insert(2, (settled, value))
+            channels.append(Channel(target, *np.array(keys, np.float64).T, source=source))
+    return tuple(channels)
+
+
+def _targets(node: Part) -> dict[Target, float]:
+    """Column -> value at the sustained part."""
+    if isinstance(node, FaceFacs):
+        return dict.fromkeys(au(node.au, node.side), node.amount)
+    lexeme = face_lexemes()[node.lexeme.upper()]
+    values: dict[Target, float] = {}
+    for (number, side), intensity in lexeme.aus.items():
+        for target in au(number, side):
+            values[target] = max(values.get(target, 0.0), node.amount * intensity)
+    return values
+
+
+def _faults(parts: Iterable[Part]) -> tuple[Fault, ...]:
+    faults = []
+    known = tables.by_number(tables.action_units())
+    for part in parts:
+        if isinstance(part, FaceLexeme):
+            if part.lexeme.upper() not in face_lexemes():
+                faults.append(unknown_lexeme(part.lexeme, face_lexemes()))
+        elif part.au not in known:
+            near = sorted(sorted(known, key=lambda number: (abs(number - part.au), number))[:3])
+            said = ", ".join(f"{number} ({known[number].name})" for number in near)
+            faults.append(
+                Fault("CANNOT_CREATE_BEHAVIOR", f"au: wanted a FACS action unit, got {part.au}; near: {said}")
+            )
+        elif part.side != "BOTH" and not known[part.au].sides:
+            name = f"AU{part.au} ({known[part.au].name})"
+            faults.append(
+                Fault(
+                    "CUSTOM_ATTRIBUTE_NOT_SUPPORTED",
+                    f"side: wanted BOTH, as {name} has no sides, got {part.side}; shown on both",
+                    fatal=False,
+                )
+            )
+    return tuple(faults)
+
+
+def unknown_lexeme(lexeme: str, known: Iterable[str]) -> Fault:
+    """The fault that names the nearest lexemes there are."""
+    names = sorted(known)
+    near = difflib.get_close_matches(lexeme.upper(), names, n=3, cutoff=0.5) or names
+    return Fault("CANNOT_CREATE_BEHAVIOR", f"lexeme: wanted one of {', '.join(near)}, got {lexeme!r}")
+
+
+KINDS = (
+    Kind(FaceLexeme, timing_of_lexeme, expand_part, check_part),
+    Kind(FaceFacs, timing_of_facs, expand_part, check_part),
+    Kind(Face, timing_of_face, expand_face, check_compound),
+    Kind(FaceShift, timing_of_shift, expand_shift, check_compound, region="face"),
+)

@@ -1,0 +1,107 @@
+"""head, headDirectionShift: nods, shakes and tilts as strokes, and a direction the head keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+
+from bml_schema import Head, HeadDirectionShift
+from realizer import tables
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import au
+from realizer.arrays import Float64
+from realizer.behaviours.face import unknown_lexeme
+from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.preferred import from_gaps, preferred
+from realizer.behaviours.scene import angles, limits, target_faults, turn
+from realizer.scheduling.timing import Timing
+from realizer.tables.lexemes import head_lexemes
+from realizer.tables.timing import Gap, gaps
+
+__all__ = ["KINDS"]
+
+# The plain `stroke` of several is the last one: it stays beside its number however the rest is stretched.
+SAME = Gap("same", 0.0, 0.0, 1e4, "BML 1.0 gives the plain stroke of a repeated movement no meaning; ours")
+
+
+def timing(node: Head, world: World) -> Timing:
+    """start ready strokeStart stroke strokeEnd relax end; with repetition n > 1 instead of the stroke
+    stroke:1 .. stroke:n, and `stroke` with the last of them.
+    """
+    row = gaps("head", node.lexeme)
+    if node.repetition <= 1 or row.strokes is None:
+        return from_gaps(row.points, row.gaps)
+    at = row.points.index("stroke")
+    numbered = tuple(f"stroke:{i}" for i in range(1, node.repetition + 1))
+    between = (row.strokes,) * (node.repetition - 1)
+    return from_gaps(
+        (*row.points[:at], *numbered, *row.points[at:]),
+        (*row.gaps[:at], *between, SAME, *row.gaps[at:]),
+    )
+
+
+def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
+    """The lexeme's poses at its sync points; between two strokes, half way, the head is back."""
+    lexeme = head_lexemes()[node.lexeme.upper()]
+    start, ready, stroke_start, *strokes, stroke_end, relax, end = times
+    if len(strokes) > 1:
+        strokes = strokes[:-1]  # the last but one and the last are the same stroke
+    keys = [start, ready, stroke_start]
+    poses: list[tuple[Mapping[int, float], float]] = [({}, 1.0), (lexeme.ready, 1.0), (lexeme.ready, 1.0)]
+    for i, stroke in enumerate(strokes):
+        if i:
+            keys.append((strokes[i - 1] + stroke) / 2)
+            poses.append((lexeme.back, lexeme.decay ** (i - 1)))
+        keys.append(stroke)
+        poses.append((lexeme.stroke, lexeme.decay**i))
+    last = lexeme.decay ** (len(strokes) - 1)
+    keys += [stroke_end, relax, end]
+    poses += [(lexeme.back, last), (lexeme.back, last), ({}, 1.0)]
+    moved = {number for pose, _ in poses for number in pose}
+    return tuple(
+        Channel(
+            au(number)[0],
+            np.array(keys),
+            np.array([pose.get(number, 0.0) * size for pose, size in poses])
+            * (node.amount / degrees()[number]),
+            layer=Layer.HEAD,
+            source=node.id,
+        )
+        for number in sorted(moved)
+    )
+
+
+def check(node: Head, world: World) -> tuple[Fault, ...]:
+    known = head_lexemes()
+    return () if node.lexeme.upper() in known else (unknown_lexeme(node.lexeme, known),)
+
+
+def timing_of_shift(node: HeadDirectionShift, world: World) -> Timing:
+    return preferred("headDirectionShift")
+
+
+def expand_shift(node: HeadDirectionShift, times: Float64, world: World) -> tuple[Channel, ...]:
+    """From start to end the head turns to the target, as far as a head turns, and stays."""
+    yaw, pitch, _ = angles(node.target, world)
+    most = limits("head")
+    aim = np.clip((yaw, pitch), -most, most)
+    keys = np.array([[0.0, 0.0], aim])
+    return turn("head", times, keys, layer=Layer.BASE, holds=True, source=node.id)
+
+
+def check_shift(node: HeadDirectionShift, world: World) -> tuple[Fault, ...]:
+    return target_faults(node.target, world)
+
+
+@cache
+def degrees() -> Mapping[int, float]:
+    """AU -> its rotation at intensity 1, degrees."""
+    return {row.au: row.degrees for row in tables.action_units()}
+
+
+KINDS = (
+    Kind(Head, timing, expand, check),
+    Kind(HeadDirectionShift, timing_of_shift, expand_shift, check_shift, region="head"),
+)

@@ -1,0 +1,26 @@
+"""timing.toml -> the Timing of a behaviour whose wishes are all in the table."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.scheduling.timing import Timing
+from realizer.tables.timing import Gap, gaps
+
+__all__: list[str] = []
+
+
+def preferred(element: str, variant: str = "") -> Timing:
+    """What `element` wants of time; `variant` is a lexeme or an influence that may want other times."""
+    row = gaps(element, variant)
+    return from_gaps(row.points, row.gaps)
+
+
+def from_gaps(points: tuple[str, ...], gaps: tuple[Gap, ...]) -> Timing:
+    """k points and the k-1 gaps between them."""
+    return Timing(
+        points,
+        np.array([gap.preferred for gap in gaps]),
+        np.array([gap.least for gap in gaps]),
+        np.array([gap.stiffness for gap in gaps]),
+    )

@@ -1,0 +1,126 @@
+"""speech: its text or SSML -> what a voice has to say, the times it took, and the lips."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, replace
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+
+from bml_schema import Speech, Sync
+from realizer.animation.channel import Channel
+from realizer.arrays import Float64
+from realizer.behaviours.kind import Fault, Kind, World
+from realizer.scheduling.timing import Timing
+from realizer.speech.utterance import Say
+
+__all__ = ["KINDS"]
+
+SSML = "application/ssml+xml"
+LANG = "{http://www.w3.org/XML/1998/namespace}lang"
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """What is really said: inner SSML, its marks in order, its language if it says so."""
+
+    ssml: str
+    marks: tuple[str, ...]
+    language: str | None = None
+
+
+def say(node: Speech, world: World) -> Say | None:
+    """The description of highest priority that is SSML, or else the text with its syncs as marks."""
+    spoken = _spoken(node)
+    if spoken is None:
+        return None
+    return Say(spoken.ssml, spoken.marks, language=spoken.language or world.language)
+
+
+def timing(node: Speech, world: World) -> Timing:
+    """Rigid: start, the sync points in the order of their times, end.
+
+    Raises:
+        KeyError: the voice has not spoken: no `world.utterances[node.id]`.
+    """
+    utterance = world.utterances[node.id]
+    spoken = _spoken(node) or Spoken("", ())
+    heard = {
+        name: min(max(time, 0.0), utterance.duration)
+        for name, time in utterance.marks.items()
+        if name not in Speech.sync_points
+    }
+    # A sync that the SSML or the voice left out comes as far into the sound as into the text.
+    guessed = {name: part * utterance.duration for name, part in _places(node).items()}
+    times = guessed | heard
+    order = {name: i for i, name in enumerate((*spoken.marks, *guessed))}
+    names = sorted(times, key=lambda name: (times[name], order.get(name, len(order))))
+    points = ("start", *names, "end")
+    gaps = np.diff([0.0, *(times[name] for name in names), utterance.duration])
+    return Timing(points, gaps, gaps, np.ones(len(gaps)), rigid=True)
+
+
+def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
+    """Lips, jaw and tongue, from the phonemes."""
+    # Imported here: it reads its tables, which a block without speech does not need.
+    from realizer.animation.lips import lip_channels
+
+    channels = lip_channels(world.utterances[node.id].phonemes, float(times[0]))
+    return tuple(replace(channel, source=node.id) for channel in channels)
+
+
+def check(node: Speech, world: World) -> tuple[Fault, ...]:
+    """Nothing to say is fatal."""
+    if _spoken(node) is not None:
+        return ()
+    return (
+        Fault("CANNOT_CREATE_BEHAVIOR", f"speech: wanted <text> or a description of type {SSML}, got none"),
+    )
+
+
+def _spoken(node: Speech) -> Spoken | None:
+    for description in sorted(node.descriptions, key=lambda d: -d.priority):
+        if description.type == SSML and (spoken := _inside(description.content)) is not None:
+            return spoken
+    if node.text is None:
+        return None
+    parts = [
+        f"<mark name={quoteattr(part.id)}/>" if isinstance(part, Sync) else escape(part)
+        for part in node.text.parts
+    ]
+    return Spoken("".join(parts), tuple(part.id for part in node.text.parts if isinstance(part, Sync)))
+
+
+def _inside(content: str) -> Spoken | None:
+    """What stands inside <speak>, without namespaces; None for what is not one whole element.
+
+    The content comes from the parser, which lets no DTD and no entities through.
+    """
+    try:
+        speak = ElementTree.fromstring(content)
+    except ElementTree.ParseError:
+        return None
+    for element in speak.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    marks = tuple(mark.get("name", "") for mark in speak.iter("mark") if mark.get("name"))
+    inner = escape(speak.text or "") + "".join(
+        ElementTree.tostring(child, encoding="unicode") for child in speak
+    )
+    return Spoken(inner, marks, speak.get(LANG))
+
+
+def _places(node: Speech) -> dict[str, float]:
+    """Sync of the core text -> how far into the text it stands, 0..1."""
+    if node.text is None:
+        return {}
+    length, places = 0, {}
+    for part in node.text.parts:
+        if isinstance(part, Sync):
+            places[part.id] = length
+        else:
+            length += len(part)
+    return {name: place / length if length else 0.0 for name, place in places.items()}
+
+
+KINDS = (Kind(Speech, timing, expand, check, say),)

@@ -1,0 +1,34 @@
+"""wait: nothing for some seconds, so that others can refer to its end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bml_schema import Wait
+from realizer.animation.channel import Channel
+from realizer.arrays import Float64
+from realizer.behaviours.kind import Kind, World
+from realizer.behaviours.preferred import preferred
+from realizer.scheduling.timing import Timing
+
+__all__ = ["KINDS"]
+
+# 1/s^2. A duration that was written down bends less than any gap of the table with which it is tied.
+STATED = 1000.0
+
+
+def timing(node: Wait, world: World) -> Timing:
+    """As long as `duration` says; without one, as long as its references say."""
+    wanted = preferred("wait")
+    if not node.duration:
+        return wanted
+    return replace(wanted, preferred=np.array([node.duration]), stiffness=np.array([STATED]))
+
+
+def expand(node: Wait, times: Float64, world: World) -> tuple[Channel, ...]:
+    return ()
+
+
+KINDS = (Kind(Wait, timing, expand),)
