@@ -21,6 +21,7 @@ from realizer.face.basis import pack
 from realizer.face.features import Point, write_features
 from realizer.face.fields import Ground, face_fields
 from realizer.face.lids import Lid
+from realizer.face.lips import close_lips
 from realizer.face.parts import Part, smooth
 from realizer.face.patch import Patch, vertex_normals
 from realizer.tables import read_csv
@@ -66,6 +67,7 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
             cache[unit] = hm08.read_target(data, unit, len(at)) * hm08.DECIMETRE
         return cache[unit]
 
+    at = close_lips(Ground(mesh, at, points, shape))
     ground = Ground(mesh, at, points, shape)
     jaw_pivot = _joint(mesh, at, "joint-mouth") + np.array([0, 0.002, 0.006])
     fields, lips = face_fields(ground, jaw_pivot)
@@ -172,7 +174,7 @@ def _parts(
         Part("tongue", tongue, place, tongue.triangles, np.repeat(np.array([look["tongue"]], float), len(place), 0),
              np.full(len(place), 0.6), 0.62 * smooth(deep, 0.8, 0.0) + 0.08)
     )  # fmt: skip
-    made.append(head.hair(skin, at, look["hair"]))
+    made.append(head.hair(skin, at, look["hair"], look["skin"]))
     made.append(head.bun(np.array(recipe["bun"]["centre"]), np.array(recipe["bun"]["radii"]), look["hair"]))
     made.append(head.shirt(body, at, look["shirt"]))
     return sorted(made, key=lambda part: ORDER.index(part.name))

@@ -12,9 +12,11 @@ __all__: list[str] = []
 
 # Where the hair begins, as (degrees from the front, metres above the eyes); ours, drawn on the base mesh.
 HAIRLINE = (
-    (0, 0.066), (18, 0.0665), (32, 0.062), (46, 0.050), (58, 0.036), (66, 0.018), (72, 0.000), (77, -0.004),
-    (82, 0.012), (88, 0.042), (104, 0.044), (116, 0.034), (123, 0.004), (130, -0.030), (142, -0.056), (180, -0.066),
+    (0, 0.065), (18, 0.0655), (32, 0.062), (46, 0.051), (57, 0.038), (64, 0.020), (69, 0.004), (74, -0.006),
+    (80, -0.010), (95, -0.014), (110, -0.018), (124, -0.030), (136, -0.050), (150, -0.060), (180, -0.068),
 )  # fmt: skip
+# The hair leaves the ear free: an ellipse in the side view, (y, z) of its middle and its half axes, metres.
+EAR = ((0.001, -0.082), (0.0475, 0.0335))
 AXIS = -0.062  # z of the upright axis that the degrees are counted about
 
 
@@ -24,30 +26,35 @@ def above_hairline(at: Float64) -> Float64:
     x, y = np.array(HAIRLINE, float).T
     line = np.interp(degrees, x, y)
     steep = np.abs(np.interp(degrees + 2, x, y) - np.interp(degrees - 2, x, y)) / (4 * np.pi / 180 * 0.08)
-    return np.asarray((at[:, 1] - line) / np.sqrt(1 + steep**2))
+    height = (at[:, 1] - line) / np.sqrt(1 + steep**2)
+    (y0, z0), (tall, wide) = EAR
+    # The ear leans back: its ellipse does too.
+    lean = at[:, 1] - y0
+    around = np.hypot(lean / tall, (at[:, 2] - z0 + 0.22 * lean) / wide)
+    off_ear = np.where(np.abs(at[:, 0]) > 0.03, (around - 1) * wide, np.inf)
+    return np.asarray(np.minimum(height, off_ear))
 
 
-def hair(skin: Patch, base: Float64, colour: list[float]) -> Part:
+def hair(skin: Patch, base: Float64, colour: list[float], skin_colour: list[float]) -> Part:
     """Hair combed back into a bun: the scalp cut at the hairline and lifted, and a ball of hair behind."""
     at = skin.positions(base)
-    # The ears' folds lie above the line too: leave out what stands away from the skull.
-    ear = (np.abs(at[:, 0]) > 0.0655) & (at[:, 1] < 0.043) & (at[:, 2] > -0.118) & (at[:, 2] < -0.05)
-    near = (above_hairline(at) > -0.02) & ~ear
+    near = above_hairline(at) > -0.02
     piece = skin.kept(near[skin.triangles].all(axis=1)).subdivided()[0]
     piece = piece.clipped(above_hairline(piece.positions(base)))[0]
     at = piece.positions(base)
     high = above_hairline(at)
     ups = vertex_normals(at, piece.triangles)
     crown = smooth(at[:, 1], 0.02, 0.10)
-    thick = -0.0012 + 0.0048 * smooth(high, 0, 0.010) + (0.004 + 0.007 * crown) * smooth(high, 0.004, 0.05)
+    thick = -0.0012 + 0.0048 * smooth(high, 0, 0.010) + (0.005 + 0.012 * crown) * smooth(high, 0.004, 0.05)
     # Locks: the surface waves along the way the hair is combed.
     comb = np.arctan2(at[:, 0], at[:, 1] + 0.01)
     thick += 0.0007 * np.sin(comb * 34) * smooth(high, 0.006, 0.02)
     piece = piece.moved(ups * thick[:, None])
     tint = np.array(colour, float) * (1 + 0.20 * np.sin(comb * 34 + 1.2) + 0.12 * np.sin(comb * 77))[:, None]
-    tint *= (0.72 + 0.28 * smooth(high, 0.0, 0.02))[:, None]
-    part = Part("hair", piece, piece.positions(base), piece.triangles, tint, np.full(len(piece), 0.30))
-    return part
+    # At the line the hair is thin and the skin shows through.
+    thin = 0.45 * (1 - smooth(high, 0.0, 0.006))[:, None]
+    tint = tint * (1 - thin) + np.array(skin_colour, float) * 0.8 * thin
+    return Part("hair", piece, piece.positions(base), piece.triangles, tint, np.full(len(piece), 0.10))
 
 
 def bun(centre: Float64, radii: Float64, colour: list[float]) -> Part:
@@ -61,7 +68,7 @@ def bun(centre: Float64, radii: Float64, colour: list[float]) -> Part:
     wound = np.sin(np.arctan2(ball[:, 1], ball[:, 0]) * 3 + ball[:, 2] * 7)
     vertices = centre + ball * radii * (1 + 0.035 * wound)[:, None]
     tint = np.array(colour, float) * (1 + 0.22 * wound)[:, None]
-    return Part("hair", None, vertices, grid(rows, columns, True), tint, np.full(len(ball), 0.3))
+    return Part("hair", None, vertices, grid(rows, columns, True), tint, np.full(len(ball), 0.10))
 
 
 COLLAR = -0.182  # m; height of the collar above the plane that tilts with the neck

@@ -28,6 +28,7 @@ MEET, BORDER = 1, 7
 LOWER_MIDDLE = 19  # place in a ring of 38 of the middle of the lower lip
 TENSION = 0.35
 KNOTS = 5  # right corner, right half, middle, left half, left corner
+APART = 0.00005  # m that is left between closed lips
 ARC = 0.30  # metres forwards for each metre that the lower lip rises: it moves on the jaw's arc
 
 
@@ -56,6 +57,7 @@ class Lips:
     Attributes:
         u, w: (n,) coordinates; inherited from the nearest place of the lips outside and inside them.
         is_upper: (n,) bool.
+        inside: (n,) bool, in the mouth.
         away: (n,) metres from the red's border, 0 on the lips and in the mouth.
         lips: (n,) 1 on the lips and just inside, falling to 0 within a centimetre: what other FAPs leave alone.
         upper, corners: (n,) the upper lip's and the corners' part of that.
@@ -89,6 +91,7 @@ class Lips:
         self._around(ground, on_ring, inside)
         ringed = (on_ring >= 0) & (on_ring <= BORDER)
         self.away[ringed | inside] = 0
+        self.inside = inside
         near = ground.body & (at[:, 2] > -0.03)
         self.lips = np.where(ringed, 1.0, np.where(near, smooth(self.away, 0.010, 0.001), 0.0))
         self.lips[inside] = self.fade[inside]
@@ -101,11 +104,11 @@ class Lips:
     def _into_the_mouth(self, ground: Ground, on_ring: Any) -> Bool:
         """Spread the inner ring's coordinates into the mouth, ring by ring, fading out."""
         n = len(ground.at)
-        inside = np.zeros(n, bool)
+        inside: Bool = np.zeros(n, bool)
         known = on_ring >= 0
         front = np.flatnonzero(on_ring == 0)
         near = ground.average
-        for step in range(12):
+        for step in range(60):
             found: dict[int, list[int]] = {}
             for vertex in front:
                 for other in near.indices[near.indptr[vertex] : near.indptr[vertex + 1]]:
@@ -115,6 +118,7 @@ class Lips:
                 self.u[other] = np.mean(self.u[parents])
                 self.is_upper[other] = bool(np.mean(self.is_upper[parents]) > 0.5)
                 self.fade[other] = max(0.0, 1 - 0.12 * (step + 1))
+                self.w[other] = 0
                 inside[other] = True
             front = np.array(list(found), int)
             known[front] = True
@@ -137,6 +141,23 @@ class Lips:
         self.away, nearest = cKDTree(line).query(at)
         other = ground.body & ~inside & ((on_ring < 0) | (on_ring > BORDER))
         self.u[other], self.is_upper[other], self.w[other] = u[nearest[other]], upper[nearest[other]], 1
+
+
+def close_lips(ground: Ground) -> Float64:
+    """The base mesh with its lips closed, (n, 3): where they stand apart at rest, each goes half the way."""
+    lips = Lips(ground)
+    at = ground.at.copy()
+    for k, share in ((0, 1.0), (1, 1.0), (2, 0.55), (3, 0.25), (4, 0.10)):
+        meet = lips.rings[min(k, MEET)]
+        upper = sorted((i for i in meet if lips.is_upper[i]), key=lambda i: float(ground.at[i, 0]))
+        lower = sorted((i for i in meet if not lips.is_upper[i]), key=lambda i: float(ground.at[i, 0]))
+        for i in lips.rings[k]:
+            x = ground.at[i, 0]
+            high, low = (np.interp(x, ground.at[row, 0], ground.at[row, 1]) for row in (upper, lower))
+            apart = high - low - APART
+            if apart > 0:
+                at[i, 1] += share * apart / 2 * (-1 if lips.is_upper[i] else 1)
+    return at
 
 
 def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:

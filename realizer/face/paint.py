@@ -70,11 +70,9 @@ def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: d
     gloss += amount * 0.30
     for k, dark in ((0, 0.55), (1, 0.70), (2, 0.90)):
         out[lips.rings[k]] *= dark
-    deep = (lips.fade > 0) & (lips.fade < 1)
-    out[deep] = mouth * np.clip(lips.fade[deep], 0.15, 1)[:, None]
-    gloss[deep] = 0.3
-    inside = ground.body & (lips.fade == 0) & (np.abs(at[:, 0]) < 0.035) & _mouth_box(ground)
-    out[inside] = mouth * 0.15
+    inside = lips.inside
+    out[inside] = mouth * np.clip(lips.fade[inside], 0.12, 1)[:, None]
+    gloss[inside] = 0.3
     for ring in rings:
         # The wet edge of the lids is pink, the upper one darkened by the lashes' roots.
         top = at[ring[0]][:, 1] > np.median(at[ring[0]][:, 1])
@@ -85,16 +83,6 @@ def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: d
     nose = ground.ellipsoid(ground.point("9.3"), (0.014, 0.016, 0.02))
     gloss += 0.16 * nose
     return np.clip(out, 0, 255), np.clip(gloss, 0, 1)
-
-
-def _mouth_box(ground: Ground) -> Any:
-    low, high = ground.point("2.3")[1] - 0.035, ground.point("2.2")[1] + 0.042
-    deep = ground.point("2.2")[2] - 0.004
-    at = ground.at
-    # Inside the head: behind the lips, in front of the throat, and not the skin of cheeks or chin.
-    return (at[:, 1] > low) & (at[:, 1] < high) & (at[:, 2] < deep) & (at[:, 2] > -0.065) & (
-        ground.shape("tongueOut")[:, 2] == 0
-    ) & (np.abs(at[:, 0]) < 0.03)
 
 
 DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth cell; metres a ray starts off

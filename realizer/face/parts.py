@@ -186,7 +186,7 @@ def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, c
         across = at[:, 0] * side
         t = (across - x[0]) / (x[-1] - x[0])
         middle = np.interp(across, x, _spline(x, y)(x)) if len(x) < 3 else _spline(x, y)(np.clip(across, x[0], x[-1]))
-        half = 0.0041 * smooth(t, -0.05, 0.16) * (1 - 0.82 * smooth(t, 0.42, 1.02))
+        half = 0.0036 * np.sqrt(smooth(t, -0.02, 0.30)) * (1 - 0.80 * smooth(t, 0.40, 1.02))
         outside = np.maximum(np.maximum(-t, t - 1), 0) * 0.05
         return half - np.abs(at[:, 1] - middle) - outside
 
