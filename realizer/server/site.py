@@ -8,7 +8,7 @@ import mimetypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
-from urllib.parse import unquote
+from urllib.parse import parse_qs, unquote
 
 from realizer.errors import FaceError, RealizerError
 
@@ -21,7 +21,10 @@ Build it where npm is on the PATH: pip install -e . in the checkout, or install 
 The WebSocket at /ws works without it.
 """
 # The page loads nothing from elsewhere, and may talk to WebSockets only where it came from.
-POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:"
+POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "connect-src 'self' ws: wss:"
+)
 
 
 @dataclass(frozen=True)
@@ -47,13 +50,14 @@ class Site:
 
     def answer(self, target: str) -> Answer:
         """The answer to `GET target`. May block: reading a face takes a moment the first time."""
-        path = unquote(target.partition("?")[0])
+        path, _, query = target.partition("?")
+        path = unquote(path)
         if path == "/healthz":
             return Answer(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
         if path == "/examples.json":
             return Answer(200, JSON, _examples())
         if path == "/look.json":
-            return Answer(200, JSON, _look())
+            return self._look(parse_qs(query).get("face", ["default"])[0])
         if path.startswith("/faces/"):
             return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
         return self._file("index.html" if path == "/" else path[1:])
@@ -65,6 +69,12 @@ class Site:
             return Answer(404, TEXT, f"{error}\n".encode())
         except RealizerError as error:
             return Answer(500, TEXT, f"{error}\n".encode())
+
+    def _look(self, name: str) -> Answer:
+        try:
+            return Answer(200, JSON, _look(name))
+        except FaceError as error:
+            return Answer(404, TEXT, f"{error}\n".encode())
 
     def _file(self, name: str) -> Answer:
         """A file of the bundle; only names in its one folder, so nothing else can be asked for."""
@@ -91,11 +101,15 @@ def _examples() -> bytes:
     return json.dumps(rows, ensure_ascii=False).encode()
 
 
-@functools.cache
-def _look() -> bytes:
+@functools.lru_cache(8)
+def _look(name: str) -> bytes:
+    """How stills are lit and framed, for whoever draws the mesh stream."""
+    from realizer.face import load_face
+    from realizer.render.cameras import camera_for
     from realizer.render.light import preset
 
-    return json.dumps(preset().to_json()).encode()
+    camera = camera_for(load_face(name))
+    return json.dumps({"light": preset().to_json(), "camera": camera.to_json()}).encode()
 
 
 @functools.lru_cache(8)

@@ -118,7 +118,7 @@ def test_a_broken_document_is_told_and_the_page_lives_on(page) -> None:  # type:
 def test_the_examples_are_at_hand(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_selector("#gallery button")
     names = page.locator("#gallery button").all_text_contents()
-    assert "greeting" in names
+    assert "Greeting" in names
     page.click("#gallery button:nth-child(2)")
     assert "really" in page.input_value("#document")
 

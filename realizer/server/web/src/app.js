@@ -116,12 +116,12 @@ $("sound").addEventListener("click", async () => {
 
 async function gallery() {
   const examples = await (await fetch("/examples.json")).json();
-  const buttons = Object.entries(examples).map(([name, text]) => {
+  const buttons = examples.map(({ title, bml }) => {
     const button = document.createElement("button");
     button.type = "button";
-    button.textContent = name.replaceAll("-", " ");
+    button.textContent = title;
     button.addEventListener("click", () => {
-      $("document").value = text;
+      $("document").value = bml;
       for (const other of buttons) other.setAttribute("aria-pressed", other === button);
     });
     return button;

@@ -1,0 +1,153 @@
+// The page: wires the face, the sound, the editor and the feedback log to one WebSocket.
+import { Clock } from "./clock.js";
+import { Link } from "./link.js";
+import { Log } from "./log.js";
+import { Score } from "./score.js";
+import { Sound } from "./sound.js";
+import { Stage } from "./stage.js";
+
+const MESH_RATE = 30; // frames a second; the page draws between them
+const at = (id) => document.getElementById(id);
+
+const stage = new Stage(at("face"));
+const clock = new Clock();
+const sound = new Sound(clock);
+const log = new Log(at("log"));
+const score = new Score(at("score"));
+const name = new URLSearchParams(location.search).get("session") ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
+const link = new Link(name);
+
+let characters = new Map(); // index on the wire -> true; the page shows the first
+let face = null;
+
+link.onopen = () => {
+  clock.reset();
+  sound.reset();
+  stage.reset();
+  status("open", "Connected");
+  link.ask({ type: "hello" });
+  subscribe();
+};
+link.onlost = () => status("lost", "Reconnecting");
+link.onfeedback = (element, seq) => {
+  log.feedback(element, seq);
+  score.feedback(element);
+};
+link.onreply = (message) => {
+  if (message.type === "subscribed" && message.stream === "mesh") showFace(message);
+  if (message.type === "subscribed" && message.stream === "audio") sound.rate = message.rate;
+  if (message.type === "error") {
+    log.error(message);
+    if (message.where?.startsWith("subscribe") || message.code === "face") at("stage-note").textContent = message.message;
+  }
+};
+link.onframe = (frame) => {
+  if (frame.kind === 5) {
+    clock.heard(frame.time, performance.now() / 1000);
+    stage.add(frame.time, frame.values());
+  } else if (frame.kind === 4) {
+    sound.packet(frame.time, frame.values(), frame.forget);
+  }
+};
+
+function subscribe() {
+  if (document.hidden) return;
+  link.ask({ type: "subscribe", stream: "mesh", fps: MESH_RATE });
+  link.ask({ type: "subscribe", stream: "audio", rate: sound.rate });
+}
+
+async function showFace(message) {
+  const key = `${message.face}/${message.vertices}`;
+  if (face === key) return;
+  face = key;
+  try {
+    await stage.load(`faces/${encodeURIComponent(message.face)}`, message.scale, message.offset);
+    at("stage-note").textContent = "";
+  } catch (error) {
+    face = null;
+    at("stage-note").textContent = `The face could not be shown: ${error.message}`;
+  }
+}
+
+function status(state, text) {
+  at("status").dataset.state = state;
+  at("status-text").textContent = text;
+  for (const id of ["play", "replace", "stop"]) at(id).disabled = state !== "open";
+}
+
+function play(replace) {
+  sound.start();
+  showSound();
+  const text = at("editor").value;
+  link.send(replace ? replacing(text) : text);
+}
+
+// The same document with composition="REPLACE" on its first <bml>.
+function replacing(text) {
+  return text.replace(/<((?:\w+:)?bml)\b([^>]*)>/, (_, tag, attributes) => {
+    const others = attributes.replace(/\scomposition\s*=\s*("[^"]*"|'[^']*')/, "");
+    return `<${tag} composition="REPLACE"${others}>`;
+  });
+}
+
+function showSound() {
+  at("sound").setAttribute("aria-pressed", String(sound.on));
+  at("sound").textContent = sound.on ? "Sound on" : "Sound off";
+}
+
+at("play").onclick = () => play(false);
+at("replace").onclick = () => play(true);
+at("stop").onclick = () => link.ask({ type: "stop" });
+at("clear").onclick = () => log.clear();
+at("points").onchange = (event) => at("log").classList.toggle("no-points", !event.target.checked);
+at("sound").onclick = () => {
+  sound.on ? sound.mute() : sound.start();
+  showSound();
+};
+addEventListener("keydown", (event) => {
+  if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) {
+    event.preventDefault();
+    if (!at("play").disabled) play(event.shiftKey);
+  }
+});
+document.addEventListener("visibilitychange", () => {
+  if (!link.open) return;
+  if (document.hidden) link.ask({ type: "unsubscribe", stream: "mesh" });
+  else {
+    stage.reset();
+    link.ask({ type: "subscribe", stream: "mesh", fps: MESH_RATE });
+  }
+});
+
+function draw() {
+  const playhead = sound.playhead() ?? clock.playhead(performance.now() / 1000);
+  stage.draw(playhead);
+  score.draw(playhead);
+  requestAnimationFrame(draw);
+}
+
+async function examples() {
+  const rows = await (await fetch("examples.json")).json();
+  const buttons = rows.map((row) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = row.title;
+    button.onclick = () => {
+      at("editor").value = row.bml;
+      at("editor").scrollTop = 0;
+      for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
+    };
+    return button;
+  });
+  at("examples").append(...buttons);
+  if (!at("editor").value) buttons[0]?.click();
+}
+
+status("connecting", "Connecting");
+examples().catch((error) => log.error({ message: `examples: ${error.message}` }));
+fetch("look.json")
+  .then((answer) => (answer.ok ? answer.json() : null))
+  .then((look) => look && stage.light(look))
+  .catch(() => undefined); // the stage keeps its own light
+link.connect();
+requestAnimationFrame(draw);

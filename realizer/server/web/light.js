@@ -1,0 +1,65 @@
+// The light of the stills as a shader: the same terms as realizer/render/light.py, a fragment at a time.
+import { Vector3 } from "three";
+
+// What is used until the service has told its own.
+const PORTRAIT = {
+  key: { direction: [-0.45, 0.51, 0.73], colour: [0.98, 0.93, 0.87], wrap: [0.42, 0.3, 0.26] },
+  fill: { direction: [0.72, 0.09, 0.68], colour: [0.2, 0.22, 0.26], wrap: [0.5, 0.5, 0.5] },
+  rim: { direction: [0.7, 0.42, -0.57], colour: [0.85, 0.88, 0.95], wrap: [0.3, 0.3, 0.3] },
+  rim_power: 3, sky: [0.25, 0.26, 0.29], ground: [0.13, 0.105, 0.09],
+  shadow: 0.55, highlight: 0.9, dull: 8, sharp: 160, exposure: 1, knee: 0.72,
+};
+
+export function lightUniforms(look = PORTRAIT) {
+  const uniforms = {};
+  for (const lamp of ["key", "fill", "rim"]) {
+    for (const part of ["direction", "colour", "wrap"]) uniforms[`${lamp}_${part}`] = { value: new Vector3(...look[lamp][part]) };
+    uniforms[`${lamp}_direction`].value.normalize();
+  }
+  for (const name of ["sky", "ground"]) uniforms[name] = { value: new Vector3(...look[name]) };
+  for (const name of ["rim_power", "shadow", "highlight", "dull", "sharp", "exposure", "knee"]) uniforms[name] = { value: look[name] };
+  return uniforms;
+}
+
+export const vertex = `
+attribute vec4 color;
+attribute float _occlusion;
+attribute float _gloss;
+varying vec3 v_normal, v_place, v_albedo;
+varying float v_occlusion, v_gloss;
+void main() {
+  v_normal = normal;
+  v_place = position;
+  v_albedo = color.rgb;
+  v_occlusion = _occlusion;
+  v_gloss = _gloss;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+
+export const fragment = `
+uniform vec3 key_direction, key_colour, key_wrap, fill_direction, fill_colour, fill_wrap, rim_direction, rim_colour, rim_wrap;
+uniform vec3 sky, ground;
+uniform float rim_power, shadow, highlight, dull, sharp, exposure, knee;
+varying vec3 v_normal, v_place, v_albedo;
+varying float v_occlusion, v_gloss;
+vec3 lamp(vec3 n, vec3 direction, vec3 colour, vec3 wrap) {
+  return colour * max(vec3(0.0), (dot(n, direction) + wrap) / (1.0 + wrap));
+}
+vec3 srgb(vec3 c) {
+  c = clamp(c, 0.0, 1.0);
+  return mix(c * 12.92, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}
+void main() {
+  vec3 n = normalize(v_normal);
+  vec3 v = normalize(cameraPosition - v_place);
+  vec3 h = normalize(key_direction + v);
+  float reach = 1.0 - shadow * (1.0 - v_occlusion);
+  vec3 edge = lamp(n, rim_direction, rim_colour, rim_wrap) * pow(1.0 - clamp(dot(n, v), 0.0, 1.0), rim_power);
+  vec3 ambient = mix(ground, sky, 0.5 + 0.5 * n.y) * v_occlusion;
+  float power = dull * pow(sharp / dull, v_gloss);
+  vec3 shine = v_gloss * highlight * pow(max(dot(n, h), 1e-6), power) * key_colour;
+  vec3 light = lamp(n, key_direction, key_colour, key_wrap) + lamp(n, fill_direction, fill_colour, fill_wrap) + edge;
+  vec3 colour = exposure * (v_albedo * (light * reach + ambient) + shine * reach);
+  vec3 shoulder = 1.0 - (1.0 - knee) * exp(-(colour - knee) / (1.0 - knee));
+  gl_FragColor = vec4(srgb(mix(colour, shoulder, step(knee, colour))), 1.0);
+}`;

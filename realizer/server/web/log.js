@@ -1,0 +1,56 @@
+// The feedback log: one line a message, newest at the bottom, each once.
+
+const MOST = 400; // lines
+
+export class Log {
+  constructor(list) {
+    this.list = list;
+    this.last = 0;
+  }
+
+  feedback(element, seq) {
+    if (seq && seq <= this.last) return;
+    this.last = seq || this.last;
+    const id = element.getAttribute("id");
+    const time = element.getAttribute("globalTime");
+    switch (element.localName) {
+      case "blockProgress": {
+        const [, block, what] = id.match(/^(.*):(start|end)$/);
+        return this.line("block", time, `${block} ${what === "start" ? "starts" : "ends"}`, element);
+      }
+      case "syncPointProgress":
+        return this.line("point", time, id.split(":").slice(1).join(" "), element);
+      case "warningFeedback":
+        return this.line("warning", null, `${id}: ${element.textContent}`, element);
+      case "predictionFeedback":
+        for (const block of element.children) {
+          if (block.localName !== "bml" || !block.hasAttribute("globalEnd")) continue;
+          const length = block.getAttribute("globalEnd") - block.getAttribute("globalStart");
+          this.line("point", block.getAttribute("globalStart"), `${block.getAttribute("id")} is planned, ${length.toFixed(2)} s`, element);
+        }
+    }
+  }
+
+  error(message) {
+    this.line("error", null, message.message);
+  }
+
+  clear() {
+    this.list.replaceChildren();
+  }
+
+  line(kind, time, text, element) {
+    const stays = this.list.scrollTop + this.list.clientHeight < this.list.scrollHeight - 20;
+    const item = document.createElement("li");
+    item.className = kind;
+    if (element) item.title = element.outerHTML;
+    const stamp = document.createElement("time");
+    stamp.textContent = time === null ? "" : Number(time).toFixed(2);
+    const words = document.createElement("span");
+    words.textContent = text;
+    item.append(stamp, words);
+    this.list.append(item);
+    while (this.list.childElementCount > MOST) this.list.firstElementChild.remove();
+    if (!stays) this.list.scrollTop = this.list.scrollHeight;
+  }
+}
