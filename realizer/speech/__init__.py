@@ -1,0 +1,44 @@
+"""Voices: text with marks in, sound and the times of words, phonemes and marks out.
+
+What is here is loaded when it is first used: the values alone start no engine and read no table.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from realizer.speech.catalogue import VoiceInfo, find_voice, voices
+    from realizer.speech.espeak import EspeakVoice
+    from realizer.speech.silent import SilentVoice
+    from realizer.speech.utterance import Phoneme, Say, Utterance, Voice, Word
+
+__all__ = [
+    "EspeakVoice",
+    "Phoneme",
+    "Say",
+    "SilentVoice",
+    "Utterance",
+    "Voice",
+    "VoiceInfo",
+    "Word",
+    "find_voice",
+    "voices",
+]
+
+_HOME = {
+    "EspeakVoice": "espeak",
+    "SilentVoice": "silent",
+    "VoiceInfo": "catalogue",
+    "find_voice": "catalogue",
+    "voices": "catalogue",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        found = getattr(import_module(f"{__name__}.{_HOME.get(name, 'utterance')}"), name)
+        globals()[name] = found
+        return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

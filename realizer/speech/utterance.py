@@ -71,7 +71,7 @@ class Utterance:
 
 
 class Voice(Protocol):
-    """Anything that turns text with marks into an utterance; one method, blocking, callable from any thread."""
+    """Turns text with marks into an utterance; one method, blocking, callable from any thread."""
 
     name: str
 

@@ -1,0 +1,303 @@
+"""What espeak-ng reports in, times of our words, phonemes and marks out: merged words split, lost marks found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from realizer.arrays import Int16
+from realizer.speech.ssml import Break, Mark, Script, write_tag
+from realizer.speech.utterance import Phoneme, Word
+from realizer.speech.words import words_in
+
+__all__ = ["Document", "Timeline", "timeline", "write_document"]
+
+WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
+STRESS = {"ˈ": 1, "ˌ": 2}
+VOWELS = set("aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ")
+SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
+LEAST_CLOSURE = 0.01  # s
+KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
+MOST_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
+
+Event = tuple[int, int, int, str]
+Spoken = Callable[[Sequence[str]], Sequence[Sequence[str]]]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedMark:
+    """A mark: `word` is the index of the next word; `paused` whether a <break> lies between."""
+
+    name: str
+    word: int
+    paused: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """What espeak-ng is given.
+
+    Attributes:
+        text: SSML; marks are named m0, m1, ...
+        words: (word, place) with places as espeak-ng counts them: characters of `text` from 1.
+        marks: in the order of the text.
+    """
+
+    text: str
+    words: tuple[tuple[str, int], ...]
+    marks: tuple[PlacedMark, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    words: tuple[Word, ...]
+    phonemes: tuple[Phoneme, ...]
+    marks: Mapping[str, float]
+
+
+@dataclass(slots=True)
+class Group:
+    """A run of phonemes that begins where one of our words surely begins, and the words in it."""
+
+    sample: int
+    first: int  # of the phonemes
+    words: list[int] = field(default_factory=list)
+
+
+def write_document(script: Script) -> Document:
+    """The script as SSML: inside <speak>, attributes in double quotes, only elements that are spoken."""
+    text = "<speak>"
+    words: list[tuple[str, int]] = []
+    marks: list[PlacedMark] = []
+    for part in script.parts:
+        if isinstance(part, str):
+            words += [(word, len(text) + len(escape(part[:at])) + 1) for word, at in words_in(part)]
+            text += escape(part)
+        elif isinstance(part, Mark):
+            text += f'<mark name="m{len(marks)}"/>'
+            marks.append(PlacedMark(part.name, len(words), False))
+        elif isinstance(part, Break):
+            text += f'<break time="{round(part.seconds * 1000)}ms"/>'
+            marks = [PlacedMark(m.name, m.word, m.paused or m.word == len(words)) for m in marks]
+        else:
+            text += write_tag(part)
+    return Document(text + "</speak>", tuple(words), tuple(marks))
+
+
+def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Timeline:
+    """The times of everything in seconds; phonemes tile 0..len(pcm)/rate without a gap.
+
+    Args:
+        document: what was spoken.
+        events: (type, sample, place, text) in order.
+        pcm: (n,) int16.
+        rate: Hz.
+        spoken: words -> the phonemes of each alone; only asked where espeak-ng merged words.
+    """
+    begins, sounds, word_events = _sounds(events, len(pcm))
+    words = _words(document, begins, sounds, word_events, len(pcm), spoken)
+    marks = _marks(document, events, words)
+    phonemes = _phonemes(_with_closures(begins, sounds, pcm, rate), sounds, len(pcm), rate)
+    return Timeline(
+        words=tuple(
+            Word(first / rate, last / rate, text)
+            for (text, _), (first, last, _) in zip(document.words, words, strict=True)
+        ),
+        phonemes=phonemes,
+        marks={name: sample / rate for name, sample in marks.items()},
+    )
+
+
+def _sounds(events: Sequence[Event], end: int) -> tuple[list[int], list[str], list[tuple[int, int, int]]]:
+    """Starts of phonemes, their IPA with stress, and (sample, place, index of its first phoneme) of words."""
+    begins: list[int] = []
+    sounds: list[str] = []
+    words: list[tuple[int, int, int]] = []
+    for kind, sample, place, text in events:
+        if kind == WORD:
+            words.append((min(sample, end), place, len(sounds)))
+        elif kind == PHONEME and not text.startswith("("):  # "(en)": the language changes
+            begins.append(min(sample, end))
+            sounds.append(text)
+    return begins, sounds, words
+
+
+def _words(
+    document: Document,
+    begins: Sequence[int],
+    sounds: Sequence[str],
+    events: Sequence[tuple[int, int, int]],
+    end: int,
+    spoken: Spoken,
+) -> list[tuple[int, int, bool]]:
+    """For each of our words: first and last sample, and whether espeak-ng itself says that it begins there."""
+    if not document.words:
+        return []
+    starts = {place: index for index, (_, place) in enumerate(document.words)}
+    groups: list[Group] = []
+    last = -1
+    for sample, place, first in events:
+        # After some punctuation the place is that of the blank before the word.
+        index = starts.get(place, starts.get(place + 1, -1))
+        if index > last:
+            groups.append(Group(sample, first))
+            groups[-1].words.append(index)
+            last = index
+    if not groups:
+        groups = [Group(begins[0] if begins else 0, 0)]
+    if not groups[0].words or groups[0].words[0] != 0:  # words before the first that was reported
+        groups[0].words = [0]
+        groups[0].first = 0
+    bounds = [group.words[0] for group in groups] + [len(document.words)]
+    for k, group in enumerate(groups):
+        group.words = list(range(bounds[k], bounds[k + 1]))
+    merged = [i for group in groups if len(group.words) > 1 for i in group.words]
+    alone = dict(zip(merged, spoken([document.words[i][0] for i in merged]), strict=True)) if merged else {}
+    inner = {first: sample for sample, _, first in events}
+
+    found: list[tuple[int, int, bool]] = []
+    for k, group in enumerate(groups):
+        stop = groups[k + 1].first if k + 1 < len(groups) else len(sounds)
+        own = [i for i in range(group.first, stop) if sounds[i]]  # without pauses
+        cuts = [0]
+        if len(group.words) > 1:
+            hints = {n for n, i in enumerate(own) if i in inner}
+            cuts = _cuts([alone[w] for w in group.words], [sounds[i] for i in own], hints)
+        cuts.append(len(own))
+        for n in range(len(group.words)):
+            mine = own[cuts[n] : cuts[n + 1]]
+            if n == 0:
+                first = group.sample
+            elif mine:
+                first = inner.get(mine[0], begins[mine[0]])
+            else:
+                first = found[-1][1]
+            until = begins[mine[-1] + 1] if mine and mine[-1] + 1 < len(begins) else end
+            found.append((first, max(first, until if mine else first), n == 0))
+    # A word ends where the next begins at the latest.
+    return [
+        (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last, sure)
+        for k, (first, last, sure) in enumerate(found)
+    ]
+
+
+def _cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: set[int]) -> list[int]:
+    """Where each word begins among the phonemes heard: the cheapest alignment of the words spoken alone.
+
+    Args:
+        expected: phonemes of each word alone.
+        heard: phonemes of the group.
+        hints: indices where espeak-ng reports a word that it gives no usable place.
+    """
+    flat = [(_bare(sound), n == 0) for word in expected for n, sound in enumerate(word)]
+    if not flat or len(flat) * len(heard) > MOST_CELLS:
+        counts = np.array([max(len(word), 1) for word in expected], float)
+        shares = np.concatenate(([0.0], np.cumsum(counts)[:-1])) / counts.sum()
+        return [round(share * len(heard)) for share in shares]
+    bare = [_bare(sound) for sound in heard]
+    rows, columns = len(flat) + 1, len(bare) + 1
+    cost = np.full((rows, columns), np.inf)
+    step = np.zeros((rows, columns), np.int8)  # 0 both, 1 expected alone, 2 heard alone
+    cost[0] = 0.7 * np.arange(columns)
+    step[0] = 2
+    for i in range(1, rows):
+        sound, opens = flat[i - 1]
+        for j in range(columns):
+            hint = -0.5 if opens and j - 1 in hints else 0.0
+            ways = (
+                cost[i - 1, j - 1] + _difference(sound, bare[j - 1]) + hint if j else np.inf,
+                cost[i - 1, j] + 0.7,
+                cost[i, j - 1] + 0.7 if j else np.inf,
+            )
+            step[i, j] = int(np.argmin(ways))
+            cost[i, j] = ways[step[i, j]]
+    at = [0] * len(flat)  # for each expected phoneme, the first one heard from there on
+    i, j = len(flat), len(bare)
+    while i:
+        if step[i, j] == 2:
+            j -= 1
+            continue
+        j -= step[i, j] == 0
+        i -= 1
+        at[i] = j
+    cuts, passed = [], 0
+    for word in expected:
+        cuts.append(at[passed] if passed < len(at) else len(bare))
+        passed += len(word)
+    cuts[0] = 0
+    return cuts
+
+
+def _bare(ipa: str) -> str:
+    return ipa.strip("ˈˌː_").replace("ː", "")
+
+
+def _difference(a: str, b: str) -> float:
+    if a == b:
+        return 0.0
+    if not a or not b:
+        return 1.2
+    return 0.4 if (a[0] in VOWELS) == (b[0] in VOWELS) else 1.2
+
+
+def _marks(
+    document: Document, events: Sequence[Event], words: Sequence[tuple[int, int, bool]]
+) -> dict[str, int]:
+    """Mark -> sample. A reported mark is exact, except inside merged words; a lost one goes by its word."""
+    reported: dict[str, int] = {}
+    for kind, sample, _, text in events:
+        if kind == MARK:
+            reported.setdefault(text, sample)
+    marks: dict[str, int] = {}
+    latest = 0
+    for k, mark in enumerate(document.marks):
+        before = words[mark.word - 1][1] if mark.word else 0
+        following = words[mark.word] if mark.word < len(words) else None
+        heard = reported.get(f"m{k}")
+        if following is not None and not mark.paused and (heard is None or not following[2]):
+            sample = following[0]
+        else:
+            sample = before if heard is None else heard
+        latest = max(latest, sample)
+        marks.setdefault(mark.name, latest)
+    return marks
+
+
+def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rate: int) -> list[int]:
+    """Starts of the phonemes with each closure given to the stop that it belongs to.
+
+    espeak-ng reports a stop at its burst: the silence of the closure counts to the sound before, and lips
+    that follow it would close when the burst is heard.
+    """
+    begins = list(begins)
+    for k in range(1, len(begins)):
+        before, here = begins[k - 1], begins[k]
+        if not sounds[k] or not sounds[k - 1] or _bare(sounds[k])[:1] in VOWELS:
+            continue
+        loud = np.flatnonzero(np.abs(pcm[before:here].astype(np.int32)) > SILENCE)
+        quiet = before + (int(loud[-1]) + 1 if len(loud) else 0)
+        if here - quiet >= LEAST_CLOSURE * rate:
+            begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (here - before)))
+    return begins
+
+
+def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int) -> tuple[Phoneme, ...]:
+    found: list[tuple[int, str, int]] = [(0, "", 0)] if not begins or begins[0] > 0 else []
+    for k, (sample, sound) in enumerate(zip(begins, sounds, strict=True)):
+        until = begins[k + 1] if k + 1 < len(begins) else end
+        if until <= sample:
+            continue
+        ipa = sound.replace("ˈ", "").replace("ˌ", "")
+        if not ipa and found and not found[-1][1]:
+            continue  # two pauses are one
+        stress = next((STRESS[c] for c in sound if c in STRESS), 0)
+        found.append((sample, ipa, stress))
+    ends = [sample for sample, _, _ in found[1:]] + [end]
+    return tuple(
+        Phoneme(sample / rate, until / rate, ipa, stress)
+        for (sample, ipa, stress), until in zip(found, ends, strict=True)
+        if until > sample
+    )

@@ -1,0 +1,165 @@
+"""The client's end of the espeak-ng process: a request in, an answer out, a dead or hung process replaced."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import threading
+import weakref
+from pathlib import Path
+from typing import IO, Any
+
+from realizer.errors import VoiceError
+
+__all__ = ["EspeakProcess", "missing"]
+
+INSTALL = "no voice with sound: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
+WORKER = Path(__file__).with_name("espeak_worker.py")
+
+
+def missing() -> str | None:
+    """None where espeak-ng is installed; otherwise the sentence that says what to install."""
+    if importlib.util.find_spec("espeakng_loader") is not None:
+        return None
+    import ctypes.util  # slow, and only needed without the package
+
+    return None if ctypes.util.find_library("espeak-ng") else INSTALL
+
+
+class EspeakProcess:
+    """One process, started at the first request; one request at a time, from any thread.
+
+    Args:
+        options: more arguments for the worker ("--data", PATH; "--no-fork").
+        limit: seconds after which a request counts as hung and the process is replaced.
+    """
+
+    def __init__(self, options: tuple[str, ...] = (), limit: float = 30.0) -> None:
+        self._options = options
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._end: weakref.finalize[..., EspeakProcess] | None = None
+        self._owner = os.getpid()
+        self._hello: dict[str, Any] = {}
+
+    @property
+    def pid(self) -> int | None:
+        """The process's id while it runs."""
+        process = self._process
+        return None if process is None else process.pid
+
+    def hello(self) -> dict[str, Any]:
+        """What the engine said of itself: rate, voices, variants. Starts it if needed.
+
+        Raises:
+            VoiceError: it is not installed or does not start.
+        """
+        with self._lock:
+            if not self._hello:
+                self._started()
+            return self._hello
+
+    def ask(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        """The head and the body of the answer.
+
+        Raises:
+            VoiceError: it is not installed, refused, died or hung; the next call starts it afresh.
+        """
+        with self._lock:
+            process = self._started()
+            watchdog = threading.Timer(self._limit, process.kill)
+            watchdog.daemon = True
+            watchdog.start()
+            try:
+                head, body = _exchange(process, request)
+            except (OSError, ValueError) as error:
+                self._stop()
+                raise VoiceError(
+                    f"espeak-ng ended or did not answer within {self._limit:g} s ({error}); "
+                    "the next text starts it again"
+                ) from None
+            finally:
+                watchdog.cancel()
+            if head["last"]:
+                self._stop()
+        if "error" in head:
+            raise VoiceError(f"espeak-ng: {head['error']}")
+        return head, body
+
+    def close(self) -> None:
+        """End the process, also under a request of another thread. May be called twice."""
+        process = self._process
+        if process is not None and self._owner == os.getpid():
+            process.kill()  # a request in progress sees the end of the pipe and lets go of the lock
+        with self._lock:
+            self._stop()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._owner != os.getpid():  # after a fork of ours the process belongs to our parent
+            self._process, self._end, self._owner = None, None, os.getpid()
+        if self._process is not None:
+            return self._process
+        fix = missing()
+        if fix:
+            raise VoiceError(fix)
+        process = subprocess.Popen(
+            # By path and without the current folder, so that it starts alone wherever the package lies.
+            [sys.executable, "-P", str(WORKER), *self._options],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        self._process = process
+        self._end = weakref.finalize(self, _end, process)
+        watchdog = threading.Timer(self._limit, process.kill)
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            hello = json.loads(_pipe(process.stdout).readline())
+        except (OSError, ValueError):
+            hello = {"error": "it ended while it started"}
+        finally:
+            watchdog.cancel()
+        if "error" in hello:
+            self._stop()
+            raise VoiceError(f"espeak-ng does not start: {hello['error']}")
+        self._hello = hello
+        return process
+
+    def _stop(self) -> None:
+        end, self._process, self._end = self._end, None, None
+        if end is not None and self._owner == os.getpid():
+            end()
+
+
+def _exchange(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+    inwards, outwards = _pipe(process.stdin), _pipe(process.stdout)
+    inwards.write(json.dumps(request).encode() + b"\n")
+    inwards.flush()
+    line = outwards.readline()
+    if not line:
+        raise OSError("end of the pipe")
+    head: dict[str, Any] = json.loads(line)
+    body = outwards.read(head["bytes"])
+    if len(body) != head["bytes"]:
+        raise OSError("half an answer")
+    return head, body
+
+
+def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
+    assert pipe is not None
+    return pipe
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):  # what was still to be written has no reader
+                pipe.close()

@@ -1,0 +1,268 @@
+"""A process that speaks with espeak-ng: JSON requests on stdin, JSON heads and PCM on stdout.
+
+espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said before; here it is loaded in
+a process of its own, made ready once, and each request is served by a fork of that (or, where there is no
+fork, by a fresh process). Nothing of the realizer is imported, so that it starts at once.
+
+    first line out   {"rate", "variants": [...], "voices": [{"name", "id", "languages": [[priority, tag], ...]}]}
+    line in          {"op": "say", "text", "voice", "wpm"} | {"op": "phonemes", "voice", "words"}
+    line out         {"bytes": n, "events": [[type, sample, place, text], ...]} and n bytes of int16 PCM
+                     {"phonemes": [[ipa, ...], ...]} | {"error": text}
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import ctypes.util
+import json
+import os
+import select
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+__all__: list[str] = []
+
+LONGEST_PATH = 140  # bytes; espeak-ng keeps its data path in a buffer of 160 with names appended
+LONGEST_SOUND = 1800  # s; a text that lasts longer is refused
+SYNCHRONOUS, PHONEME_EVENTS, PHONEME_IPA, DONT_EXIT = 2, 1, 2, 0x8000
+UTF8, SSML, END_PAUSE = 1, 0x10, 0x1000
+RATE = 1  # parameter number: words a minute
+WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
+KEPT = (WORD, SENTENCE, MARK, END, PHONEME)
+PARENT_DEATH_SIGNAL = 1  # prctl
+
+
+class EventId(ctypes.Union):
+    _fields_ = (("number", ctypes.c_int), ("name", ctypes.c_char_p), ("string", ctypes.c_char * 8))
+
+
+class Event(ctypes.Structure):
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("unique_identifier", ctypes.c_uint),
+        ("text_position", ctypes.c_int),
+        ("length", ctypes.c_int),
+        ("audio_position", ctypes.c_int),
+        ("sample", ctypes.c_int),
+        ("user_data", ctypes.c_void_p),
+        ("id", EventId),
+    )
+
+
+class VoiceEntry(ctypes.Structure):
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("languages", ctypes.c_void_p),
+        ("identifier", ctypes.c_char_p),
+        ("gender", ctypes.c_ubyte),
+        ("age", ctypes.c_ubyte),
+        ("variant", ctypes.c_ubyte),
+        ("reserved", ctypes.c_ubyte),
+        ("score", ctypes.c_int),
+        ("spare", ctypes.c_void_p),
+    )
+
+
+SynthCallback = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.POINTER(ctypes.c_short), ctypes.c_int, ctypes.POINTER(Event)
+)
+
+
+class Engine:
+    """espeak-ng, loaded and ready.
+
+    Raises:
+        RuntimeError: the library or its data cannot be loaded.
+    """
+
+    def __init__(self, data: str | None) -> None:
+        path, own_data = find_library()
+        data = data or own_data
+        self.lib = lib = ctypes.CDLL(path)
+        lib.espeak_Initialize.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_char_p, ctypes.c_int]
+        lib.espeak_SetVoiceByName.argtypes = [ctypes.c_char_p]
+        lib.espeak_SetSynthCallback.argtypes = [SynthCallback]
+        lib.espeak_ListVoices.argtypes = [ctypes.c_void_p]
+        lib.espeak_ListVoices.restype = ctypes.POINTER(ctypes.POINTER(VoiceEntry))
+        lib.espeak_TextToPhonemes.argtypes = [ctypes.POINTER(ctypes.c_void_p), ctypes.c_int, ctypes.c_int]
+        lib.espeak_TextToPhonemes.restype = ctypes.c_char_p
+        lib.espeak_Synth.argtypes = [
+            ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint, ctypes.c_int,
+            ctypes.c_uint, ctypes.c_uint, ctypes.POINTER(ctypes.c_uint), ctypes.c_void_p,
+        ]  # fmt: skip
+        self.variants: list[str] = []
+        if data is not None:
+            self.variants = sorted(p.name for p in Path(data, "voices", "!v").glob("*"))
+            if len(os.fsencode(data)) > LONGEST_PATH:
+                # This process's folder is its own: from inside the data the path is one character.
+                os.chdir(data)
+                data = "."
+        flags = PHONEME_EVENTS | PHONEME_IPA | DONT_EXIT
+        self.rate = lib.espeak_Initialize(SYNCHRONOUS, 0, None if data is None else os.fsencode(data), flags)
+        if self.rate <= 0:
+            raise RuntimeError(f"espeak-ng found no data in {data!r}")
+
+    def voices(self) -> list[dict[str, Any]]:
+        found = []
+        entries = self.lib.espeak_ListVoices(None)
+        index = 0
+        while entries[index]:
+            entry = entries[index].contents
+            at, tags = entry.languages, []
+            # A list of: priority byte, tag, 0; a priority of 0 ends it.
+            while (priority := ctypes.c_ubyte.from_address(at).value) != 0:
+                tag = ctypes.string_at(at + 1)
+                tags.append([priority, tag.decode("ascii", "replace")])
+                at += len(tag) + 2
+            found.append({"name": text(entry.name), "id": text(entry.identifier), "languages": tags})
+            index += 1
+        return found
+
+    def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        sound: list[bytes] = []
+        events: list[tuple[int, int, int, str]] = []
+        heard = 0
+
+        def hear(wave: Any, count: int, event: Any) -> int:
+            nonlocal heard
+            if wave and count > 0:
+                sound.append(ctypes.string_at(wave, 2 * count))
+                heard += count
+            index = 0
+            while event[index].type != 0:
+                e = event[index]
+                if e.type in KEPT:
+                    events.append((e.type, e.sample, e.text_position, label(e)))
+                index += 1
+            return int(heard > LONGEST_SOUND * self.rate)
+
+        self._choose(request["voice"])
+        callback = SynthCallback(hear)  # kept until the end of the synthesis
+        self.lib.espeak_SetSynthCallback(callback)
+        self.lib.espeak_SetParameter(RATE, request["wpm"], 0)
+        document = request["text"].encode() + b"\0"
+        self.lib.espeak_Synth(document, len(document), 0, 1, 0, UTF8 | SSML | END_PAUSE, None, None)
+        if heard > LONGEST_SOUND * self.rate:
+            raise RuntimeError(f"the text lasts longer than {LONGEST_SOUND} s")
+        return {"events": events, "bytes": 2 * heard}, b"".join(sound)
+
+    def phonemes(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        self._choose(request["voice"])
+        answers = []
+        for word in request["words"]:
+            buffer = ctypes.create_string_buffer(word.encode())
+            place = ctypes.c_void_p(ctypes.addressof(buffer))
+            ipa = ""
+            while place.value:  # a clause at a time
+                clause = self.lib.espeak_TextToPhonemes(
+                    ctypes.byref(place), UTF8, PHONEME_IPA | ord("_") << 8
+                )
+                ipa += "_" + text(clause or b"")
+            answers.append([part for part in ipa.replace(" ", "_").split("_") if part])
+        return {"phonemes": answers}, b""
+
+    def _choose(self, voice: str) -> None:
+        if self.lib.espeak_SetVoiceByName(voice.encode()) != 0:
+            raise RuntimeError(f"espeak-ng has no voice {voice!r}")
+
+
+def find_library() -> tuple[str, str | None]:
+    """(library, data folder or None for its own): the pip package, or else the system's."""
+    try:
+        import espeakng_loader
+    except ImportError:
+        path = ctypes.util.find_library("espeak-ng")
+        if path is None:
+            raise RuntimeError("espeak-ng is not installed") from None
+        return path, None
+    return str(espeakng_loader.get_library_path()), str(espeakng_loader.get_data_path())
+
+
+def text(raw: bytes) -> str:
+    return raw.decode("utf-8", "replace")
+
+
+def label(event: Any) -> str:
+    """The phoneme's IPA, the mark's name, or nothing."""
+    if event.type == PHONEME:
+        # Eight bytes in the event itself, without an end where all eight are used.
+        return text(ctypes.string_at(ctypes.addressof(event.id), 8).split(b"\0")[0])
+    if event.type == MARK:
+        return text(event.id.name or b"")
+    return ""
+
+
+def answer(engine: Engine, line: bytes, out: int, last: bool = False) -> None:
+    """Serve one request and write the whole answer."""
+    try:
+        request = json.loads(line)
+        head, body = {"say": engine.say, "phonemes": engine.phonemes}[request["op"]](request)
+    except Exception as error:
+        head, body = {"error": str(error)}, b""
+    write(out, {"bytes": 0, **head, "last": last}, body)
+
+
+def write(out: int, head: dict[str, Any], body: bytes = b"") -> None:
+    data = memoryview(json.dumps(head).encode() + b"\n" + body)
+    while data:
+        data = data[os.write(out, data) :]
+
+
+def serve_in_forks(engine: Engine, out: int) -> None:
+    """One fork a request, so that each starts from the same state; ends with its parent."""
+    parent = os.getppid()
+    libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+    pending = b""
+    while os.getppid() == parent:
+        if b"\n" not in pending:
+            # End of file is not enough: another child of our parent may hold the other end of the pipe.
+            if not select.select([0], [], [], 5.0)[0]:
+                continue
+            read = os.read(0, 1 << 16)
+            if not read:
+                return
+            pending += read
+            continue
+        line, _, pending = pending.partition(b"\n")
+        child = os.fork()
+        if child == 0:
+            if libc is not None:
+                libc.prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
+            try:
+                answer(engine, line, out)
+            finally:
+                os._exit(0)
+        status = os.waitpid(child, 0)[1]
+        if status:
+            write(out, {"bytes": 0, "error": f"espeak-ng crashed (status {status})", "last": False})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", help="folder of espeak-ng's data")
+    parser.add_argument("--no-fork", action="store_true", help="serve one request, then end")
+    options = parser.parse_args()
+    # Ctrl-C is for our parent. A library may print to stdout: the answers go elsewhere.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    out = os.dup(1)
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 1)
+    try:
+        engine = Engine(options.data)
+    except (RuntimeError, OSError) as error:
+        write(out, {"error": str(error)})
+        return
+    write(out, {"rate": engine.rate, "voices": engine.voices(), "variants": engine.variants})
+    if options.no_fork or not hasattr(os, "fork"):
+        line = sys.stdin.buffer.readline()
+        if line:
+            answer(engine, line, out, last=True)
+        return
+    serve_in_forks(engine, out)
+
+
+if __name__ == "__main__":
+    main()

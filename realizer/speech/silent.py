@@ -1,0 +1,102 @@
+"""The voice that needs nothing: text in, the times of words, marks and rough phonemes out, no sound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from realizer.speech.spelling import letters_to_phonemes, syllable_facts, units
+from realizer.speech.ssml import Mark, read_script
+from realizer.speech.utterance import Phoneme, Say, Utterance, Word
+from realizer.speech.words import Item, Pause, Spelled, items
+
+__all__ = ["SilentVoice"]
+
+SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
+VOWELS = "aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ"
+
+
+class SilentVoice:
+    """Rule-based durations by vowel units (Wojdel 2005, 6.4.1); the fallback when no engine is installed."""
+
+    name = "silent"
+
+    def say(self, request: Say) -> Utterance:
+        """Words last as many units (0.2 s at rate 1) as they have vowels; a punctuation mark lasts one.
+
+        Raises:
+            VoiceError: the text is too long.
+        """
+        script = read_script(request)
+        facts = syllable_facts()
+        if script.is_silent and not any(not isinstance(part, (str, Mark)) for part in script.parts):
+            return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)
+        rate = min(FASTEST, max(SLOWEST, request.rate))
+        return _laid_out(items(script, facts["phrase"]), request.language, rate, script.warnings)
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:
+    facts = syllable_facts()
+    now = facts["edge"]
+    words: list[Word] = []
+    phonemes = [Phoneme(0.0, now, "")]
+    marks: dict[str, float] = {}
+    waiting: list[str] = []  # marks that wait for the next word
+    for thing in things:
+        if isinstance(thing, Mark):
+            waiting.append(thing.name)
+            continue
+        if isinstance(thing, Pause):
+            if thing.seconds:  # a mark stands before the silence that follows it
+                marks.update(dict.fromkeys(waiting, now))
+                waiting = []
+            length = thing.seconds or facts["unit"] / rate
+            phonemes.append(Phoneme(now, now + length, ""))
+        else:
+            marks.update(dict.fromkeys(waiting, now))
+            waiting = []
+            length = units(thing.text, language) * facts["unit"] / (rate * thing.rate)
+            words.append(Word(now, now + length, thing.text))
+            phonemes += _phonemes(thing, language, now, length, facts["consonant"])
+        now += length
+    said = words[-1].end if words else now
+    marks.update(dict.fromkeys(waiting, said))
+    phonemes.append(Phoneme(now, now + facts["closing"], ""))
+    return Utterance(
+        duration=now + facts["closing"],
+        words=tuple(words),
+        phonemes=_joined(phonemes),
+        marks=marks,
+        warnings=warnings,
+    )
+
+
+def _phonemes(word: Spelled, language: str, start: float, length: float, consonant: float) -> list[Phoneme]:
+    ipa = letters_to_phonemes(word.text, language) or ("",)
+    times = [1.0 if sound[:1] in VOWELS else consonant for sound in ipa]
+    share = length / sum(times)
+    stressed = next((k for k, sound in enumerate(ipa) if sound[:1] in VOWELS), None)
+    phonemes = []
+    for k, (sound, time) in enumerate(zip(ipa, times, strict=True)):
+        # Short words are mostly unstressed; in longer ones the first vowel stands out, for want of better.
+        stress = 1 if k == stressed and len(word.text) > 3 else 0
+        phonemes.append(Phoneme(start, start + time * share, sound, stress))
+        start += time * share
+    return phonemes
+
+
+def _joined(phonemes: list[Phoneme]) -> tuple[Phoneme, ...]:
+    """Pauses that touch are one; each phoneme ends where the next begins, exactly."""
+    joined: list[Phoneme] = []
+    for phoneme in phonemes:
+        before = joined[-1] if joined else None
+        if before is not None:
+            begin = before.start if not phoneme.ipa and not before.ipa else phoneme.start
+            joined[-1] = Phoneme(before.start, phoneme.start, before.ipa, before.stress)
+            if begin == before.start:
+                joined.pop()
+            phoneme = Phoneme(begin, phoneme.end, phoneme.ipa, phoneme.stress)
+        joined.append(phoneme)
+    return tuple(joined)

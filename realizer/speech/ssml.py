@@ -1,0 +1,215 @@
+"""What a voice is asked to say, made safe: SSML text in, a script of text, marks, breaks and tags out."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr, unescape
+
+from realizer.errors import VoiceError
+from realizer.speech.utterance import Say
+
+__all__ = ["MOST_TEXT", "Break", "Mark", "Script", "Tag", "read_script"]
+
+MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
+LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice's
+LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
+
+# SSML 1.1 elements that change how text is spoken, with the attributes that are passed on. `audio` is not
+# one of them: an engine would open the file it names.
+SPOKEN: Mapping[str, tuple[str, ...]] = {
+    "emphasis": ("level",),
+    "lang": ("xml:lang",),
+    "p": ("xml:lang",),
+    "phoneme": ("alphabet", "ph"),
+    "prosody": ("rate", "pitch", "volume", "range", "contour"),
+    "s": ("xml:lang",),
+    "say-as": ("interpret-as", "format", "detail"),
+    "sub": ("alias",),
+    "voice": ("xml:lang", "name", "gender", "age", "variant"),
+}
+EMPTY = ("break", "mark", "bookmark", "sync")
+STRENGTHS = {"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.2}  # s
+CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
+
+NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+PICTURES = re.compile(
+    "[\U0001f000-\U0001faff\u2600-\u27bf\u2b00-\u2bff\ufe00-\ufe0f\u200d\u20e3\U000e0000-\U000e007f]+"
+)
+MARKUP = re.compile(r"<[^<>]*>")
+NAMED = re.compile(
+    r"<(?:\w+:)?(?:mark|bookmark|sync)\b[^<>]*?\b(?:name|mark|id)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """The start of an SSML element, or its end (`attributes` is then None)."""
+
+    name: str
+    attributes: tuple[tuple[str, str], ...] | None
+
+
+Part = str | Mark | Break | Tag
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """Parts in the order of the text.
+
+    Attributes:
+        parts: text (not empty, blanks collapsed), marks, breaks, and properly nested tags.
+        warnings: what was left out, in sentences.
+    """
+
+    parts: tuple[Part, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def text(self) -> str:
+        """What is spoken, without marks and tags."""
+        return "".join(part for part in self.parts if isinstance(part, str))
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """Names of the marks in the order of the text."""
+        return tuple(part.name for part in self.parts if isinstance(part, Mark))
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether there is nothing a voice could pronounce."""
+        return not any(unicodedata.category(c)[0] in "LNS" for c in self.text)
+
+
+def read_script(request: Say) -> Script:
+    """The script of a request. Wrong SSML is spoken as plain text, its marks kept, with a warning.
+
+    Control characters, lone surrogates and emoji are left out with a warning; elements and attributes that
+    are not SSML are left out silently, their text is spoken.
+
+    Raises:
+        VoiceError: the text is longer than `MOST_TEXT` characters.
+    """
+    if len(request.ssml) > MOST_TEXT:
+        raise VoiceError(
+            f"wanted a text of at most {MOST_TEXT} characters, got {len(request.ssml)}: "
+            "split it over several behaviours"
+        )
+    warnings: list[str] = []
+    ssml, wrong = NOT_XML.subn(" ", request.ssml)
+    if wrong:
+        warnings.append(f"{wrong} control characters in the text are left out")
+    try:
+        parts = list(_parse(ssml))
+    except expat.ExpatError as error:
+        warnings.append(f"the text is not well-formed SSML ({error}): spoken as plain text")
+        parts = list(_scrape(ssml))
+    if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
+        warnings.append("emoji in the text are not spoken")
+        parts = [PICTURES.sub(" ", part) if isinstance(part, str) else part for part in parts]
+    script = Script(tuple(_collapsed(parts)), tuple(warnings))
+    if script.is_silent:
+        warnings.append("the text is empty: nothing is spoken")
+        script = Script(script.parts, tuple(warnings))
+    return script
+
+
+def _parse(ssml: str) -> list[Part]:
+    parts: list[Part] = []
+    reader = expat.ParserCreate()
+    reader.buffer_text = True
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        name = name.rpartition(":")[2]
+        if name in EMPTY:
+            parts.extend(_point(name, attributes))
+        elif name in SPOKEN:
+            kept = ((k, attributes[k][:LONGEST_ATTRIBUTE]) for k in SPOKEN[name] if k in attributes)
+            parts.append(Tag(name, tuple(kept)))
+
+    def end(name: str) -> None:
+        name = name.rpartition(":")[2]
+        if name in SPOKEN:
+            parts.append(Tag(name, None))
+
+    def text(characters: str) -> None:
+        parts.append(characters)
+
+    reader.StartElementHandler = start
+    reader.EndElementHandler = end
+    reader.CharacterDataHandler = text
+    reader.Parse(f"<speak>{ssml}</speak>".encode(), True)
+    return parts
+
+
+def _point(name: str, attributes: Mapping[str, str]) -> Iterator[Part]:
+    """An element without content: a mark by any of its spellings, or a break."""
+    if name == "break":
+        clock = CLOCK.fullmatch(attributes.get("time", ""))
+        if clock:
+            seconds = float(clock[1]) / (1000 if clock[2] == "ms" else 1)
+        else:
+            seconds = STRENGTHS.get(attributes.get("strength", "medium"), STRENGTHS["medium"])
+        yield Break(min(seconds, LONGEST_BREAK))
+    else:
+        # SSML <mark name>, SAPI <bookmark mark>, BML <sync id>.
+        named = next((attributes[k] for k in ("name", "mark", "id") if k in attributes), None)
+        if named is not None:
+            yield Mark(named)
+
+
+def _scrape(ssml: str) -> Iterator[Part]:
+    """Text and marks of something that only looks like XML."""
+    place = 0
+    for tag in MARKUP.finditer(ssml):
+        yield unescape(ssml[place : tag.start()], {"&quot;": '"', "&apos;": "'"})
+        yield " "
+        named = NAMED.match(tag[0])
+        if named:
+            yield Mark(named[1] if named[1] is not None else named[2])
+        place = tag.end()
+    yield unescape(ssml[place:].replace("<", " "), {"&quot;": '"', "&apos;": "'"})
+
+
+def _collapsed(parts: list[Part]) -> Iterator[Part]:
+    """Blanks as one space, texts that touch joined, texts of nothing left out."""
+    text = ""
+    blank = True  # whether what was given out last ended in a blank: leading blanks go
+    for part in [*parts, None]:
+        if isinstance(part, str):
+            text += part
+            continue
+        text = re.sub(r"\s+", " ", text)
+        if blank:
+            text = text.lstrip(" ")
+        if text:
+            blank = text.endswith(" ")
+            yield text
+        text = ""
+        if part is not None:
+            yield part
+
+
+def write_tag(tag: Tag) -> str:
+    """The tag as SSML text; attributes in double quotes."""
+    if tag.attributes is None:
+        return f"</{tag.name}>"
+    # quoteattr would choose single quotes for a value that holds a double one: an engine's trap.
+    return "".join([f"<{tag.name}", *(f" {k}={_quoted(v)}" for k, v in tag.attributes), ">"])
+
+
+def _quoted(value: str) -> str:
+    return '"' + quoteattr(value.replace('"', " "))[1:-1] + '"'

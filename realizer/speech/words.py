@@ -1,0 +1,108 @@
+"""A script in, its words with their places out: what a reader would point at, whatever an engine merges."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from realizer.speech.ssml import Break, Mark, Script
+
+__all__ = ["Item", "Pause", "Spelled", "items"]
+
+# Ideographs and kana are words of their own (there are no blanks between words to go by).
+SINGLE = r"[\u3040-\u30ff\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
+# Letters with their marks, joined by apostrophes, hyphens or dots between letters; numbers with their signs.
+WORD = re.compile(
+    rf"{SINGLE}|\d[\d.,:/]*\d|(?:(?!{SINGLE})[^\W_]|[\u0300-\u036f\u0900-\u0dff])+"
+    rf"(?:['’.\u00ad-](?!{SINGLE})[^\W_]+)*|[&%@+=°§#*]|[^\s\w!-/:-@\[-`{{-~]",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Spelled:
+    """A word as it is written; `place` counts characters in the text that the engine is given."""
+
+    text: str
+    place: int
+    rate: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """A silence that the text asks for: `signs` is punctuation, `seconds` a <break>."""
+
+    signs: str
+    seconds: float = 0.0
+
+
+Item = Spelled | Pause | Mark
+
+
+def words_in(text: str) -> Iterator[tuple[str, int]]:
+    """(word, place) in order; symbols that are spoken ("&", "€") count as words, punctuation does not."""
+    for found in WORD.finditer(text):
+        first = found[0][0]
+        if unicodedata.category(first)[0] in "LNSM" or first in "&%@#*§":
+            yield found[0], found.start()
+
+
+def items(script: Script, phrase: str) -> tuple[Item, ...]:
+    """Words, pauses and marks in the order of the text, for a voice that has no engine.
+
+    Args:
+        script: the parts; <prosody rate> scales the words inside it, <sub alias> replaces its text.
+        phrase: the characters that make a pause; a run of them is one.
+    """
+    found: list[Item] = []
+    rates = [1.0]
+    open_tags: list[bool] = []  # for each open tag, whether it pushed a rate
+    hidden = 0  # depth inside <sub>
+    place = 0
+    for part in script.parts:
+        if isinstance(part, str):
+            if not hidden:
+                found += _spelled(part, place, rates[-1], phrase)
+            place += len(part)
+        elif isinstance(part, Mark):
+            found.append(part)
+        elif isinstance(part, Break):
+            found.append(Pause("", part.seconds))
+        elif part.attributes is None:
+            if open_tags.pop():
+                rates.pop()
+            hidden -= part.name == "sub"
+        else:
+            values = dict(part.attributes)
+            rate = prosody_rate(values.get("rate", "")) if part.name == "prosody" else None
+            open_tags.append(rate is not None)
+            if rate is not None:
+                rates.append(rates[-1] * rate)
+            if part.name == "sub":
+                found += _spelled(values.get("alias", ""), place, rates[-1], phrase)
+                hidden += 1
+    return tuple(found)
+
+
+def prosody_rate(text: str) -> float | None:
+    """SSML's `rate`: a word or a percentage, as a factor; None if it is neither."""
+    named = {"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.4, "x-fast": 1.8}
+    if text in named:
+        return named[text]
+    percent = re.fullmatch(r"\s*([+-]?)(\d+(?:\.\d+)?)%\s*", text)
+    if not percent:
+        return None
+    value = float(percent[2]) / 100
+    return min(4.0, max(0.25, {"+": 1 + value, "-": 1 - value, "": value}[percent[1]]))
+
+
+def _spelled(text: str, place: int, rate: float, phrase: str) -> Iterator[Item]:
+    at = 0
+    for word, start in [*words_in(text), ("", len(text))]:
+        signs = "".join(c for c in text[at:start] if c in phrase)
+        if signs:
+            yield Pause(signs)
+        if word:
+            yield Spelled(word, place + start, rate)
+        at = start + len(word)
