@@ -22,9 +22,10 @@ from bml_schema.behaviours import (
     Sync,
     Wait,
 )
-from bml_schema.documents import MOST_BYTES, parse, read
+from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS, parse, read
 from bml_schema.errors import BMLError, BMLSyntaxError, Place, Problem
 from bml_schema.feedback import (
+    BMLA,
     BlockPrediction,
     BlockProgress,
     Feedback,
@@ -48,14 +49,18 @@ from bml_schema.nodes import (
     Synchronize,
 )
 from bml_schema.parser import MOST_BEHAVIOURS
+from bml_schema.shape import attribute, child, children, mixed, node, sync_ref, text
 from bml_schema.sync_refs import SyncRef
+from bml_schema.values import Value, flag, integer, number, one_of, seconds, string, word
 from bml_schema.writer import OWN, write
 
 __all__ = [
+    "BMLA",
     "CORE",
     "EXTENSIONS",
     "MOST_BEHAVIOURS",
     "MOST_BYTES",
+    "MOST_DOCUMENTS",
     "OWN",
     "VOCABULARY",
     "After",
@@ -95,11 +100,26 @@ __all__ = [
     "SyncPointProgress",
     "SyncRef",
     "Synchronize",
+    "Value",
     "Wait",
     "WarningFeedback",
+    "attribute",
+    "child",
+    "children",
+    "flag",
+    "integer",
+    "mixed",
+    "node",
+    "number",
+    "one_of",
     "parse",
     "parse_feedback",
     "predicted",
     "read",
+    "seconds",
+    "string",
+    "sync_ref",
+    "text",
+    "word",
     "write",
 ]

@@ -14,7 +14,7 @@ from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MOST_BEHAVIOURS, read_block
 
-__all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "element", "parse", "read"]
+__all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
 
 MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
 MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings

@@ -13,18 +13,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
 
-__all__ = [
-    "BEHAVIOR_TYPE_NOT_SUPPORTED",
-    "CUSTOM_BEHAVIOR_NOT_SUPPORTED",
-    "PARSING_FAILURE",
-    "BMLError",
-    "BMLSyntaxError",
-    "Place",
-    "Problem",
-    "at",
-    "did_you_mean",
-    "shown",
-]
+__all__ = ["BMLError", "BMLSyntaxError", "Place", "Problem"]
 
 # Warning types of the standard, in its (American) spelling.
 PARSING_FAILURE = "PARSING_FAILURE"

@@ -243,7 +243,8 @@ def _time(source: etree._Element, name: str) -> float:
 
 
 def _line(source: etree._Element) -> int:
-    return int(source.sourceline or 1)
+    line: Any = source.sourceline
+    return int(line or 1)
 
 
 def _seq(root: etree._Element) -> int | None:

@@ -9,7 +9,7 @@ from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.nodes import Behaviour, Constraint, Synchronize
 from bml_schema.sync_refs import SyncRef
 
-__all__ = ["Losses"]
+__all__: list[str] = []
 
 
 class Losses:

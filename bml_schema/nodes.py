@@ -9,10 +9,9 @@ from typing import ClassVar
 from bml_schema.errors import Place, Problem
 from bml_schema.shape import attribute, node, sync_ref
 from bml_schema.sync_refs import SyncRef
-from bml_schema.values import integer, name, one_of, word
+from bml_schema.values import block_name, integer, name, one_of, word
 
 __all__ = [
-    "COMPOSITIONS",
     "CORE",
     "EXTENSIONS",
     "After",
@@ -24,8 +23,6 @@ __all__ = [
     "Part",
     "Required",
     "Synchronize",
-    "core",
-    "extension",
 ]
 
 CORE = "http://www.bml-initiative.org/bml/bml-1.0"
@@ -165,7 +162,7 @@ class Block:
 
     tag: ClassVar[str] = core("bml")
 
-    id: str = attribute(name)
+    id: str = attribute(block_name)
     character_id: str | None = attribute(word, default=None)
     composition: str = attribute(one_of(*COMPOSITIONS, any_case=True), default="MERGE")
     children: tuple[Behaviour | Required | Constraint, ...] = ()

@@ -21,7 +21,7 @@ from typing import Any, TypeVar, dataclass_transform
 
 from bml_schema.values import Value
 
-__all__ = ["Shape", "attribute", "child", "children", "mixed", "node", "shape_of", "sync_ref", "text"]
+__all__ = ["attribute", "child", "children", "mixed", "node", "sync_ref", "text"]
 
 _KEY = "bml"
 _T = TypeVar("_T")
@@ -73,6 +73,12 @@ class Shape:
     mixed: str = ""
     text: str = ""
     names: frozenset[str] = frozenset()
+
+    @property
+    def listed(self) -> str:
+        """The children an element may have, in words."""
+        tags = [f"<{local(c.tag)}>" for kind in self.children for c in kind.classes] or ["<description>"]
+        return ", ".join(tags[:-1]) + f" or {tags[-1]}" if len(tags) > 1 else tags[0]
 
 
 def attribute(value: Value, *, default: Any = MISSING, default_factory: Any = MISSING, name: str = "") -> Any:

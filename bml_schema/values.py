@@ -9,21 +9,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-__all__ = [
-    "MOST_SECONDS",
-    "NUMBER",
-    "Value",
-    "decimal",
-    "flag",
-    "integer",
-    "name",
-    "number",
-    "one_of",
-    "seconds",
-    "string",
-    "unwanted",
-    "word",
-]
+__all__ = ["Value", "flag", "integer", "number", "one_of", "seconds", "string", "word"]
 
 MOST_SECONDS = 86400.0  # a day; longer times in a document are a unit mistake or an attack
 _MOST_DIGITS = 400  # the smallest float written without exponent has 345 characters
@@ -125,9 +111,19 @@ def _read_word(text: str) -> str:
     return text
 
 
+_NAME = re.compile(rf"[^\s:]{{1,{_MOST_NAME}}}")
+
+
 def _read_name(text: str) -> str:
     text = text.strip()
-    if not text or text == "bml" or len(text) > _MOST_NAME or ":" in text or len(text.split()) > 1:
+    if text == "bml" or not _NAME.fullmatch(text):
+        raise ValueError(text)
+    return text
+
+
+def _read_block_name(text: str) -> str:
+    text = text.strip()
+    if not text or text == "bml" or ":" in text or len(text) > _MOST_NAME:
         raise ValueError(text)
     return text
 
@@ -146,4 +142,7 @@ flag = Value("true or false", _read_flag, lambda v: "true" if v else "false", "b
 seconds = number(-MOST_SECONDS, MOST_SECONDS, wanted=f"seconds, at most {MOST_SECONDS:g}")
 # Ids hold no colon, because references and feedback ids are joined with it, and no blank, because
 # "a - 1" must always mean an offset. "bml" is the block itself in references.
+block_name = Value(
+    f'a name of at most {_MOST_NAME} characters without ":", other than "bml"', _read_block_name
+)
 name = Value(f'a name of at most {_MOST_NAME} characters without blanks or ":", other than "bml"', _read_name)

@@ -20,7 +20,7 @@ from bml_schema.nodes import (
 from bml_schema.shape import Attribute, shape_of, sync_ref
 from bml_schema.sync_refs import SyncRef
 
-__all__ = ["OWN", "Writer", "write"]
+__all__ = ["OWN", "write"]
 
 OWN = "urn:bml-realizer:1"  # what we add to BML ourselves
 _XML = "http://www.w3.org/XML/1998/namespace"

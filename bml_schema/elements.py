@@ -1,0 +1,274 @@
+"""One element inside a block in, its node out: attributes, children, descriptions, constraints.
+
+Recursive descent, one function per grammar rule. The first element with a fault raises it; who called
+decides what goes with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from lxml import etree
+
+from bml_schema.behaviours import Speech, Sync
+from bml_schema.errors import PARSING_FAILURE, shown
+from bml_schema.escape import escape
+from bml_schema.nodes import (
+    CORE,
+    EXTENSIONS,
+    After,
+    Before,
+    Behaviour,
+    Constraint,
+    Description,
+    Synchronize,
+    core,
+    extension,
+)
+from bml_schema.shape import Shape, local, shape_of, sync_ref
+from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
+from bml_schema.values import unwanted
+
+__all__: list[str] = []
+
+Vocabulary = Mapping[str, type[Behaviour]]
+
+# Documents from before the standard name no namespace, or the draft's.
+_DRAFTS = frozenset({"http://www.mindmakers.org/projects/BML"})
+_SSML = "application/ssml+xml"
+_OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
+_PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
+_SYNC, _DESCRIPTION = Sync.tag, Description.tag
+
+
+class Fault(Exception):
+    """What is wrong with an element; it becomes the Problem of the behaviour or constraint around it."""
+
+    def __init__(self, text: str, element: etree._Element, type: str = PARSING_FAILURE) -> None:
+        super().__init__(text)
+        self.text = text
+        self.element = element
+        self.type = type
+
+
+class _BadReference(Exception):
+    """A reference that is none or leads nowhere; its text is the whole sentence."""
+
+
+class Elements:
+    """Reads elements of one document.
+
+    Attributes:
+        vocabulary: Clark tag -> node class.
+        names: what references may name; None looks nothing up.
+    """
+
+    __slots__ = ("_tags", "names", "vocabulary")
+
+    def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
+        self.vocabulary = vocabulary
+        self.names = names
+        self._tags: dict[str, str] = {}
+
+    def tag(self, element: etree._Element) -> str:
+        """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
+        raw = str(element.tag)
+        known = self._tags.get(raw)
+        if known is None:
+            space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
+            known = core(name) if not space or space in _DRAFTS else raw
+            if known == core(name) and known not in self.vocabulary and extension(name) in self.vocabulary:
+                known = extension(name)
+            self._tags[raw] = known
+        return known
+
+    # element := attributes children
+
+    def node(self, cls: type[Any], element: etree._Element, *, timed: bool = False) -> Any:
+        """An element as its class says; timed: with an id and sync points of its own."""
+        shape = shape_of(cls)
+        values = self.attributes(cls, shape, element, timed)
+        if shape.mixed:
+            values[shape.mixed] = tuple(self.mixed(shape, element))
+        elif shape.text:
+            values[shape.text] = self.text(element)
+        elif shape.children or len(element):
+            self.children(shape, element, values)
+        elif element.text:
+            self.no_text(element)
+        node: Any = cls(**values)
+        if timed and (said := node.fault()):
+            raise Fault(said, element)
+        return node
+
+    def attributes(
+        self, cls: type[Any], shape: Shape, element: etree._Element, timed: bool
+    ) -> dict[str, Any]:
+        """Values by field; one Fault names everything that is wrong with them."""
+        values: dict[str, Any] = {}
+        syncs: dict[str, SyncRef] = {}
+        foreign: dict[str, str] = {}
+        faults: list[str] = []
+        known = shape.attributes
+        points = cls.sync_points if timed else ()
+        items: Any = element.items()
+        for name, text in items:
+            spec = known.get(name)
+            try:
+                if spec is not None:
+                    value = spec.value
+                    values[spec.field] = self.reference(text) if value is sync_ref else value.read(text)
+                elif name in points:
+                    syncs[name] = self.reference(text)
+                else:
+                    foreign[name] = text
+            except _BadReference as wrong:
+                faults.append(f"{name}: {wrong}")
+            except ValueError:
+                wanted = spec.value.wanted if spec is not None else ""
+                faults.append(f"{name}: {unwanted(wanted, text, shown(text))}")
+        has_syncs = "syncs" in shape.names
+        for spec in shape.required:
+            if spec.field in values or spec.name in element.attrib:
+                continue
+            if spec.name == "id" and has_syncs and not timed:
+                values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
+            else:
+                faults.append(f"{spec.name}: wanted {spec.value.wanted}, got none")
+        if faults:
+            raise Fault("; ".join(faults), element)
+        if has_syncs:
+            values["syncs"] = syncs
+            values["foreign"] = foreign
+        return values
+
+    def reference(self, text: str) -> SyncRef:
+        try:
+            return read_sync_ref(text, self.names)
+        except ValueError as wrong:
+            raise _BadReference(str(wrong)) from None
+
+    def children(self, shape: Shape, element: etree._Element, values: dict[str, Any]) -> None:
+        """Child elements into the fields of `values`."""
+        found: dict[str, list[Any]] = {}
+        descriptions: list[Description] = []
+        self.no_text(element)
+        for child in element:
+            tag = self.tag(child)
+            if tag == _DESCRIPTION and "descriptions" in shape.names:
+                descriptions.append(self.description(child))
+                continue
+            spec = shape.by_tag.get(tag)
+            if spec is None and tag.startswith(_OURS[0]):
+                spec = shape.by_local.get(local(tag))
+            if spec is not None:
+                found.setdefault(spec[0].field, []).append(self.node(spec[1], child))
+            elif tag.startswith(_OURS):
+                raise Fault(f"wanted {shape.listed}, got <{local(tag)}>", child)
+            # Others' elements, such as <bmlt:parameter>, are for others.
+        for kind in shape.children:
+            nodes = found.get(kind.field, [])
+            if len(nodes) < kind.least:
+                raise Fault(f"wanted {shape.listed}, got none", element)
+            if kind.many:
+                values[kind.field] = tuple(nodes)
+            elif len(nodes) > 1:
+                raise Fault(f"wanted one <{local(kind.classes[0].tag)}>, got {len(nodes)}", element)
+            elif nodes:
+                values[kind.field] = nodes[0]
+        if descriptions:
+            values["descriptions"] = tuple(descriptions)
+
+    def no_text(self, element: etree._Element) -> None:
+        loose = loose_text(element)
+        if loose:
+            hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
+            raise Fault(f"wanted elements, got the text {shown(loose)}{hint}", element)
+
+    def mixed(self, shape: Shape, element: etree._Element) -> Iterator[Any]:
+        """text := (characters | sync)*, blanks kept."""
+        if element.text:
+            yield element.text
+        for child in element:
+            spec = shape.by_tag.get(self.tag(child))
+            if spec is None:
+                raise Fault(f"wanted text and {shape.listed}, got <{local(str(child.tag))}>", child)
+            yield self.node(spec[1], child)
+            if child.tail:
+                yield child.tail
+
+    def text(self, element: etree._Element) -> str:
+        if len(element):
+            raise Fault(f"wanted text, got <{local(str(element[0].tag))}>", element[0])
+        return element.text or ""
+
+    # description := any XML
+
+    def description(self, element: etree._Element) -> Description:
+        values = self.attributes(Description, shape_of(Description), element, False)
+        if values["type"] == _SSML:
+            speak = [c for c in element if local(str(c.tag)) == "speak"]
+            if len(speak) != 1:
+                raise Fault(f"wanted one <speak> for {_SSML}, got {len(speak) or 'none'}", element)
+            return Description(**values, content=_canonical(speak[0]))
+        inside = [escape(element.text or "")]
+        for child in element:
+            inside += (_canonical(child), escape(child.tail or ""))
+        return Description(**values, content="".join(inside))
+
+    # constraint := (synchronize | before | after)+
+
+    def constraint(self, element: etree._Element) -> dict[str, Any]:
+        """The id and parts of a constraint, by field."""
+        values = self.attributes(Constraint, shape_of(Constraint), element, False)
+        self.no_text(element)
+        values["parts"] = tuple(self.constraint_part(child) for child in element)
+        if not values["parts"]:
+            raise Fault("wanted <synchronize>, <before> or <after>, got none", element)
+        return values
+
+    def constraint_part(self, element: etree._Element) -> Synchronize | Before | After:
+        cls = _PARTS.get(self.tag(element))
+        if cls is None:
+            got = local(str(element.tag))
+            raise Fault(f"wanted <synchronize>, <before> or <after>, got <{got}>", element)
+        self.no_text(element)
+        refs = tuple(self.sync(child) for child in element)
+        if not refs:
+            raise Fault("wanted at least one <sync>, got none", element)
+        if cls is Synchronize:
+            # Drafts name one of the points in an attribute.
+            return Synchronize(refs=((self.ref(element),) if "ref" in element.attrib else ()) + refs)
+        return (After if cls is After else Before)(ref=self.ref(element), refs=refs)
+
+    def sync(self, element: etree._Element) -> SyncRef:
+        if self.tag(element) != _SYNC:
+            raise Fault(f"wanted <sync>, got <{local(str(element.tag))}>", element)
+        return self.ref(element)
+
+    def ref(self, element: etree._Element) -> SyncRef:
+        text = element.get("ref")
+        if text is None:
+            raise Fault("ref: wanted a sync reference, got none", element)
+        try:
+            return self.reference(text)
+        except _BadReference as wrong:
+            raise Fault(f"ref: {wrong}", element) from None
+
+
+def loose_text(element: etree._Element) -> str:
+    """Character data of an element that should hold elements only; "" where there is none."""
+    text = element.text
+    if text and not text.isspace():
+        return text.strip()
+    for child in element:
+        text = child.tail
+        if text and not text.isspace():
+            return text.strip()
+    return ""
+
+
+def _canonical(element: etree._Element) -> str:
+    """An element as text that does not depend on what stands around it."""
+    return etree.tostring(element, method="c14n", exclusive=True, with_tail=False).decode()
