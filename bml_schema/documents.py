@@ -74,8 +74,7 @@ def parse(
         raise first
     if strict and first.problems:
         problem = first.problems[0]
-        said = problem.text.partition(f"{problem.path}: ")[2] or problem.text
-        raise BMLError(said, line=problem.line, path=problem.path, block=first.id)
+        raise BMLError(problem.text, line=problem.line, path=problem.path, block=first.id)
     return first
 
 

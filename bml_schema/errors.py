@@ -73,7 +73,7 @@ class Problem:
     Attributes:
         id: "block:behaviour" ("block:path" for a behaviour without id), a constraint's id, or the block's.
         type: BML warning type, such as PARSING_FAILURE.
-        text: what was wanted and what came, with line and path in front.
+        text: what was wanted and what came, without the place; str(problem) has it in front.
         line, path: where.
         lost: what vanished with it: "behaviour:sync" for a reference, a constraint's id or path.
         fatal: the whole block goes, because it was inside <required>.
@@ -88,7 +88,7 @@ class Problem:
     fatal: bool = False
 
     def __str__(self) -> str:
-        return self.text
+        return at(self.line, self.path, self.text)
 
 
 _LONGEST_SHOWN = 60  # characters of a value in a message; enough to find it, never a flood

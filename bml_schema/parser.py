@@ -19,7 +19,6 @@ from bml_schema.errors import (
     BMLError,
     Place,
     Problem,
-    at,
     shown,
 )
 from bml_schema.losses import Losses
@@ -268,9 +267,8 @@ class _Reader:
     ) -> None:
         where = _path_below(fault.element, element, path)
         line = self.line(fault.element)
-        text = at(line, where, fault.text)
         self.problems.append(
-            Problem(id=id, type=fault.type, text=text, line=line, path=where, fatal=required)
+            Problem(id=id, type=fault.type, text=fault.text, line=line, path=where, fatal=required)
         )
 
     def line(self, element: etree._Element) -> int:
