@@ -24,16 +24,14 @@ class Losses:
         self.gone = gone
         self.lost: dict[str, list[str]] = {}
         self.fatal: set[str] = set()
-        self._touched: set[str] = set()
 
     def without(self, node: Behaviour | Constraint) -> Behaviour | Constraint | None:
-        """The node without references to what is gone; None if nothing of a constraint is left."""
+        """The node without references to what is gone; None for a constraint that names it."""
         return self._constraint(node) if isinstance(node, Constraint) else self._behaviour(node)
 
     def _is_gone(self, ref: SyncRef, name: str) -> bool:
         if ref.block is not None or ref.behaviour not in self.gone or ref.behaviour is None:
             return False
-        self._touched.add(ref.behaviour)
         names = self.lost.setdefault(ref.behaviour, [])
         if name not in names[-1:]:
             names.append(name)
@@ -56,21 +54,9 @@ class Losses:
 
     def _constraint(self, node: Constraint) -> Constraint | None:
         name = node.id or (node.place.path if node.place else "constraint")
-        self._touched = set()
-        parts = []
-        changed = False
-        for part in node.parts:
-            refs = tuple(ref for ref in part.refs if not self._is_gone(ref, name))
-            anchor = not isinstance(part, Synchronize) and self._is_gone(part.ref, name)
-            if len(refs) == len(part.refs) and not anchor:
-                parts.append(part)
-                continue
-            changed = True
-            # Two points can still be equal when a third is gone; one alone says nothing.
-            if not anchor and len(refs) >= (2 if isinstance(part, Synchronize) else 1):
-                parts.append(replace(part, refs=refs))
-        if not changed:
-            return node
+        refs = [ref for part in node.parts for ref in part.refs]
+        refs += [part.ref for part in node.parts if not isinstance(part, Synchronize)]
+        gone = {ref.behaviour for ref in refs if self._is_gone(ref, name) and ref.behaviour}
         if node.required:
-            self.fatal |= self._touched
-        return replace(node, parts=tuple(parts)) if parts else None
+            self.fatal |= gone
+        return None if gone else node

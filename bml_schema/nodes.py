@@ -154,7 +154,7 @@ class Block:
         children: in document order.
         foreign: attributes this version does not know, by Clark name.
         problems: what was dropped while parsing; not part of ==.
-        places: behaviour id -> line and path; not part of ==.
+        places: behaviour or constraint id -> line and path; not part of ==.
         behaviours: all, in document order, those inside <required> too.
         constraints: all, in document order, those inside <required> too.
         required: ids of the behaviours inside <required>.

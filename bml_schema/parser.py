@@ -74,6 +74,9 @@ def read_block(
         if node is not None:
             nodes[n] = node
     reader.prune(nodes)
+    for node in nodes.values():
+        if isinstance(node, Constraint) and node.id and node.place:
+            reader.places.setdefault(node.id, node.place)
     return Block(
         **values,
         children=_grouped(tree, nodes),
@@ -187,7 +190,9 @@ class _Reader:
             return None
         if self.elements.vocabulary[tag].marks:
             syncs = (s for child in element if self.elements.tag(child) == SpeechText.tag for s in child)
-            marks = (s.get("id", "").strip() for s in syncs if self.elements.tag(s) == Sync.tag)
+            marks = [s.get("id", "").strip() for s in syncs if self.elements.tag(s) == Sync.tag]
+            # A description may name points that the core text leaves out.
+            marks += [m.get("name", "").strip() for m in element.iterdescendants("{*}mark")]
             return Points((*points.names, *marks))
         times = element.get("repetition")
         if times is not None and "stroke" in points.names and times.isdecimal() and len(times) < 6:
