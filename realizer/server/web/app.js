@@ -147,7 +147,7 @@ status("connecting", "Connecting");
 examples().catch((error) => log.error({ message: `examples: ${error.message}` }));
 fetch("look.json")
   .then((answer) => (answer.ok ? answer.json() : null))
-  .then((look) => look && stage.light(look))
+  .then((look) => look && stage.light(look.light))
   .catch(() => undefined); // the stage keeps its own light
 link.connect();
 requestAnimationFrame(draw);
