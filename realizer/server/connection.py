@@ -29,7 +29,7 @@ class FrameSubscription:
 
 @dataclass(eq=False)
 class SoundSubscription:
-    """Sound packets: `next` is the packet to send, `sent` the last few that went out, to know what changed."""
+    """Sound packets: `next` is the one to send, `sent` the last few that went out."""
 
     sound: Sound
     index: int

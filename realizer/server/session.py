@@ -1,4 +1,4 @@
-"""One session: documents and control messages in, effects out. No sockets, no clock; every call is told `now`."""
+"""One session: documents and control messages in, effects out. No sockets, no clock: it is told `now`."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ class Session:
         return tuple(self._connections)
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
-        """A client joins; with `seen` it gets the feedback that followed, otherwise what comes from now on."""
+        """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
         self._connections[connection] = Connection(connection, self._seq + 1)
         self.empty_since = None
         if seen is not None:
@@ -220,7 +220,7 @@ class Session:
             self._publish(t)
 
     def next_deadline(self) -> float | None:
-        """When `tick` is next wanted, on the caller's clock; at once is in the past; None when nothing waits."""
+        """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
         if self.closed:
             return None
         if self._inbox:

