@@ -201,11 +201,11 @@ def _ears(ground: Ground) -> dict[int, Float64]:
     for side, names in {1: ("10.1", "10.3", 65, 67), -1: ("10.2", "10.4", 66, 68)}.items():
         top, back, up, pull = names
         centre = (ground.point(top) + ground.point("10.5" if side > 0 else "10.6")) / 2
-        reach = ground.ellipsoid(centre + [0.006 * side, 0, -0.004], (0.022, 0.060, 0.036), 0.45)
+        reach = ground.ellipsoid(centre + [0.006 * side, 0, -0.004], (0.022, 0.046, 0.030), 0.45)
         reach = ground.smoothed(reach, 1)[:, None]
         out[up] = scaled(reach * UP, points[top], UP)
         # Pulled out, the ear swings about its front edge.
-        swing = reach * smooth(centre[2] - ground.at[:, 2], -0.024, 0.018)[:, None]
+        swing = reach * smooth(centre[2] - ground.at[:, 2], -0.016, 0.010)[:, None]
         out[pull] = scaled(swing * side * LEFT, points[back], side * LEFT)
     return out
 

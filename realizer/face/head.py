@@ -12,11 +12,11 @@ __all__: list[str] = []
 
 # Where the hair begins, as (degrees from the front, metres above the eyes); ours, drawn on the base mesh.
 HAIRLINE = (
-    (0, 0.065), (18, 0.0655), (32, 0.062), (46, 0.051), (57, 0.038), (64, 0.020), (69, 0.004), (74, -0.006),
-    (80, -0.010), (95, -0.014), (110, -0.018), (124, -0.030), (136, -0.050), (150, -0.060), (180, -0.068),
+    (0, 0.0645), (18, 0.0645), (32, 0.060), (46, 0.048), (57, 0.032), (64, 0.014), (69, -0.002), (74, -0.014),
+    (80, -0.018), (95, -0.022), (110, -0.026), (124, -0.038), (136, -0.054), (150, -0.063), (180, -0.072),
 )  # fmt: skip
 # The hair leaves the ear free: an ellipse in the side view, (y, z) of its middle and its half axes, metres.
-EAR = ((0.001, -0.082), (0.0475, 0.0335))
+EAR = ((-0.018, -0.0725), (0.0320, 0.0205))
 AXIS = -0.062  # z of the upright axis that the degrees are counted about
 
 
@@ -45,7 +45,9 @@ def hair(skin: Patch, base: Float64, colour: list[float], skin_colour: list[floa
     high = above_hairline(at)
     ups = vertex_normals(at, piece.triangles)
     crown = smooth(at[:, 1], 0.02, 0.10)
-    thick = -0.0012 + 0.0048 * smooth(high, 0, 0.010) + (0.005 + 0.012 * crown) * smooth(high, 0.004, 0.05)
+    # Fullest along the middle, close at the temples: a rounded head, not a box.
+    crown = crown * np.clip(1 - (at[:, 0] / 0.075) ** 2, 0, 1)
+    thick = -0.0012 + 0.0048 * smooth(high, 0, 0.010) + (0.005 + 0.013 * crown) * smooth(high, 0.004, 0.05)
     # Locks: the surface waves along the way the hair is combed.
     comb = np.arctan2(at[:, 0], at[:, 1] + 0.01)
     thick += 0.0007 * np.sin(comb * 34) * smooth(high, 0.006, 0.02)

@@ -32,12 +32,25 @@ APART = 0.00005  # m that is left between closed lips
 ARC = 0.30  # metres forwards for each metre that the lower lip rises: it moves on the jaw's arc
 
 
+def _stretch() -> tuple[Float64, Float64]:
+    # Place along the lip -> place between the knots; the knots at 0, 0.5 and 1 stay where they are.
+    u = np.linspace(0, 1, 200)
+    mixed = 0.5 * u + 0.5 * np.arcsin(u) / (np.pi / 2)
+    half = float(np.interp(0.5, u, mixed))
+    return u, np.where(mixed < half, mixed / half / 2, 0.5 + (mixed - half) / (1 - half) / 2)
+
+
+_STRETCH = _stretch()
+
+
 def hats(u: Any) -> Float64:
     """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; each 1 at its knot, 0 at the others, sum 1.
 
     Their sum being 1 everywhere is what keeps a lip whose FAPs are equal from bending into a w.
     """
     u = np.clip(np.asarray(u, float), -1, 1)
+    # Half-way to an ellipse's angle: an open mouth is round at its corners, a smile still runs into them.
+    u = np.sign(u) * np.interp(np.abs(u), *_STRETCH)
     piece = np.clip(np.floor((u + 1) * 2).astype(int), 0, 3)
     t = (u + 1) * 2 - piece
     out = np.zeros((KNOTS, len(u)))

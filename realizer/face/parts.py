@@ -52,7 +52,7 @@ def grid(rows: int, columns: int, closed: bool = False) -> Int32:
 
 
 PUPIL, IRIS = 2.05, 6.35  # mm, radii on the ball
-SEGMENTS = 36
+SEGMENTS = 32
 
 
 def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[float]], inward: float) -> Part:
@@ -66,7 +66,7 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     # Radii in mm on the flat of the eye, then angles: close together where the colour jumps.
     flat = [1.0, PUPIL - 0.05, PUPIL + 0.18, 3.2, 4.4, 5.4, 5.9, IRIS, IRIS + 0.45, 8.2, 10.2, 12.0]
     names = ["pupil", "pupil", "iris_inner", "iris_inner", "iris_middle", "iris_outer", "ring", "ring", "white"]
-    angles = [float(np.arcsin(r / 1000 / radius)) for r in flat] + [1.15, 1.4, 1.75]
+    angles = [float(np.arcsin(r / 1000 / radius)) for r in flat] + [1.15, 1.6]
     turn = np.arange(SEGMENTS) * 2 * np.pi / SEGMENTS
     points, colours = [np.array([[0, 0, 1.0]])], [np.array([look["pupil"]], float)]
     for k, angle in enumerate(angles):
@@ -170,23 +170,27 @@ def brow_curve(points: dict[str, Float64], side: float) -> tuple[Any, Any]:
     """x stations and heights of a brow's middle line from the inner end to the outer, |x|."""
     a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
     x = np.abs([a[0] - np.sign(a[0]) * 0.001, (a[0] + b[0]) / 2, b[0], c[0] + np.sign(c[0]) * 0.0015])
-    y = np.array([a[1], (a[1] + b[1]) / 2 + 0.0012, b[1], c[1]])
+    # The points lie on the bone; a calm brow begins a little higher and arches a little less.
+    y = np.array([a[1] + 0.0016, (a[1] + b[1]) / 2 + 0.0012, b[1] - 0.0010, c[1] - 0.0004])
     return x, y
 
 
 def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, colour: list[float]) -> Part:
     """A brow: the skin along the feature points, cut to a tapered shape and lifted off a little."""
+    from scipy.interpolate import PchipInterpolator
+
     vertices = patch.positions(base)
     x, y = brow_curve(points, side)
+    curve = PchipInterpolator(x, y)
     near = (vertices[:, 0] * side > 0.004) & (vertices[:, 1] > 0.004) & (vertices[:, 1] < 0.04) & (vertices[:, 2] > -0.02)
     piece = patch.kept(near[patch.triangles].all(axis=1))
-    piece = piece.subdivided()[0].subdivided()[0]
+    piece = piece.subdivided(flat=True)[0].subdivided(flat=True)[0]
 
     def height(at: Float64) -> Float64:
         across = at[:, 0] * side
         t = (across - x[0]) / (x[-1] - x[0])
-        middle = np.interp(across, x, _spline(x, y)(x)) if len(x) < 3 else _spline(x, y)(np.clip(across, x[0], x[-1]))
-        half = 0.0036 * np.sqrt(smooth(t, -0.02, 0.30)) * (1 - 0.80 * smooth(t, 0.40, 1.02))
+        middle = curve(np.clip(across, x[0], x[-1]))
+        half = 0.0036 * smooth(t, -0.06, 0.24) ** 0.7 * (1 - 0.78 * smooth(t, 0.40, 1.02))
         outside = np.maximum(np.maximum(-t, t - 1), 0) * 0.05
         return half - np.abs(at[:, 1] - middle) - outside
 
@@ -194,7 +198,7 @@ def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, c
     at = piece.positions(base)
     ups = vertex_normals(at, piece.triangles)
     inner = np.clip(height(at), 0, 0.003)
-    piece = piece.moved(ups * (0.0003 + 0.25 * inner)[:, None])
+    piece = piece.moved(ups * (0.0006 + 0.20 * inner)[:, None])
     hair = 1 + 0.16 * np.sin(at[:, 0] * 2600 + at[:, 1] * 1500)
     t = np.clip((at[:, 0] * side - x[0]) / (x[-1] - x[0]), 0, 1)
     # Thinner, hence lighter, at the inner end and along the edge.
@@ -202,12 +206,6 @@ def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, c
     tint = np.array(colour, float) * hair[:, None]
     tint = tint * (1 - thin[:, None]) + np.array([178, 134, 112.0]) * thin[:, None]
     return Part("brows", piece, piece.positions(base), piece.triangles, tint, np.full(len(piece), 0.05))
-
-
-def _spline(x: Any, y: Any) -> Any:
-    from scipy.interpolate import PchipInterpolator
-
-    return PchipInterpolator(x, y)
 
 
 def lashes(base: Float64, margin: list[int], centre: Float64, colour: list[float]) -> Part:
@@ -223,8 +221,8 @@ def lashes(base: Float64, margin: list[int], centre: Float64, colour: list[float
     out = at - centre
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     side = np.sign(centre[0])
-    length = 0.0010 + 0.0030 * smooth(t, 0.05, 0.75) * (1 - 0.35 * smooth(t, 0.9, 1.0))
-    way = out * 0.8 + np.array([0.30 * side, 0.30, 0.35]) * smooth(t, 0, 0.8)[:, None] + np.array([0, 0, 0.3])
+    length = 0.0008 + 0.0026 * smooth(t, 0.05, 0.70) * (1 - 0.80 * smooth(t, 0.78, 1.0))
+    way = out * 0.8 + np.array([0.12 * side, 0.30, 0.35]) * smooth(t, 0, 0.8)[:, None] + np.array([0, 0, 0.3])
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     root = out * 0.00025
     rows = np.concatenate([margin, margin])

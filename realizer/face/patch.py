@@ -97,8 +97,12 @@ class Patch:
         mix = mix[used]
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
-    def subdivided(self) -> tuple[Patch, sp.csr_matrix]:
-        """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed."""
+    def subdivided(self, flat: bool = False) -> tuple[Patch, sp.csr_matrix]:
+        """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed.
+
+        Args:
+            flat: new vertices stay on the old triangles: for what lies on another surface.
+        """
         ends: dict[tuple[int, int], list[int]] = {}
         for a, b, c in self.triangles.tolist():
             for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
@@ -119,7 +123,7 @@ class Patch:
         for (p, q), others in ends.items():
             near[p].append(q)
             near[q].append(p)
-            if len(others) == 2:
+            if len(others) == 2 and not flat:
                 put(number[p, q], {p: 3 / 8, q: 3 / 8, others[0]: 1 / 8, others[1]: 1 / 8})
             else:
                 put(number[p, q], {p: 1 / 2, q: 1 / 2})
@@ -128,6 +132,8 @@ class Patch:
         for i in range(n):
             around, share = (rim[i], 1 / 8) if i in rim else (near[i], 3 / (8 * max(len(near[i]), 3)))
             if i in rim and len(around) != 2:
+                around = []
+            if flat:
                 around = []
             put(i, {i: 1 - share * len(around)} | {j: share for j in around})
 
