@@ -52,7 +52,7 @@ def bundle() -> None:
     if not npm:
         # The scripts npm starts look for `node` on the PATH.
         environment["PATH"] = os.pathsep.join([str(_node_folder()), environment.get("PATH", "")])
-    for step in (["ci"], ["run", "build"]):
+    for step in (["ci", "--ignore-scripts"], ["run", "build"]):
         try:
             done = subprocess.run(
                 [*command, *step], cwd=WEB, env=environment, capture_output=True, text=True, timeout=TIMEOUT
@@ -67,8 +67,8 @@ def bundle() -> None:
 
 def _failed(step: list[str], words: str) -> str:
     return (
-        f"The page could not be bundled: `npm {' '.join(step)}` in {WEB} failed. It needs Node 18 or later and "
-        f"npm's registry. Set {SKIP}=1 to build without the page; everything else works.\n{words}"
+        f"The page could not be bundled: `npm {' '.join(step)}` in {WEB} failed. It needs Node 18 or "
+        f"later and npm's registry. Set {SKIP}=1 to build without the page; everything else works.\n{words}"
     )
 
 
@@ -84,7 +84,8 @@ def _current() -> bool:
 
 def _hash() -> str:
     digest = hashlib.sha256()
-    for path in sorted(p for p in WEB.iterdir() if p.suffix in (".js", ".css", ".html", ".json")):
+    own = [p for p in WEB.iterdir() if p.suffix in (".css", ".html", ".json")]
+    for path in sorted([*own, *(WEB / "src").iterdir()]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 

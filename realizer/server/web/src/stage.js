@@ -1,11 +1,11 @@
 // The face in WebGL: rest mesh from the GLB, vertices from the stream, the light of the stills.
-import { BufferAttribute, DoubleSide, PerspectiveCamera, Scene, ShaderMaterial, Vector3, WebGLRenderer } from "three";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, Scene, ShaderMaterial, Spherical, Vector3, WebGLRenderer } from "three";
+import { readGlb } from "./glb.js";
 import { fragment, lightUniforms, vertex } from "./light.js";
 
 const KEPT = 60; // frames
-const EYES = 0.0625; // m; the distance of the eyes that the framing below was made for
-const VIEW = { distance: 1.8, middle: -0.03, height: 0.37, width: 0.25 }; // m
+// The width of the head over the height of the front camera's picture: narrower pictures step back.
+const HEAD = 0.66;
 const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
 
 export class Stage {
@@ -14,38 +14,37 @@ export class Stage {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(12, 1, 0.1, 10);
-    this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, uniforms: lightUniforms(), side: DoubleSide });
+    this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
     this.frames = [];
-    this.scaleOfFace = 1;
+    this.shownFrames = 0;
     this.want = { yaw: 0, pitch: 0, zoom: 1 };
     this.view = { yaw: 0, pitch: 0, zoom: 1 };
     this.turn();
   }
 
-  light(look) {
-    this.material.uniforms = lightUniforms(look);
-    this.material.needsUpdate = true;
-  }
-
-  // Show the face behind `url`; stream positions are int16 x scale + offset.
-  async load(url, scale, offset) {
-    const { scene } = await new GLTFLoader().loadAsync(url);
-    let mesh = null;
-    scene.traverse((node) => (mesh ??= node.isMesh ? node : null));
-    if (!mesh) throw new Error("the file holds no mesh");
-    mesh.material = this.material;
-    mesh.frustumCulled = false;
-    const { geometry } = mesh;
-    const count = geometry.attributes.position.count;
-    for (const [name, value] of [["_occlusion", 1], ["_gloss", 0]]) {
-      if (!geometry.attributes[name]) geometry.setAttribute(name, new BufferAttribute(new Float32Array(count).fill(value), 1));
-    }
-    this.scaleOfFace = (mesh.userData.fapu?.es0 ?? EYES) / EYES;
-    this.scale = scale;
-    this.offset = offset;
-    if (this.mesh) this.scene.remove(this.mesh);
-    this.mesh = mesh;
-    this.scene.add(mesh);
+  // Show a face by name; stream positions are int16 x scale + offset.
+  async load(name, scale, offset) {
+    const path = encodeURIComponent(name);
+    const [look, glb] = await Promise.all([
+      fetch(`look.json?face=${path}`).then((answer) => checked(answer).json()),
+      fetch(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
+    ]);
+    const { attributes, indices } = readGlb(glb);
+    const geometry = new BufferGeometry();
+    const put = (as, { array, size, normalized }) => geometry.setAttribute(as, new BufferAttribute(array, size, normalized));
+    put("position", { array: new Float32Array(attributes.POSITION.array), size: 3 });
+    put("albedo", attributes.COLOR_0);
+    put("occlusion", attributes._OCCLUSION);
+    put("gloss", attributes._GLOSS);
+    geometry.setIndex(new BufferAttribute(indices, 1));
+    geometry.computeVertexNormals();
+    this.material.uniforms = lightUniforms(look.light);
+    Object.assign(this, { preset: look.camera, scale, offset });
+    this.mesh?.geometry.dispose();
+    this.scene.clear();
+    this.mesh = new Mesh(geometry, this.material);
+    this.mesh.frustumCulled = false;
+    this.scene.add(this.mesh);
   }
 
   reset() {
@@ -60,8 +59,9 @@ export class Stage {
   }
 
   draw(playhead) {
+    if (!this.mesh) return;
     this.fit();
-    if (this.mesh && playhead !== null) this.pose(playhead);
+    if (playhead !== null) this.pose(playhead);
     const ease = 0.18;
     for (const axis of ["yaw", "pitch", "zoom"]) this.view[axis] += (this.want[axis] - this.view[axis]) * ease;
     this.aim();
@@ -84,6 +84,7 @@ export class Stage {
     for (let i = 0; i < out.length; i++) out[i] = (a.values[i] + (b.values[i] - a.values[i]) * t) * scale + offset[i % 3];
     position.needsUpdate = true;
     this.mesh.geometry.computeVertexNormals();
+    this.shownFrames += 1;
   }
 
   fit() {
@@ -97,17 +98,19 @@ export class Stage {
   }
 
   aim() {
-    const size = this.scaleOfFace;
-    const aspect = this.width / Math.max(1, this.height);
-    const tall = Math.max(VIEW.height, VIEW.width / aspect) * size / this.view.zoom;
-    const distance = VIEW.distance * size;
-    const { yaw, pitch } = this.view;
-    const middle = new Vector3(0, VIEW.middle * size, -0.06 * size * Math.min(1, Math.abs(yaw)));
-    this.camera.position.set(Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)).multiplyScalar(distance).add(middle);
-    this.camera.lookAt(middle);
-    this.camera.aspect = aspect;
-    this.camera.fov = (2 * Math.atan(tall / 2 / distance) * 180) / Math.PI;
-    this.camera.updateProjectionMatrix();
+    const { preset, view, camera } = this;
+    const target = new Vector3(...preset.target);
+    const away = new Spherical().setFromVector3(new Vector3(...preset.position).sub(target));
+    away.theta += view.yaw;
+    away.phi = Math.min(2.8, Math.max(0.3, away.phi - view.pitch));
+    camera.position.setFromSpherical(away).add(target);
+    camera.aspect = this.width / Math.max(1, this.height);
+    const half = (Math.tan((preset.fovy * Math.PI) / 360) * Math.max(1, HEAD / camera.aspect)) / view.zoom;
+    camera.fov = (2 * Math.atan(half) * 180) / Math.PI;
+    camera.near = preset.near;
+    camera.far = preset.far;
+    camera.lookAt(target);
+    camera.updateProjectionMatrix();
   }
 
   // Orbit by drag, wheel and keys.
@@ -141,4 +144,9 @@ export class Stage {
       limit();
     });
   }
+}
+
+function checked(answer) {
+  if (!answer.ok) throw new Error(`${answer.url}: ${answer.status}`);
+  return answer;
 }

@@ -7,6 +7,7 @@ import { Sound } from "./sound.js";
 import { Stage } from "./stage.js";
 
 const MESH_RATE = 30; // frames a second; the page draws between them
+const BLOCK = /(<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*)(["'])(.*?)\2/;
 const at = (id) => document.getElementById(id);
 
 const stage = new Stage(at("face"));
@@ -17,14 +18,15 @@ const score = new Score(at("score"));
 const name = new URLSearchParams(location.search).get("session") ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
 const link = new Link(name);
 
-let characters = new Map(); // index on the wire -> true; the page shows the first
+const alive = new Set(); // ids of blocks that were accepted and have not ended
+let plays = 0;
 let face = null;
 
 link.onopen = () => {
   clock.reset();
   sound.reset();
   stage.reset();
-  status("open", "Connected");
+  status("live", "Connected");
   link.ask({ type: "hello" });
   subscribe();
 };
@@ -32,6 +34,10 @@ link.onlost = () => status("lost", "Reconnecting");
 link.onfeedback = (element, seq) => {
   log.feedback(element, seq);
   score.feedback(element);
+  const id = element.getAttribute("id") ?? "";
+  if (element.localName === "predictionFeedback") for (const block of element.children) block.localName === "bml" && alive.add(block.id);
+  else if (element.localName === "warningFeedback") alive.delete(id);
+  else if (element.localName === "blockProgress" && id.endsWith(":end")) alive.delete(id.slice(0, -4));
 };
 link.onreply = (message) => {
   if (message.type === "subscribed" && message.stream === "mesh") showFace(message);
@@ -61,7 +67,7 @@ async function showFace(message) {
   if (face === key) return;
   face = key;
   try {
-    await stage.load(`faces/${encodeURIComponent(message.face)}`, message.scale, message.offset);
+    await stage.load(message.face, message.scale, message.offset);
     at("stage-note").textContent = "";
   } catch (error) {
     face = null;
@@ -72,14 +78,17 @@ async function showFace(message) {
 function status(state, text) {
   at("status").dataset.state = state;
   at("status-text").textContent = text;
-  for (const id of ["play", "replace", "stop"]) at(id).disabled = state !== "open";
+  for (const id of ["play", "replace", "stop"]) at(id).disabled = state !== "live";
 }
 
 function play(replace) {
   sound.start();
   showSound();
-  const text = at("editor").value;
-  link.send(replace ? replacing(text) : text);
+  const text = at("document").value;
+  const id = text.match(BLOCK)?.[3];
+  // An id is free again when its block has ended; until then the same document plays under a new one.
+  const own = alive.has(id) ? text.replace(BLOCK, `$1$2$3-${++plays}$2`) : text;
+  link.send(replace ? replacing(own) : own);
 }
 
 // The same document with composition="REPLACE" on its first <bml>.
@@ -133,21 +142,20 @@ async function examples() {
     button.type = "button";
     button.textContent = row.title;
     button.onclick = () => {
-      at("editor").value = row.bml;
-      at("editor").scrollTop = 0;
+      at("document").value = row.bml;
+      at("document").scrollTop = 0;
       for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
     };
     return button;
   });
-  at("examples").append(...buttons);
-  if (!at("editor").value) buttons[0]?.click();
+  at("gallery").append(...buttons);
+  if (!at("document").value) buttons[0]?.click();
 }
 
 status("connecting", "Connecting");
 examples().catch((error) => log.error({ message: `examples: ${error.message}` }));
-fetch("look.json")
-  .then((answer) => (answer.ok ? answer.json() : null))
-  .then((look) => look && stage.light(look.light))
-  .catch(() => undefined); // the stage keeps its own light
 link.connect();
 requestAnimationFrame(draw);
+
+// For whoever tests the page: what has been shown.
+globalThis.realizerPage = { stage, sound, link, clock };

@@ -1,16 +1,7 @@
 // The light of the stills as a shader: the same terms as realizer/render/light.py, a fragment at a time.
 import { Vector3 } from "three";
 
-// What is used until the service has told its own.
-const PORTRAIT = {
-  key: { direction: [-0.45, 0.51, 0.73], colour: [0.98, 0.93, 0.87], wrap: [0.42, 0.3, 0.26] },
-  fill: { direction: [0.72, 0.09, 0.68], colour: [0.2, 0.22, 0.26], wrap: [0.5, 0.5, 0.5] },
-  rim: { direction: [0.7, 0.42, -0.57], colour: [0.85, 0.88, 0.95], wrap: [0.3, 0.3, 0.3] },
-  rim_power: 3, sky: [0.25, 0.26, 0.29], ground: [0.13, 0.105, 0.09],
-  shadow: 0.55, highlight: 0.9, dull: 8, sharp: 160, exposure: 1, knee: 0.72,
-};
-
-export function lightUniforms(look = PORTRAIT) {
+export function lightUniforms(look) {
   const uniforms = {};
   for (const lamp of ["key", "fill", "rim"]) {
     for (const part of ["direction", "colour", "wrap"]) uniforms[`${lamp}_${part}`] = { value: new Vector3(...look[lamp][part]) };
@@ -22,17 +13,17 @@ export function lightUniforms(look = PORTRAIT) {
 }
 
 export const vertex = `
-attribute vec4 color;
-attribute float _occlusion;
-attribute float _gloss;
+attribute vec4 albedo;
+attribute float occlusion;
+attribute float gloss;
 varying vec3 v_normal, v_place, v_albedo;
 varying float v_occlusion, v_gloss;
 void main() {
   v_normal = normal;
   v_place = position;
-  v_albedo = color.rgb;
-  v_occlusion = _occlusion;
-  v_gloss = _gloss;
+  v_albedo = albedo.rgb;
+  v_occlusion = occlusion;
+  v_gloss = gloss;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
