@@ -93,7 +93,8 @@ def _rise_and_fall(
             keys = [(start, 0.0), (peak, (1 + overshoot) * value), (relax, value), (end, 0.0)]
             if overshoot and settled > peak:
                 keys.insert(2, (settled, value))
-            channels.append(Channel(target, *np.array(keys, np.float64).T, source=source))
+            key_times, key_values = np.array(keys, np.float64).T
+            channels.append(Channel(target, key_times, key_values, source=source))
     return tuple(channels)
 
 

@@ -1,0 +1,142 @@
+"""Layers meet as `blend` says, whatever the order of the channels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.animation.blend import blend
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
+
+ONE = np.array([0.0])
+
+
+def still(target: Target, value: float, layer: Layer = Layer.EXPRESSION) -> Channel:
+    return Channel(target, ONE, np.array([value]), layer=layer, holds=True)
+
+
+def value_of(channels: list[Channel], target: Target, time: float = 0.0) -> float:
+    return float(blend(channels, np.array([time])).values[0, target.column])
+
+
+SMILE, NOD, GAZE, JAW = au(12, "LEFT")[0], au(54)[0], au(61)[0], fap(3)
+
+targets = st.sampled_from(sorted(axis().values(), key=lambda target: target.column))
+
+
+@st.composite
+def channels(draw: st.DrawFn) -> Channel:
+    start = draw(st.floats(0.0, 2.0))
+    gaps = draw(st.lists(st.floats(0.05, 1.0), min_size=3, max_size=3))
+    values = draw(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4))
+    return Channel(
+        draw(targets),
+        np.cumsum([start, *gaps]),
+        np.array(values),
+        layer=draw(st.sampled_from(Layer)),
+        holds=draw(st.booleans()),
+    )
+
+
+many = st.lists(channels(), max_size=12)
+TIMES = np.arange(0, 5, 0.04)
+
+
+@given(many, st.randoms(use_true_random=False))
+def test_the_order_of_channels_does_not_matter(given: list[Channel], random: st.DataObject) -> None:
+    other = list(given)
+    random.shuffle(other)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(blend(given, TIMES).values, blend(other, TIMES).values, atol=1e-6)
+
+
+@given(targets, st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), st.sampled_from(Layer))
+def test_one_channel_blends_to_itself(target: Target, values: list[float], layer: Layer) -> None:
+    channel = Channel(target, np.arange(4.0), np.array([0.0, *values[1:]]), layer=layer)
+    got = blend([channel], np.arange(4.0)).values
+    np.testing.assert_array_equal(got[:, target.column], channel.values.astype(np.float32))
+    assert not np.delete(got, target.column, axis=1).any()
+
+
+@given(many)
+def test_25_frames_a_second_are_every_second_of_50(given: list[Channel]) -> None:
+    fast, slow = np.arange(0, 5, 0.02), np.arange(0, 5, 0.02)[::2]
+    np.testing.assert_array_equal(blend(given, fast).values[::2], blend(given, slow).values)
+
+
+@given(many)
+def test_action_units_and_presences_stay_within_0_and_1(given: list[Channel]) -> None:
+    values = np.delete(blend(given, TIMES).values, range(len(AU_NAMES()), len(AU_NAMES()) + 68), axis=1)
+    assert values.min() >= 0
+    assert values.max() <= 1
+
+
+def test_nothing_is_nothing() -> None:
+    frames = blend([], TIMES)
+    assert frames.values.shape == (len(TIMES), len(axis()))
+    assert frames.values.dtype == np.float32
+    assert not frames.values.any()
+    assert blend([still(SMILE, 1)], np.array([])).values.shape == (0, len(axis()))
+
+
+@pytest.mark.parametrize("layer", [Layer.IDLE, Layer.EXPRESSION, Layer.SPEECH])
+def test_the_stronger_of_two_expressions_shows(layer: Layer) -> None:
+    assert value_of([still(SMILE, 0.3, layer), still(SMILE, 0.6)], SMILE) == pytest.approx(0.6)
+
+
+def test_a_mood_shows_under_a_weaker_expression() -> None:
+    assert value_of([still(SMILE, 0.5, Layer.BASE), still(SMILE, 0.2)], SMILE) == pytest.approx(0.5)
+
+
+def test_rotations_add_up() -> None:
+    nods = [still(NOD, 0.1, Layer.HEAD), still(NOD, 0.2, Layer.HEAD), still(NOD, 0.05, Layer.IDLE)]
+    assert value_of(nods, NOD) == pytest.approx(0.35)
+
+
+def test_faps_add_up() -> None:
+    assert value_of([still(JAW, 100, Layer.SPEECH), still(JAW, 50, Layer.SPEECH)], JAW) == 150
+
+
+def test_an_old_mood_passes_evenly_into_the_new_one() -> None:
+    old = still(SMILE, 0.6, Layer.BASE).faded(1.0, 2.0)
+    new = Channel(SMILE, np.array([1.0, 2.0]), np.array([0.0, 0.6]), layer=Layer.BASE, holds=True)
+    values = blend([old, new], np.linspace(0.5, 2.5, 51)).values[:, SMILE.column]
+    assert values == pytest.approx(0.6)
+
+
+def test_a_gaze_takes_the_eyes_from_the_base_gaze_but_not_from_idle() -> None:
+    base, idle = still(GAZE, 0.5, Layer.BASE), still(GAZE, 0.02, Layer.IDLE)
+    look = [still(GAZE, 0.2, Layer.GAZE), still(presence("eyes"), 0.75, Layer.GAZE)]
+    assert value_of([base, idle, *look], GAZE) == pytest.approx(0.5 * 0.25 + 0.02 + 0.2)
+
+
+def test_a_gaze_of_the_eyes_leaves_the_head_where_it_was_turned() -> None:
+    turned = au(51)[0]
+    look = [still(GAZE, 0.2, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
+    assert value_of([still(turned, 0.4, Layer.BASE), *look], turned) == pytest.approx(0.4)
+
+
+def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:
+    left = [still(GAZE, 0.6, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
+    up = [still(au(63)[0], 0.4, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
+    assert value_of(left + up, GAZE) == pytest.approx(0.3)
+    assert value_of(left + left, GAZE) == pytest.approx(0.6)
+    assert value_of(left + up, presence("eyes")) == 1
+
+
+def test_what_is_set_directly_replaces_all_else_and_lets_go_smoothly() -> None:
+    held = Channel(SMILE, np.array([0.0, 0.1]), np.array([0.0, 0.1]), layer=Layer.DIRECT, holds=True)
+    face = [still(SMILE, 0.8), held.faded(2.0, 2.3)]
+    times = np.linspace(0, 3, 3001)
+    values = blend(face, times).values[:, SMILE.column]
+    assert values[0] == pytest.approx(0.8)
+    assert values[(times > 0.1) & (times < 2.0)] == pytest.approx(0.1)
+    assert values[-1] == pytest.approx(0.8)
+    assert np.max(np.abs(np.diff(values))) < 0.02
+
+
+def test_a_nod_set_directly_replaces_the_sum() -> None:
+    face = [still(NOD, 0.3, Layer.HEAD), still(NOD, 0.1, Layer.DIRECT)]
+    assert value_of(face, NOD) == pytest.approx(0.1)

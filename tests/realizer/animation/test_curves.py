@@ -1,0 +1,107 @@
+"""Channels hit their keys, are 0 outside, and never jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from realizer.animation.channel import Channel
+from realizer.animation.curves import CURVES, MANY_KEYS, sample, smooth, weights
+from realizer.animation.targets import au
+
+TARGET = au(12, "LEFT")[0]
+
+
+@st.composite
+def channels(draw: st.DrawFn) -> Channel:
+    keys = draw(st.integers(1, 6) | st.just(MANY_KEYS + 5))
+    gaps = draw(st.lists(st.floats(0.01, 2.0), min_size=keys, max_size=keys))
+    values = draw(st.lists(st.floats(0.0, 1.0), min_size=keys, max_size=keys))
+    begin = draw(st.floats(-5.0, 100.0))
+    return Channel(
+        TARGET,
+        begin + np.cumsum(gaps),
+        np.array(values),
+        curve=draw(st.sampled_from(sorted(CURVES))),
+        holds=draw(st.booleans()),
+    )
+
+
+@given(st.lists(channels(), min_size=1, max_size=5))
+def test_every_channel_hits_its_keys(given: list[Channel]) -> None:
+    for row, channel in enumerate(given):
+        np.testing.assert_array_equal(sample(given, channel.times)[row], channel.values)
+
+
+@given(channels(), st.floats(0.001, 50.0))
+def test_a_channel_is_zero_outside_its_keys_and_holds_where_it_says(channel: Channel, away: float) -> None:
+    before, after = sample([channel], np.array([channel.times[0] - away, channel.times[-1] + away]))[0]
+    assert before == 0
+    assert after == (channel.values[-1] if channel.holds else 0)
+
+
+@given(channels(), st.lists(st.floats(-10, 120), min_size=1, max_size=30))
+def test_a_value_does_not_depend_on_which_other_times_are_asked_nor_on_their_order(
+    channel: Channel, times: list[float]
+) -> None:
+    whole = sample([channel], np.array(times))[0]
+    alone = [sample([channel], np.array([t]))[0, 0] for t in times]
+    np.testing.assert_array_equal(whole, alone)
+
+
+@given(channels())
+def test_between_two_keys_the_value_lies_between_theirs(channel: Channel) -> None:
+    assume(len(channel.times) > 1)
+    at = (channel.times[:-1] + channel.times[1:]) / 2
+    values = sample([channel], at)[0]
+    assert np.all(values >= np.minimum(channel.values[:-1], channel.values[1:]) - 1e-12)
+    assert np.all(values <= np.maximum(channel.values[:-1], channel.values[1:]) + 1e-12)
+
+
+def test_smooth_stands_still_at_both_ends() -> None:
+    u = np.array([0.0, 1e-4, 0.5, 1 - 1e-4, 1.0])
+    assert smooth(u)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
+    assert smooth(u)[1] < 1e-10
+    assert 1 - smooth(u)[3] < 1e-10
+
+
+@given(st.floats(0.05, 2.0), st.floats(0.0, 3.0))
+def test_a_faded_channel_reaches_zero_without_a_jump(length: float, begin: float) -> None:
+    channel = Channel(TARGET, np.array([0.0, 1.0]), np.array([0.0, 1.0]), holds=True)
+    faded = channel.faded(begin, begin + length)
+    times = np.linspace(0, begin + length + 0.5, 2000)
+    values, before = sample([faded, channel], times)
+    np.testing.assert_array_equal(values[times <= begin], before[times <= begin])
+    assert np.all(values[times >= begin + length] == 0)
+    # 1.875 is the steepest of the minimum-jerk curve; rise and fade may meet.
+    assert np.max(np.abs(np.diff(values))) <= 1.9 * (times[1] - times[0]) * (1 + 1 / length)
+
+
+def test_a_held_channel_faded_while_another_rises_passes_evenly_into_it() -> None:
+    old = Channel(TARGET, np.array([0.0]), np.array([0.7]), holds=True).faded(1.0, 2.0)
+    new = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.0, 0.7]), holds=True)
+    assert sample([old, new], np.linspace(0, 3, 61)).sum(axis=0) == pytest.approx(0.7)
+
+
+def test_of_two_keys_at_one_time_the_later_counts() -> None:
+    channel = Channel(TARGET, np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 0.2, 0.8, 0.0]), curve="linear")
+    assert sample([channel], np.array([0.999999, 1.0, 1.5]))[0] == pytest.approx([0.2, 0.8, 0.4], abs=1e-5)
+
+
+def test_no_times_and_no_channels_are_no_values() -> None:
+    assert sample([], np.array([0.0, 1.0])).shape == (0, 2)
+    assert sample([Channel(TARGET, np.array([0.0]), np.array([1.0]))], np.array([])).shape == (1, 0)
+
+
+def test_an_unknown_curve_is_a_key_error() -> None:
+    with pytest.raises(KeyError, match="wobbly"):
+        sample([Channel(TARGET, np.array([0.0]), np.array([1.0]), curve="wobbly")], np.array([0.0]))
+
+
+def test_weights_say_how_much_of_a_channel_is_there() -> None:
+    ends = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.3, 0.3]))
+    stays = Channel(TARGET, np.array([1.0]), np.array([0.0]), holds=True).faded(3.0, 4.0)
+    times = np.array([0.9, 1.0, 2.0, 2.1, 3.5, 4.0])
+    assert weights([ends, stays], times).tolist() == [[0, 1, 1, 0, 0, 0], [0, 1, 1, 1, 0.5, 0]]

@@ -1,0 +1,275 @@
+"""The tables agree with each other, and a bad table is refused with its place."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from importlib.resources import files
+
+import pytest
+
+from realizer import tables
+from realizer.errors import TableError
+from realizer.tables import Fap, lexemes, timing
+from realizer.units import degrees_to_angle_units
+
+FAPS = {row.fap: row for row in tables.faps()}
+AUS = tables.by_number(tables.action_units())
+ROWS = tables.au_to_fap()
+
+# MPEG-4 moves the head by angles only: it cannot come forward or go back.
+NOT_SHOWN = {57, 58}
+
+
+def polylines() -> dict[tuple[int, str, int], list[tuple[float, float]]]:
+    points: dict[tuple[int, str, int], list[tuple[float, float]]] = defaultdict(list)
+    for row in sorted(ROWS, key=lambda row: (*row.key, row.au_from)):
+        points[row.key] += [(row.au_from, row.fap_from), (row.au_to, row.fap_to)]
+    return points
+
+
+def at_one(au: int, side: str, fap: int) -> float:
+    return sum(points[-1][1] for key, points in polylines().items() if key == (au, side, fap))
+
+
+@pytest.mark.parametrize(
+    "name", [f.name for f in files(tables).iterdir() if f.name.endswith((".csv", ".toml"))]
+)
+def test_every_file_names_source_units_and_licence(name: str) -> None:
+    tables._check_head(tables.text_of(name), name)
+
+
+def test_faps_are_the_68_of_the_standard_in_order() -> None:
+    assert [row.fap for row in tables.faps()] == list(range(1, 69))
+    sizes = defaultdict(int)
+    for row in tables.faps():
+        sizes[row.group] += 1
+    assert list(sizes.values()) == [2, 16, 12, 8, 4, 5, 3, 10, 4, 4]
+
+
+def test_only_the_five_unidirectional_faps_stop_at_zero() -> None:
+    assert {row.fap for row in tables.faps() if row.least == 0 and row.most > 0} == {3, 14, 41, 42, 47}
+
+
+@pytest.mark.parametrize("row", tables.faps(), ids=lambda row: row.name)
+def test_the_mirror_of_a_mirrored_fap_is_itself(row: Fap) -> None:
+    other = FAPS[row.mirror]
+    assert other.mirror == row.fap
+    assert other.sign == row.sign
+    assert (other.unit, other.group, other.speech_owns) == (row.unit, row.group, row.speech_owns)
+    assert abs(row.sign) == 1
+
+
+def test_action_units_are_numbered_once_and_upwards() -> None:
+    numbers = [row.au for row in tables.action_units()]
+    assert numbers == sorted(set(numbers))
+
+
+@pytest.mark.parametrize("key", sorted(polylines()), ids=str)
+def test_a_polyline_starts_at_rest_and_stays_whole_and_within_the_fap(key: tuple[int, str, int]) -> None:
+    au, side, fap = key
+    assert side in (("L", "R") if AUS[au].sides else ("",))
+    points = polylines()[key]
+    assert points[0][1] == 0
+    for left, right in zip(points[1:-1:2], points[2::2], strict=True):
+        assert left == right
+    assert [a for a, _ in points] == sorted(a for a, _ in points)
+    assert all(0 <= a <= 1 and math.isfinite(f) for a, f in points)
+    assert all(a < b for (a, _), (b, _) in zip(points[::2], points[1::2], strict=True))
+    assert all(FAPS[fap].least <= f <= FAPS[fap].most for _, f in points)
+    assert any(f for _, f in points)
+
+
+def test_every_action_unit_that_a_face_can_show_moves_something() -> None:
+    assert set(AUS) - {row.au for row in ROWS} == NOT_SHOWN
+
+
+def test_left_and_right_mirror_each_other() -> None:
+    lines = polylines()
+    for (au, side, fap), points in lines.items():
+        mirror = FAPS[fap]
+        if side:
+            other = lines[au, "R" if side == "L" else "L", mirror.mirror]
+        elif AUS[au].degrees:  # head and eyes: the mirror of "left" is "right"
+            opposite = {51: 52, 52: 51, 55: 56, 56: 55, 61: 62, 62: 61}.get(au, au)
+            other = lines[opposite, "", mirror.mirror]
+        else:
+            other = lines[au, "", mirror.mirror]
+        assert other == [(a, f * mirror.sign) for a, f in points]
+
+
+@pytest.mark.parametrize("au", [row.au for row in tables.action_units() if row.degrees])
+def test_a_rotation_turns_by_the_degrees_of_its_action_unit(au: int) -> None:
+    turned = {abs(row.fap_to) for row in ROWS if row.au == au and FAPS[row.fap].unit == "angle_unit"}
+    assert list(turned) == [pytest.approx(degrees_to_angle_units(AUS[au].degrees), abs=1)]
+
+
+@pytest.mark.parametrize("au", [43, 45, 46])
+@pytest.mark.parametrize(("side", "upper", "lower"), [("L", 19, 21), ("R", 20, 22)])
+def test_closed_lids_meet_exactly(au: int, side: str, upper: int, lower: int) -> None:
+    assert at_one(au, side, upper) + at_one(au, side, lower) == 1024
+
+
+@pytest.mark.parametrize(
+    ("au", "side", "fap", "sign"),
+    [
+        (1, "L", 31, 1),
+        (2, "L", 35, 1),
+        (4, "L", 31, -1),
+        (4, "L", 37, 1),
+        (5, "L", 19, -1),
+        (7, "L", 21, 1),
+        (6, "R", 42, 1),
+        (9, "L", 63, 1),
+        (10, "R", 9, -1),
+        (10, "L", 4, -1),
+        (12, "L", 12, 1),
+        (12, "L", 6, 1),
+        (15, "R", 13, -1),
+        (16, "L", 5, -1),
+        (17, "", 18, 1),
+        (18, "", 6, -1),
+        (20, "L", 53, 1),
+        (22, "", 16, 1),
+        (26, "", 3, 1),
+        (26, "", 5, -1),
+        (28, "", 17, -1),
+        (30, "L", 15, -1),
+        (35, "L", 39, -1),
+        (38, "L", 61, 1),
+        (51, "", 49, 1),
+        (54, "", 48, 1),
+        (56, "", 50, 1),
+        (61, "", 23, 1),
+        (64, "", 26, 1),
+        (64, "", 19, 1),
+    ],
+)
+def test_signs_are_those_of_mpeg_4(au: int, side: str, fap: int, sign: int) -> None:
+    assert at_one(au, side, fap) * sign > 0
+
+
+# Upper and lower lip at the same place: the gap between them is -(upper + lower).
+LIPS = [(4, 5), (8, 10), (9, 11), (51, 52), (55, 57), (56, 58)]
+
+
+@pytest.mark.parametrize("au", sorted({row.au for row in ROWS}))
+@pytest.mark.parametrize(("upper", "lower"), LIPS[:3])
+def test_no_action_unit_pushes_a_lip_through_the_other(au: int, upper: int, lower: int) -> None:
+    for side in ("L", "R", ""):
+        assert at_one(au, side, upper) + at_one(au, side, lower) <= 0
+
+
+@pytest.mark.parametrize(("upper", "lower"), LIPS)
+def test_the_jaw_drop_includes_the_parting_of_the_lips(upper: int, lower: int) -> None:
+    gaps = [-(at_one(au, "", upper) + at_one(au, "", lower)) for au in (25, 26, 27)]
+    assert gaps == sorted(gaps)
+    assert gaps[0] > 0
+
+
+def test_an_own_row_replaces_the_whole_polyline() -> None:
+    own = (tables.AuToFap(12, "L", 12, 0.0, 1.0, 0.0, 99.0),)
+    rows = tables.override(ROWS, own)
+    assert [row.fap_to for row in rows if row.key == (12, "L", 12)] == [99.0]
+    assert len(rows) == len(ROWS)
+
+
+HEAD = "# source: x\n# units: x\n# licence: x\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("au,side\n", "# source: ..."),
+        (HEAD, "wanted a header row"),
+        (HEAD + "au,side\n", "wanted columns au,side,fap,au_from"),
+        (HEAD + "au,side,fap,au_from,au_to,fap_from,fap_to\n1,L,31\n", "line 5: wanted 7 cells, got 3"),
+        (
+            HEAD + "au,side,fap,au_from,au_to,fap_from,fap_to\n1,B,31,0,1,0,1\n",
+            "line 5, side: wanted one of L, R",
+        ),
+        (HEAD + "au,side,fap,au_from,au_to,fap_from,fap_to\n1,L,x,0,1,0,1\n", "line 5, fap: wanted int"),
+    ],
+)
+def test_a_bad_table_is_refused_with_its_place(text: str, says: str) -> None:
+    with pytest.raises(TableError, match=says):
+        tables.read_csv(text, tables.AuToFap, "bad.csv")
+
+
+# --- lexemes
+
+BROWS = tuple(f"{way}_{brow}" for way in ("RAISE", "LOWER") for brow in ("BROWS", "LEFT_BROW", "RIGHT_BROW"))
+CORNERS = tuple(
+    f"{way}_{corner}"
+    for way in ("RAISE", "LOWER")
+    for corner in ("MOUTH_CORNERS", "LEFT_MOUTH_CORNER", "RIGHT_MOUTH_CORNER")
+)
+STANDARD = (*BROWS, *CORNERS, "OBLIQUE_BROWS", "OPEN_MOUTH", "OPEN_LIPS", "WIDEN_EYES", "CLOSE_EYES")
+EMOTIONS = ("ANGER", "DISGUST", "FEAR", "HAPPINESS", "JOY", "SADNESS", "SURPRISE")
+
+
+def test_the_lexemes_of_the_standard_and_the_emotions_are_there() -> None:
+    assert len(STANDARD) == 17
+    assert {*STANDARD, *EMOTIONS, "SMILE", "BLINK"} <= set(lexemes.face_lexemes())
+    assert {"NOD", "SHAKE", "TILT"} <= set(lexemes.head_lexemes())
+
+
+def test_joy_is_happiness() -> None:
+    known = lexemes.face_lexemes()
+    assert known["JOY"].aus == known["HAPPINESS"].aus
+
+
+@pytest.mark.parametrize("name", sorted(lexemes.face_lexemes()))
+def test_a_lexeme_of_one_side_mirrors_that_of_the_other(name: str) -> None:
+    swapped = {"LEFT": "RIGHT", "RIGHT": "LEFT", "BOTH": "BOTH"}
+    swap = name.replace("LEFT", "?").replace("RIGHT", "LEFT").replace("?", "RIGHT")
+    known = lexemes.face_lexemes()
+    assert known[swap].aus == {(au, swapped[side]): amount for (au, side), amount in known[name].aus.items()}
+
+
+@pytest.mark.parametrize("name", sorted(lexemes.face_lexemes()))
+def test_every_action_unit_of_a_lexeme_moves_a_fap(name: str) -> None:
+    moved = {row.au for row in ROWS}
+    assert {au for au, _ in lexemes.face_lexemes()[name].aus} <= moved
+
+
+# --- timing
+
+FACE = ("faceLexeme", "faceFacs", "face", "faceShift", "gaze", "gazeShift", "head", "headDirectionShift")
+BODY = ("gesture", "pointing", "posture", "postureShift", "locomotion", "wait")
+
+
+@pytest.mark.parametrize("element", [*FACE, *BODY])
+def test_every_element_has_its_gaps_with_a_source(element: str) -> None:
+    row = timing.gaps(element)
+    assert row.points[0] == "start"
+    assert row.points[-1] == "end"
+    assert all(gap.source and gap.stiffness > 0 and gap.preferred >= gap.least >= 0 for gap in row.gaps)
+
+
+@pytest.mark.parametrize("name", sorted(timing.all_gaps()))
+def test_a_variant_has_the_sync_points_of_its_element(name: str) -> None:
+    element, _, variant = name.partition(".")
+    assert timing.gaps(element, variant.lower()).points == timing.gaps(element).points
+
+
+def test_a_variant_without_times_of_its_own_takes_those_of_its_element() -> None:
+    assert timing.gaps("faceLexeme", "WIDEN_EYES") == timing.gaps("faceLexeme")
+    assert timing.gaps("faceLexeme", "BLINK") != timing.gaps("faceLexeme")
+
+
+def test_variants_are_lexemes_or_influences_that_exist() -> None:
+    variants = {name.split(".")[1] for name in timing.all_gaps() if "." in name}
+    assert variants <= {*lexemes.face_lexemes(), *lexemes.head_lexemes(), "EYES"}
+
+
+def test_a_nod_takes_six_to_nine_tenths_of_a_second_and_a_blink_three() -> None:
+    nod = sum(gap.preferred for gap in timing.gaps("head", "NOD").gaps)
+    assert 0.6 <= nod <= 0.9
+    assert sum(gap.preferred for gap in timing.gaps("faceLexeme", "BLINK").gaps) == pytest.approx(0.3)
+
+
+def test_every_row_class_is_frozen() -> None:
+    row = tables.faps()[0]
+    with pytest.raises(AttributeError):
+        row.fap = 2  # type: ignore[misc]
