@@ -49,6 +49,7 @@ MAY: dict[str, set[str]] = {
         "realizer.speech.utterance",
         "realizer.tables",
     },
+    "realizer.reporting": {"bml_schema", "realizer.scheduling.timing"},
     "realizer.planning": VALUES
     | {"bml_schema", "realizer.animation", "realizer.behaviours", "realizer.scheduling"},
     "realizer.player": VALUES
@@ -57,6 +58,7 @@ MAY: dict[str, set[str]] = {
         "realizer.animation",
         "realizer.behaviours",
         "realizer.planning",
+        "realizer.reporting",
         "realizer.scheduling",
         "realizer.speech.utterance",
     },
@@ -123,7 +125,8 @@ def test_imports_point_downwards(name: str, path: Path) -> None:
     rule = max((package for package in MAY if within(name, package)), key=len)
     if "*" in MAY[rule]:
         return
-    ours = {i for i in imports(path) if i.split(".")[0] in ROOTS}
+    # The bare root is a folder and a version; what it hands out is imported by its own name.
+    ours = {i for i in imports(path) if i.split(".")[0] in ROOTS and i != "realizer"}
     bad = {i for i in ours if not any(within(i, may) for may in MAY[rule]) and i != "realizer.tables"}
     allowed = {i for i in bad if i.rpartition(".")[0] == "realizer" and i in MAY[rule]}
     assert not bad - allowed, f"{name} may import {sorted(MAY[rule])}"

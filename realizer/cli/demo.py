@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 
 import click
@@ -24,6 +23,8 @@ def demo(once: bool, port: int, voice: str | None, face: str) -> None:
 
     Leaves demo.mp4 and demo.fap in the current folder.
     """
+    import asyncio
+
     from realizer.examples import examples
 
     documents = examples()

@@ -6,12 +6,13 @@ import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from realizer.behaviours.kind import Position
-from realizer.scheduling.timing import Warning
+if TYPE_CHECKING:  # loading them takes longer than `--help` should
+    from realizer.behaviours.kind import Position
+    from realizer.scheduling.timing import Warning
 
 __all__: list[str] = []
 

@@ -1,0 +1,3 @@
+"""The service: sessions that know no sockets, and the one place that does."""
+
+__all__: list[str] = []

@@ -78,4 +78,5 @@ def find_voice(name: str | None = None) -> Voice:
         if fix:
             raise VoiceError(fix)
         return EspeakVoice(voice=variant or None)
-    raise VoiceError(f"voice: wanted one of {', '.join(v.name for v in voices())}, got {name!r}")
+    known = ", ".join(v.name for v in voices())
+    raise VoiceError(f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to get them")
