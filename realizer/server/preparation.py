@@ -107,9 +107,9 @@ def _references(block: Block) -> Iterator[SyncRef]:
     for behaviour in block.behaviours:
         yield from behaviour.syncs.values()
         if isinstance(behaviour, Speech) and behaviour.text is not None:
-            for part in behaviour.text.parts:
-                if not isinstance(part, str) and part.ref is not None:
-                    yield part.ref
+            for piece in behaviour.text.parts:
+                if not isinstance(piece, str) and piece.ref is not None:
+                    yield piece.ref
     for constraint in block.constraints:
         for part in constraint.parts:
             yield from part.refs

@@ -124,12 +124,11 @@ def encode(
             return json_frame("fap", frame, time, window.integers[row].tolist(), name)
         rounded = [round(v, 4) for v in window.intensities[row].tolist()]
         return json_frame("au", frame, time, rounded, name)
-    kind, values = {
-        "fap": (FrameKind.FAP, lambda: window.integers),
-        "au": (FrameKind.AU, lambda: window.intensities),
-        "mesh": (FrameKind.MESH, lambda: window.mesh),
-    }[stream]
-    return pack(kind, frame, time, values()[row].tobytes(), character=character)
+    if stream == "fap":
+        return pack(FrameKind.FAP, frame, time, window.integers[row].tobytes(), character=character)
+    if stream == "au":
+        return pack(FrameKind.AU, frame, time, window.intensities[row].tobytes(), character=character)
+    return pack(FrameKind.MESH, frame, time, window.mesh[row].tobytes(), character=character)
 
 
 class Sound:
