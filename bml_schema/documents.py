@@ -119,7 +119,7 @@ class _Stretch(NamedTuple):
 
 
 class _Mark(NamedTuple):
-    """text[start:end] is a start tag, an end tag, or something between documents: "open", "close", "skip"."""
+    """text[start:end]: an "open", "close" or "whole" tag of <bml>, a "doctype", or to "skip" (a comment)."""
 
     kind: str
     start: int
@@ -127,82 +127,81 @@ class _Mark(NamedTuple):
 
 
 def _marks(text: str) -> Iterator[_Mark]:
-    """Tags of <bml>, DOCTYPEs, comments and processing instructions; linear in the text whatever it holds."""
+    """What decides where documents begin and end; linear in the text whatever it holds."""
     never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
-    position = 0
-    while found := _MARKS.search(text, position):
-        start, position = found.span()
+    here = 0
+    while found := _MARKS.search(text, here):
+        start, here = found.span()
         opener = found[0]
         if opener.startswith("</"):
-            position = (text.find(">", position) + 1) or position
-            yield _Mark("close", start, position)
+            here = (text.find(">", here) + 1) or here
+            yield _Mark("close", start, here)
             continue
         if opener not in _CLOSERS:
-            rest = _REST_OF_TAG.match(text, position)
-            position = rest.end() if rest else position
-            closed = rest is not None and text[position - 2] == "/"
-            yield _Mark("open", start, position)
-            if closed:
-                yield _Mark("close", position, position)
+            rest = _REST_OF_TAG.match(text, here)
+            here = rest.end() if rest else here
+            yield _Mark("whole" if rest and text[here - 2] == "/" else "open", start, here)
             continue
-        if opener == "<!DOCTYPE":
-            rest = _REST_OF_DOCTYPE.match(text, position)
-            position = rest.end() if rest else position
-            if rest is None or text[position - 1] == ">":
-                yield _Mark("doctype", start, position)
+        doctype = opener == "<!DOCTYPE"
+        if doctype:
+            rest = _REST_OF_DOCTYPE.match(text, here)
+            here = rest.end() if rest else here
+            if rest is None or text[here - 1] == ">":
+                yield _Mark("doctype", start, here)
                 continue
-        end = None if opener in never else _CLOSERS[opener].search(text, position)
-        if end is not None:
-            position = end.end()
-        else:
+        closer = None if opener in never else _CLOSERS[opener].search(text, here)
+        if closer is None:
             never.add(opener)
-        if opener == "<!DOCTYPE":
-            yield _Mark("doctype", start, position)
-        elif end is not None and opener != "<![CDATA[":
-            yield _Mark("skip", start, position)
+        else:
+            here = closer.end()
+        if doctype:
+            yield _Mark("doctype", start, here)
+        elif closer is not None and opener != "<![CDATA[":
+            yield _Mark("skip", start, here)
 
 
 def _stretches(text: str) -> Iterator[_Stretch]:
-    """Documents and what stands between them that should not, in order."""
+    """Documents, and what stands between them that should not, in order."""
     marks = list(_marks(text))
     ends: dict[int, int] = {}
     opened: list[int] = []
     for n, mark in enumerate(marks):
         if mark.kind == "open":
             opened.append(n)
+        elif mark.kind == "whole":
+            ends[n] = mark.end
         elif mark.kind == "close" and opened:
             ends[opened.pop()] = mark.end
-    opens = [m.start for m in marks if m.kind == "open"]
-    here = junk = (
-        0  # how far reading got; where the junk begins that was not told of yet, if text[junk:here] is
-    )
-    loose = False
-    doctype = False
-    seen = 0
+    roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
+    after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
+    here = 0
+    junk = doctype = -1  # where the stretch began that is not told of yet; -1 while there is none
     for n, mark in enumerate([*marks, _Mark("end", len(text), len(text))]):
-        seen += mark.kind == "open"
         if mark.start < here:
-            continue
-        if text[here : mark.start].strip(_BLANKS) and not loose:
-            junk, loose = here, True
+            continue  # inside a document
+        if junk < 0 and (gap := text[here : mark.start].lstrip(_BLANKS)):
+            junk = mark.start - len(gap)
+        if junk < 0 and mark.kind == "close":
+            junk = mark.start
+        if doctype < 0 and mark.kind == "doctype":
+            doctype = mark.start if junk < 0 else junk
         here = mark.end
-        if mark.kind == "close" and not loose:
-            junk, loose = mark.start, True
-        if mark.kind == "doctype" and not doctype:
-            junk, doctype = (junk if loose else mark.start), True
-        if mark.kind not in ("open", "end"):
+        if mark.kind not in ("open", "whole", "end"):
             continue
-        if doctype and mark.kind == "end":
-            yield _Stretch(junk, mark.start, fault=_NO_DTD)
-        elif loose and not doctype:
-            yield _Stretch(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
+        end = ends.get(n) or after.get(n, len(text))
         if mark.kind == "end":
-            return
-        start = junk if doctype else mark.start
-        end = ends.get(n) or (opens[seen] if seen < len(opens) else len(text))
-        here = max(end, mark.end) if n in ends else end
-        yield _Stretch(start, end, text[mark.start : mark.end], _NO_DTD if doctype else "")
-        loose = doctype = False
+            if doctype >= 0:
+                yield _Stretch(doctype, here, fault=_NO_DTD)
+            elif junk >= 0:
+                yield _Stretch(junk, here, fault=_not_bml(text[junk:here]))
+        elif doctype >= 0:
+            yield _Stretch(doctype, end, text[mark.start : mark.end], _NO_DTD)
+        else:
+            if junk >= 0:
+                yield _Stretch(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
+            yield _Stretch(mark.start, end, text[mark.start : mark.end])
+        here = end
+        junk = doctype = -1
 
 
 _NO_DTD = "wanted a document without DTD and entities, got <!DOCTYPE"

@@ -1,0 +1,192 @@
+"""Hypothesis strategies: whole valid blocks, as a parser could have read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from hypothesis import strategies as st
+
+from bml_schema import (
+    VOCABULARY,
+    After,
+    Before,
+    Behaviour,
+    Block,
+    Constraint,
+    Description,
+    FaceFacs,
+    FaceLexeme,
+    FaceShift,
+    Pose,
+    Required,
+    Speech,
+    SpeechText,
+    Stance,
+    Sync,
+    Synchronize,
+    SyncRef,
+    Value,
+)
+from bml_schema.behaviours import Face
+from bml_schema.shape import shape_of, sync_ref
+
+__all__ = ["attribute_values", "blocks", "descriptions", "names", "numbers", "xml_text"]
+
+_LETTERS = "abcxyzABCXYZ0123456789_.-+éß中"
+# Everything XML 1.0 can hold, and often what needs escapes.
+_CHARACTERS = st.one_of(
+    st.sampled_from(" \t\n\r<>&\"'\u0085\u2028é中😀ab"),
+    st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"),
+)
+
+names = st.text(_LETTERS, min_size=1, max_size=8).filter(lambda n: n != "bml" and n == n.strip())
+numbers = st.one_of(
+    st.floats(-86400, 86400, allow_nan=False),
+    st.sampled_from([0.0, 0.5, 1.0, 1e-7, -1e-300, 5e-324, 86400.0, 0.1 + 0.2]),
+)
+
+
+def xml_text(min_size: int = 0, max_size: int = 12) -> st.SearchStrategy[str]:
+    """Any characters an XML document can hold."""
+    return st.text(_CHARACTERS, min_size=min_size, max_size=max_size)
+
+
+def attribute_values(value: Value) -> st.SearchStrategy[Any]:
+    """Values an attribute of this kind can have."""
+    if value.words:
+        return st.sampled_from(value.words)
+    if value.low is not None and value.high is not None:
+        if value.type == "integer":
+            return st.integers(int(value.low), int(value.high))
+        return st.floats(value.low, value.high, allow_nan=False)
+    if value.type == "boolean":
+        return st.booleans()
+    return xml_text(1).map(str.strip).filter(bool)
+
+
+@st.composite
+def descriptions(draw: st.DrawFn) -> Description:
+    """SSML, or anything well-formed in canonical form."""
+    words = draw(st.text("abc é", max_size=5))
+    content = draw(
+        st.sampled_from(
+            [
+                words,
+                f"<a>{words}</a>",
+                f'<a xmlns="urn:x"><b q="1"></b>{words}</a>{words}',
+                f'<p:a xmlns:p="urn:y">{words}</p:a>',
+                f'<a xmlns="http://www.bml-initiative.org/bml/bml-1.0">{words}</a>',
+            ]
+        )
+    )
+    kind = draw(st.sampled_from(["application/ssml+xml", "text/x-own"]))
+    if kind == "application/ssml+xml":
+        content = f'<speak xmlns="http://www.w3.org/2001/10/synthesis">{words}<mark name="m"></mark></speak>'
+    return Description(priority=draw(st.integers(-5, 5)), type=kind, content=content)
+
+
+@st.composite
+def _references(draw: st.DrawFn, points: Mapping[str, list[tuple[str, int | None]]]) -> SyncRef:
+    offset = draw(st.one_of(st.just(0.0), numbers))
+    kind = draw(st.integers(0, 5))
+    if kind == 0:
+        return SyncRef(offset=offset)
+    if kind == 1:
+        return SyncRef(behaviour="bml", sync="start", offset=offset)
+    if kind == 2:
+        # Another block's names are not looked up, so they must not look like an offset.
+        other = st.text("abc_", min_size=1, max_size=4)
+        sync = draw(st.sampled_from(["start", "end", "tm1"]))
+        return SyncRef(block="other block", behaviour=draw(other), sync=sync, offset=offset)
+    behaviour = draw(st.sampled_from(sorted(points)))
+    sync, index = draw(st.sampled_from(points[behaviour]))
+    return SyncRef(behaviour=behaviour, sync=sync, index=index, offset=offset)
+
+
+def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
+    """Values for the plain attributes of a class; optional ones sometimes left out."""
+    values: dict[str, Any] = {}
+    for spec in shape_of(cls).attributes.values():
+        if spec.field != "id" and spec.value is not sync_ref and (spec.required or draw(st.booleans())):
+            values[spec.field] = draw(attribute_values(spec.value))
+    return values
+
+
+def _content(draw: st.DrawFn, cls: type[Behaviour]) -> dict[str, Any]:
+    """Values for the children of a class."""
+    own = {f.name for f in fields(cls)}
+    values: dict[str, Any] = {}
+    if issubclass(cls, Face | FaceShift):
+        kinds = st.sampled_from([FaceLexeme, FaceFacs])
+        chosen = draw(st.lists(kinds, min_size=1, max_size=3))
+        values["parts"] = tuple(k(id=draw(st.just("") | names), **_own_values(draw, k)) for k in chosen)
+    if "stance" in own:
+        values["stance"] = draw(st.none() | st.just(Stance(type="SITTING")))
+        poses = draw(st.integers(0, 2))
+        values["poses"] = tuple(Pose(**_own_values(draw, Pose)) for _ in range(poses))
+    return values
+
+
+@st.composite
+def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
+    """Valid blocks: any behaviours, references that lead somewhere, constraints, required parts.
+
+    Args:
+        foreign: also attributes nobody knows.
+    """
+    ids = draw(st.lists(names, max_size=6, unique=True))
+    kinds = {id: draw(st.sampled_from(sorted(VOCABULARY.values(), key=lambda c: c.tag))) for id in ids}
+    values = {id: _own_values(draw, kinds[id]) | _content(draw, kinds[id]) for id in ids}
+    marks = {
+        id: draw(st.lists(names.filter(lambda n: n not in ("start", "end")), max_size=3, unique=True))
+        for id in ids
+        if kinds[id] is Speech and draw(st.booleans())
+    }
+    points: dict[str, list[tuple[str, int | None]]] = {}
+    for id, cls in kinds.items():
+        points[id] = [(p, None) for p in (*cls.sync_points, *marks.get(id, []))]
+        times = values[id].get("repetition", 1)
+        if times > 1:
+            points[id] += [("stroke", n) for n in range(1, min(times, 4) + 1)]
+    refs = _references(points) if points else numbers.map(lambda t: SyncRef(offset=t))
+    others = st.dictionaries(
+        st.sampled_from(["zz", "{urn:a}b", "{http://www.asap-project.org/bmla}priority"]),
+        xml_text(),
+        max_size=2,
+    )
+    nodes: list[Behaviour | Constraint] = []
+    for id, cls in kinds.items():
+        if id in marks:
+            parts: list[str | Sync] = [draw(xml_text(1))]
+            for mark in marks[id]:
+                parts += [Sync(id=mark, ref=draw(st.none() | refs)), draw(xml_text(1))]
+            values[id]["text"] = SpeechText(parts=tuple(parts))
+        node = cls(
+            id=id,
+            syncs={p: draw(refs) for p in cls.sync_points if draw(st.integers(0, 2)) == 0},
+            descriptions=tuple(draw(st.lists(descriptions(), max_size=1))),
+            foreign=draw(others) if foreign else {},
+            **values[id],
+        )
+        nodes.append(node)
+    some = st.lists(refs, min_size=1, max_size=3).map(tuple)
+    for n in range(draw(st.integers(0, 2))):
+        part = st.one_of(
+            st.builds(Synchronize, refs=some),
+            st.builds(Before, ref=refs, refs=some),
+            st.builds(After, ref=refs, refs=some),
+        )
+        id_ = draw(st.none() | st.just(f"constraint{n}"))
+        nodes.append(Constraint(id=id_, parts=tuple(draw(st.lists(part, min_size=1, max_size=2)))))
+    cut = draw(st.integers(0, len(nodes)))
+    inside = tuple(draw(st.permutations(nodes[cut:])))
+    children = (*nodes[:cut], *((Required(children=inside),) if draw(st.booleans()) else inside))
+    return Block(
+        id=draw(names),
+        character_id=draw(st.none() | names),
+        composition=draw(st.sampled_from(["MERGE", "APPEND", "REPLACE"])),
+        children=children,
+        foreign=draw(others) if foreign else {},
+    )
