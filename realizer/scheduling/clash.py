@@ -1,0 +1,127 @@
+"""Relations that cannot hold together: found as loops and cycles, kept as what they are made of."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
+
+__all__ = ["Clash", "Gap", "Link", "cycle_clash", "loop_clash"]
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A behaviour's least length between two of its points."""
+
+    part: Part
+    begin: str
+    end: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One inequality of a cycle: time[v] >= time[u] + seconds.
+
+    `order` is what stated it, None for a gap or a bound; a bound (nothing starts sooner) has u = ORIGIN.
+    """
+
+    u: int
+    v: int
+    seconds: float
+    order: Relation | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Clash:
+    """What cannot hold together; without any one of it, the rest of it could.
+
+    Attributes:
+        relations: the equalities and orders, in the order in which they chain.
+        gaps: least lengths, one for each stretch of a behaviour.
+        earliest: what starts too soon and the bound, seconds; None where no bound takes part.
+        named: the behaviours whose points occur, whether or not they state or hinder anything themselves.
+    """
+
+    relations: tuple[Relation, ...]
+    gaps: tuple[Gap, ...] = ()
+    earliest: tuple[str, float] | None = None
+    named: tuple[Part, ...] = ()
+
+    @property
+    def parts(self) -> list[Part]:
+        """What states or needs something in the clash, each once."""
+        return _once([r.part for r in self.relations] + [g.part for g in self.gaps])
+
+
+def loop_clash(problem: Problem, closing: int) -> Clash:
+    """The loop that equality number `closing` closes with the ones before it."""
+    last = problem.equalities[closing]
+    return _clash(problem, [*_chain(problem, last.u, last.v, closing), last], [])
+
+
+def cycle_clash(problem: Problem, links: Sequence[Link]) -> Clash:
+    """A cycle of inequalities: each link's end is tied, by equalities, to the next one's beginning."""
+    relations: list[Relation] = []
+    for link, after in zip(links, (*links[1:], links[0]), strict=True):
+        if link.order is not None:
+            relations.append(link.order)
+        relations += _chain(problem, link.v, after.u, len(problem.equalities))
+    return _clash(problem, relations, links)
+
+
+def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Clash:
+    gaps: list[Gap] = []
+    earliest = None
+    points = {p for r in relations for p in (r.u, r.v)}
+    for link in links:
+        if link.order is not None:
+            continue
+        if link.u == ORIGIN:
+            earliest = (problem.name_of(link.v), problem.earliest[problem.owner[link.v]])
+            continue
+        b = problem.owner[link.u]
+        part, names, first = problem.behaviours[b], problem.timings[b].points, problem.first[b]
+        begin, end = names[link.u - first], names[link.v - first]
+        if gaps and gaps[-1].part is part and gaps[-1].end == begin:
+            gaps[-1] = Gap(part, gaps[-1].begin, end, gaps[-1].seconds + link.seconds)
+        else:
+            gaps.append(Gap(part, begin, end, link.seconds))
+    if len(gaps) > 1 and gaps[0].part is gaps[-1].part and gaps[-1].end == gaps[0].begin:
+        head, tail = gaps[0], gaps.pop()
+        gaps[0] = Gap(head.part, tail.begin, head.end, tail.seconds + head.seconds)
+    owners = [problem.behaviours[problem.owner[p]] for p in sorted(points) if p != ORIGIN]
+    unique = {id(r): r for r in relations}
+    return Clash(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
+
+
+def _chain(problem: Problem, begin: int, end: int, before: int) -> list[Relation]:
+    """The fewest equalities among the first `before` that tie one point to another."""
+    if begin == end:
+        return []
+    beside: dict[int, list[tuple[int, Relation]]] = {}
+    for relation in problem.equalities[:before]:
+        beside.setdefault(relation.u, []).append((relation.v, relation))
+        beside.setdefault(relation.v, []).append((relation.u, relation))
+    came: dict[int, tuple[int, Relation] | None] = {begin: None}
+    queue = deque([begin])
+    while queue:
+        at = queue.popleft()
+        if at == end:
+            break
+        for to, relation in beside.get(at, ()):
+            if to not in came:
+                came[to] = (at, relation)
+                queue.append(to)
+    found: list[Relation] = []
+    step = came.get(end)
+    while step is not None:
+        found.append(step[1])
+        step = came[step[0]]
+    return found[::-1]
+
+
+def _once(parts: Iterable[Part]) -> list[Part]:
+    return list({id(part): part for part in parts}.values())

@@ -1,0 +1,101 @@
+"""Clashes in, what gives way and the words for it out."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from realizer.scheduling.clash import Clash, Gap
+from realizer.scheduling.problem import Part, Relation
+from realizer.scheduling.timing import Warning
+
+__all__ = ["IMPOSSIBLE", "choose", "fault_warning", "in_words", "refusal", "warning_of"]
+
+IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
+
+
+def choose(clash: Clash) -> Part | None:
+    """What gives way: an optional constraint before any behaviour, then the behaviour of the lowest priority.
+
+    Of equals the later one in the document. A behaviour that is merely referred to is spared while one that
+    states or hinders something can go. None where everything is required.
+    """
+    return max(_candidates(clash), key=lambda part: (-part.priority, part.order), default=None)
+
+
+def warning_of(clash: Clash, dropped: Part) -> Warning:
+    """The one warning of something that was dropped."""
+    name = dropped.name or "a constraint"
+    if dropped.is_constraint:
+        name = f"constraint {dropped.name}" if dropped.name else "a constraint without an id"
+        text = f"{name} cannot be kept: {in_words(clash)}; a constraint that is not required gives way first"
+    else:
+        reason = _reason(clash, dropped)
+        text = f"{name} cannot be placed: {in_words(clash)}; {name} was dropped because {reason}"
+    return Warning(dropped.id, IMPOSSIBLE, text)
+
+
+def refusal(block: str, clash: Clash) -> Warning:
+    """The warning of a block that fails, because everything in the clash is required."""
+    return Warning(block, IMPOSSIBLE, f"{in_words(clash)}, and all of this is required")
+
+
+def fault_warning(part: Part, text: str) -> Warning:
+    """The warning of a part that refers to what is not there."""
+    name = part.name or "a constraint"
+    return Warning(part.id, IMPOSSIBLE, f"{name} was dropped{_where(part)}: {text}")
+
+
+def in_words(clash: Clash) -> str:
+    """The clash as the clauses of one sentence, in the order in which they chain."""
+    clauses = [_relation(r) for r in clash.relations] + [_gap(g) for g in clash.gaps]
+    if clash.earliest is not None:
+        point, seconds = clash.earliest
+        clauses.append(f"{point} is not before {_seconds(seconds)}")
+    unique = list(dict.fromkeys(clauses))
+    return f"{_join(unique)} cannot {'all ' if len(unique) > 2 else 'both ' if len(unique) > 1 else ''}hold"
+
+
+def _candidates(clash: Clash) -> Collection[Part]:
+    optional = [part for part in clash.parts if not part.required]
+    constraints = [part for part in optional if part.is_constraint]
+    return constraints or optional or [part for part in clash.named if not part.required]
+
+
+def _reason(clash: Clash, dropped: Part) -> str:
+    others = [part for part in _candidates(clash) if part is not dropped]
+    if not others:
+        required = any(part.required for part in (*clash.parts, *clash.named))
+        return "everything else in this is required" if required else "nothing else has a part in this"
+    if all(part.priority > dropped.priority for part in others):
+        return "its priority is the lowest"
+    return "it comes later"
+
+
+def _relation(relation: Relation) -> str:
+    left, sign, right = relation.says
+    part = relation.part
+    if sign == "rigid":
+        return f"{left} takes exactly {_seconds(relation.seconds)} from its start to {right}"
+    return f"{left} {'is ' if sign != '=' else ''}{sign} {right}{_where(part)}"
+
+
+def _where(part: Part) -> str:
+    words = [f"constraint {part.name}".strip()] if part.is_constraint else []
+    if part.line is not None:
+        words.append(f"line {part.line}")
+    return f" ({', '.join(words)})" if words else ""
+
+
+def _gap(gap: Gap) -> str:
+    name = gap.part.name
+    if gap.seconds > 0:
+        return f"{name} takes at least {_seconds(gap.seconds)} from {gap.begin} to {gap.end}"
+    return f"{name}:{gap.end} is not before {name}:{gap.begin}"
+
+
+def _seconds(value: float) -> str:
+    return f"{round(value, 3):g} s"
+
+
+def _join(clauses: Sequence[str]) -> str:
+    return clauses[0] if len(clauses) == 1 else f"{', '.join(clauses[:-1])} and {clauses[-1]}"

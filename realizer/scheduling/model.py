@@ -1,0 +1,124 @@
+"""A problem in, its numbers as arrays out: tied points contracted to classes, gaps, orders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.arrays import Bool, Float64
+from realizer.scheduling.clash import Clash, loop_clash
+from realizer.scheduling.problem import ORIGIN, Problem
+from realizer.scheduling.ties import Ties
+
+__all__ = ["LOOSE", "TIGHT", "Index", "Model", "model_of"]
+
+Index: TypeAlias = npt.NDArray[np.intp]
+
+# Two ways to the same point may differ by this much: sums of decimal fractions and of spoken lengths do.
+LOOSE = 1e-7  # s
+# An order is kept when it is broken by no more than the rounding of double precision.
+TIGHT = 1e-10  # s
+
+
+@dataclass(slots=True, eq=False)
+class Model:
+    """n points (0 is the block's start), B behaviours, g gaps of behaviours that are not rigid.
+
+    Attributes:
+        first, last: (B,) each behaviour's first and last point.
+        owner: (n,) behaviour of each point; B for the block's start.
+        root, shift: (n,) time[p] = time[root[p]] + shift[p]; untied points are their own root.
+        tied: points other than the block's start that some equality names, ascending.
+        chain: (n,) seconds after the behaviour's first point when every gap has its preferred length.
+        slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens what lies between.
+        gap: (g,) the point where each gap starts; it ends at the next point.
+        wanted, least, stiffness: (g,) of each gap.
+        earliest: (B,) no first point is sooner.
+    """
+
+    problem: Problem
+    first: Index
+    last: Index
+    owner: Index
+    root: Index
+    shift: Float64
+    tied: Index
+    chain: Float64
+    slack: Float64
+    gap: Index
+    wanted: Float64
+    least: Float64
+    stiffness: Float64
+    earliest: Float64
+
+    def points_of(self, chosen: Bool) -> Index:
+        """The points of the behaviours that are chosen; chosen is (B + 1,) bool, its last entry False."""
+        return np.flatnonzero(chosen[self.owner])
+
+
+def model_of(problem: Problem) -> Model | list[Clash]:
+    """The problem as arrays, or the loops of equalities that do not close."""
+    n = len(problem.owner)
+    ties = Ties(n)
+    clashes = [
+        loop_clash(problem, k)
+        for k, (u, v, seconds, _, _) in enumerate(problem.equalities)
+        if abs(ties.tie(u, v, seconds)) > LOOSE
+    ]
+    if clashes:
+        return clashes
+    named = {p for relation in problem.equalities for p in relation[:2]}
+    named.discard(ORIGIN)
+    tied = sorted(named)
+    root, shift = np.arange(n), np.zeros(n)
+    root[tied] = [ties.find(p) for p in tied]
+    shift[tied] = [ties.shift[p] for p in tied]
+
+    timings = problem.timings
+    size = len(timings)
+    first = np.array(problem.first, np.intp)
+    last = np.append(first[1:], n) - 1
+    owner = np.array(problem.owner, np.intp)
+    owner[ORIGIN] = size
+    # Every point but the first of a behaviour ends a gap.
+    starts = np.ones(n, np.bool_)
+    starts[last] = starts[ORIGIN] = False
+    every = np.flatnonzero(starts)
+    wanted, stiffness, least = (
+        np.concatenate([getattr(t, name) for t in timings]) if timings else np.zeros(0)
+        for name in ("preferred", "stiffness", "least")
+    )
+    rigid = np.array([t.rigid for t in timings], np.bool_)
+    if rigid.any():
+        free = ~rigid[owner[every]]
+        stiffness = np.where(free, stiffness, 1.0)
+    else:
+        free = np.ones(len(every), np.bool_)
+    return Model(
+        problem,
+        first,
+        last,
+        owner,
+        root,
+        shift,
+        np.array(tied, np.intp),
+        _along(every, wanted, first, owner),
+        _along(every, 1.0 / stiffness, first, owner),
+        every[free],
+        wanted[free],
+        least[free],
+        stiffness[free],
+        np.array(problem.earliest),
+    )
+
+
+def _along(gap: Index, length: Float64, first: Index, owner: Index) -> Float64:
+    """(n,) the sum of a behaviour's lengths before each of its points."""
+    step = np.zeros(len(owner))
+    step[gap + 1] = length
+    total = np.cumsum(step)
+    total[ORIGIN + 1 :] -= total[first][owner[ORIGIN + 1 :]]
+    return total

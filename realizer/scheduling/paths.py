@@ -1,0 +1,94 @@
+"""Orders between levels: the least levels that keep them all, or the cycle that cannot; strong components."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+__all__ = ["components", "raise_levels"]
+
+Edge = tuple[int, int, float]
+
+
+def raise_levels(level: list[float], edges: Sequence[Edge], slack: float) -> list[int] | None:
+    """Raise levels, in place and as little as possible, until each edge is kept.
+
+    An edge (u, v, w) is kept where level[v] + slack >= level[u] + w.
+
+    This is Bellman-Ford's longest path from the levels given. It takes one sweep where the edges come in the
+    order of the paths, so give them sorted by (roughly) where their tails end up.
+
+    Returns:
+        None; or, where that has no end, the numbers of edges that form a cycle of positive length, in order.
+    """
+    cause: dict[int, int] = {}
+    while True:
+        moved = False
+        for k, (u, v, w) in enumerate(edges):
+            need = level[u] + w
+            if level[v] < need - slack:
+                level[v] = need
+                cause[v] = k
+                moved = True
+        if not moved:
+            return None
+        if cycle := _cycle(cause, edges):
+            return cycle
+
+
+def _cycle(cause: dict[int, int], edges: Sequence[Edge]) -> list[int]:
+    """A cycle among the edges that last raised their heads; [] where there is none."""
+    seen: dict[int, int] = {}
+    for start in cause:
+        at = start
+        while at in cause and at not in seen:
+            seen[at] = start
+            at = edges[cause[at]][0]
+        if at in cause and seen[at] == start:
+            found = []
+            end = at
+            while True:
+                found.append(cause[at])
+                at = edges[cause[at]][0]
+                if at == end:
+                    return found[::-1]
+    return []
+
+
+def components(n: int, edges: Sequence[Edge]) -> list[int]:
+    """The strong component of each of n nodes, numbered so that no edge leads to a lower number.
+
+    Source: Tarjan (1972), without recursion.
+    """
+    after: list[list[int]] = [[] for _ in range(n)]
+    for u, v, _ in edges:
+        after[u].append(v)
+    index, low, component = [-1] * n, [0] * n, [-1] * n
+    stack: list[int] = []
+    counter = found = 0
+    for root in range(n):
+        if index[root] >= 0:
+            continue
+        work = [(root, 0)]
+        while work:
+            at, k = work.pop()
+            if k == 0:
+                index[at] = low[at] = counter
+                counter += 1
+                stack.append(at)
+            for step in range(k, len(after[at])):
+                to = after[at][step]
+                if index[to] < 0:
+                    work += [(at, step), (to, 0)]
+                    break
+                if component[to] < 0:
+                    low[at] = min(low[at], low[to])
+            else:
+                if low[at] == index[at]:
+                    while True:
+                        node = stack.pop()
+                        component[node] = found
+                        if node == at:
+                            break
+                    found += 1
+    # Tarjan closes the last components first.
+    return [found - 1 - c for c in component]

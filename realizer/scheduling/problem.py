@@ -1,0 +1,259 @@
+"""A block and its timings in, a problem out: numbered sync points, what must hold between them, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bml_schema import After, Before, Synchronize
+from realizer.scheduling.timing import Timing
+
+if TYPE_CHECKING:
+    from bml_schema import Behaviour, Block, Constraint, SyncRef
+
+__all__ = ["ORIGIN", "Part", "Problem", "Relation", "problem_of"]
+
+# The point that stands for the block's start; it is at 0 and every number is tied to it.
+ORIGIN = 0
+
+
+@dataclass(slots=True, eq=False)
+class Part:
+    """Something that can be dropped: a behaviour or a constraint.
+
+    Attributes:
+        id: as warnings name it, "block:behaviour" or a constraint's own id or its block's.
+        name: as sentences name it, "nod1"; "" for a constraint without an id.
+        order: place in the document, among its own kind.
+        line: where it stands, None where the document does not say.
+        names: ids of the behaviours that a constraint names; it goes with any of them.
+    """
+
+    id: str
+    name: str
+    required: bool = False
+    priority: float = 0.0
+    order: int = 0
+    line: int | None = None
+    is_constraint: bool = False
+    names: frozenset[str] = frozenset()
+
+
+class Relation(NamedTuple):
+    """As an equality: time[u] = time[v] + seconds. As an order: time[v] >= time[u] + seconds.
+
+    `part` stated it; `says` is the sentence's left side, sign and right side, put into words only on a clash.
+    """
+
+    u: int
+    v: int
+    seconds: float
+    part: Part
+    says: tuple[object, str, object]
+
+
+@dataclass(slots=True)
+class Problem:
+    """What a solver needs to know of one or more blocks.
+
+    Point 0 is the block's start; behaviour b owns the k points from first[b] on, in document order. The gaps
+    of a behaviour that is not rigid cost stiffness * (gap - preferred)^2 and are at least `least`.
+
+    Attributes:
+        earliest: (behaviours,) seconds, no behaviour starts sooner.
+        owner: (points,) behaviour number of each point; -1 for the block's start.
+        faults: parts that cannot even be stated, and why: a reference to a sync point that is not there.
+    """
+
+    behaviours: list[Part] = field(default_factory=list)
+    timings: list[Timing] = field(default_factory=list)
+    first: list[int] = field(default_factory=list)
+    earliest: list[float] = field(default_factory=list)
+    owner: list[int] = field(default_factory=lambda: [-1])
+    equalities: list[Relation] = field(default_factory=list)
+    orders: list[Relation] = field(default_factory=list)
+    faults: list[tuple[Part, str]] = field(default_factory=list)
+
+    def add(self, part: Part, timing: Timing, earliest: float = 0.0) -> int:
+        """Add a behaviour; returns the number of its first point."""
+        first, k = len(self.owner), len(timing.points)
+        self.owner += [len(self.behaviours)] * k
+        self.behaviours.append(part)
+        self.timings.append(timing)
+        self.first.append(first)
+        self.earliest.append(earliest)
+        if timing.rigid:
+            at = np.cumsum(timing.preferred).tolist()
+            for i, seconds in enumerate(at, 1):
+                says = (part.name, "rigid", timing.points[i])
+                self.equalities.append(Relation(first + i, first, seconds, part, says))
+        return first
+
+    def name_of(self, point: int) -> str:
+        """The point as documents write it: "nod1:start"; "bml:start" for the block's start."""
+        if point == ORIGIN:
+            return "bml:start"
+        b = self.owner[point]
+        return f"{self.behaviours[b].name}:{self.timings[b].points[point - self.first[b]]}"
+
+    def without(self, dropped: Iterable[Part]) -> Problem:
+        """The problem without some parts, and without what referred to them."""
+        gone = {id(part): part.name for part in dropped}
+        lost = {part.name for part in self.behaviours if id(part) in gone}
+        gone.update((id(r.part), "") for r in (*self.equalities, *self.orders) if r.part.names & lost)
+        number = {ORIGIN: ORIGIN}
+        smaller = Problem()
+        for b, part in enumerate(self.behaviours):
+            if id(part) not in gone:
+                old, new = self.first[b], smaller.add(part, self.timings[b], self.earliest[b])
+                number.update((old + i, new + i) for i in range(len(self.timings[b].points)))
+        for u, v, seconds, part, says in self.equalities:
+            # `add` has already made what holds a rigid behaviour together.
+            if id(part) not in gone and v in number and says[1] != "rigid":
+                smaller.equalities.append(Relation(number[u], number[v], seconds, part, says))
+        for u, v, seconds, part, says in self.orders:
+            if id(part) not in gone and u in number and v in number:
+                smaller.orders.append(Relation(number[u], number[v], seconds, part, says))
+        smaller.faults = [fault for fault in self.faults if id(fault[0]) not in gone]
+        return smaller
+
+
+def problem_of(
+    block: Block,
+    timings: Mapping[str, Timing],
+    *,
+    earliest: float = 0.0,
+    outside: Callable[[SyncRef], float | None] = lambda ref: None,
+    priorities: Mapping[str, float] | None = None,
+) -> Problem:
+    """The problem of one block.
+
+    Args:
+        timings: behaviour id -> what it wants of time; a behaviour that is not in it is absent, and what
+            refers to it vanishes.
+        earliest: seconds from block start, no behaviour starts sooner.
+        outside: a reference into another block, offset included -> seconds from this block's start, or None.
+        priorities: behaviour id -> priority; 0 where absent, the lower goes first in a clash.
+    """
+    problem, filler = Problem(), _Filler(block, timings, outside)
+    required, places, weights = block.required, block.places, priorities or {}
+    present: list[tuple[Behaviour, Part, int]] = []
+    for order, node in enumerate(block.behaviours):
+        name = node.id
+        if name not in timings or name in filler.first:
+            continue
+        place = places.get(name)
+        line = place.line if place is not None else None
+        part = Part(f"{block.id}:{name}", name, name in required, weights.get(name, 0.0), order, line)
+        filler.first[name] = problem.add(part, timings[name], earliest)
+        present.append((node, part, filler.first[name]))
+    for node, part, first in present:
+        points = timings[node.id].points
+        for sync, ref in _references(node):
+            try:
+                if (target := filler.point(ref)) is None:
+                    continue
+                if sync not in points:
+                    raise LookupError(f"{node.id} has no {sync}, only {', '.join(points)}")
+            except LookupError as fault:
+                problem.faults.append((part, str(fault)))
+                break
+            says = (f"{node.id}:{sync}", "=", ref)
+            problem.equalities.append(Relation(first + points.index(sync), *target, part, says))
+    for order, constraint in enumerate(block.constraints):
+        _add_constraint(problem, filler, constraint, order)
+    return problem
+
+
+def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
+    """Every sync point a behaviour ties, as attribute or inside its text."""
+    yield from node.syncs.items()
+    text = getattr(node, "text", None)
+    for mark in getattr(text, "parts", ()):
+        if not isinstance(mark, str) and mark.ref is not None:
+            yield mark.id, mark.ref
+
+
+def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, order: int) -> None:
+    block = filler.block
+    refs = [ref for piece in constraint.parts for ref in piece.refs]
+    refs += [piece.ref for piece in constraint.parts if not isinstance(piece, Synchronize)]
+    names = {ref.behaviour for ref in refs if filler.is_own(ref)} - {None, "bml"}
+    if not names <= filler.first.keys():
+        return
+    place = block.places.get(constraint.id) if constraint.id else constraint.place
+    part = Part(
+        constraint.id or block.id,
+        constraint.id or "",
+        constraint.required,
+        order=order,
+        line=place.line if place is not None else None,
+        is_constraint=True,
+        names=frozenset(name for name in names if name),
+    )
+    try:
+        for piece in constraint.parts:
+            members = [(*filler.must(ref), ref) for ref in piece.refs]
+            target = piece.refs[0] if isinstance(piece, Synchronize) else piece.ref
+            r, there = filler.must(target)
+            for x, here, ref in members:
+                if isinstance(piece, Before):
+                    says = (ref, "not after", target)
+                    problem.orders.append(Relation(x, r, here - there, part, says))
+                elif isinstance(piece, After):
+                    says = (ref, "not before", target)
+                    problem.orders.append(Relation(r, x, there - here, part, says))
+                elif ref is not target:
+                    problem.equalities.append(Relation(x, r, there - here, part, (target, "=", ref)))
+    except LookupError as fault:
+        problem.faults.append((part, str(fault)))
+
+
+class _Filler:
+    """Sync references of one block -> (point, seconds after it)."""
+
+    def __init__(
+        self, block: Block, timings: Mapping[str, Timing], outside: Callable[[SyncRef], float | None]
+    ) -> None:
+        self.block, self.timings, self.outside = block, timings, outside
+        self.first: dict[str, int] = {}
+
+    def is_own(self, ref: SyncRef) -> bool:
+        return ref.block is None or ref.block == self.block.id
+
+    def must(self, ref: SyncRef) -> tuple[int, float]:
+        """As `point`, of a behaviour that is present."""
+        found = self.point(ref)
+        if found is None:
+            raise LookupError(f"{ref} is not known")
+        return found
+
+    def point(self, ref: SyncRef) -> tuple[int, float] | None:
+        """None where the behaviour is absent.
+
+        Raises:
+            LookupError: there is no such sync point; the text says what there is.
+        """
+        if not self.is_own(ref):
+            time = self.outside(ref)
+            if time is None:
+                raise LookupError(f"{ref} is not known here, or its time is not known yet")
+            return ORIGIN, float(time)
+        name = ref.behaviour
+        if name is None:
+            return ORIGIN, ref.offset
+        if name == "bml":
+            if ref.sync != "start":
+                raise LookupError(f"{ref}: of its own block only bml:start can be referred to")
+            return ORIGIN, ref.offset
+        first = self.first.get(name)
+        if first is None:
+            return None
+        sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
+        points = self.timings[name].points
+        if sync not in points:
+            raise LookupError(f"{ref}: {name} has no {sync}, only {', '.join(points)}")
+        return first + points.index(sync), ref.offset

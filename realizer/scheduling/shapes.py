@@ -1,0 +1,163 @@
+"""A model in, its shapes out: behaviours that hold each other, at the least squares of their gaps.
+
+What hangs together without a contradiction keeps its preferred gaps; only the rest needs a solver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from realizer.arrays import Bool, Float64
+from realizer.scheduling.model import Index, Model
+from realizer.scheduling.problem import ORIGIN
+from realizer.scheduling.ties import Ties
+
+__all__ = ["Shapes", "settle", "shapes_of"]
+
+# Lengths that meet as closely as this count as fitting exactly.
+FITS = 1e-9  # s
+# From this many unknowns on a sparse factorisation is faster; the time of a dense one grows with the cube.
+SPARSE_FROM = 150
+
+
+@dataclass(slots=True, eq=False)
+class Shapes:
+    """Which behaviours hold each other, and where their points are.
+
+    Attributes:
+        label: (B + 1,) the shape of each behaviour, named by one of them; B is the block's start.
+        held: (B + 1,) bool by label: the shape is tied to a fixed time and cannot slide.
+        at: (n,) seconds: from the block's start for held shapes, from anywhere for others.
+    """
+
+    label: Index
+    held: Bool
+    at: Float64
+
+
+def shapes_of(model: Model) -> Shapes:
+    """The shapes of all behaviours, each at its least squares, inequalities aside."""
+    size = len(model.first)
+    ties, strained, held_at = _hang(model)
+    label, base = np.arange(size + 1), np.zeros(size + 1)
+    touched = np.unique(model.owner[model.tied])
+    label[touched] = [ties.find(b) for b in touched.tolist()]
+    base[touched] = [ties.shift[b] for b in touched.tolist()]
+    held = np.zeros(size + 1, np.bool_)
+    held[size] = True
+    fixed: dict[int, float] = {}
+    for b, time in held_at:
+        shape = ties.find(b)
+        start = time - ties.shift[b]
+        if abs(fixed.setdefault(shape, start) - start) > FITS:
+            strained.append(b)
+    if fixed:
+        names = list(fixed)
+        held[names] = True
+        moved = np.zeros(size + 1)
+        moved[names] = list(fixed.values())
+        base += moved[label]
+    at = base[model.owner] + model.chain
+    for shape in {ties.find(b) for b in strained}:
+        _relax(model, label == shape, at)
+    return Shapes(label, held, at)
+
+
+def _hang(model: Model) -> tuple[Ties, list[int], list[tuple[int, float]]]:
+    """Hang behaviours on each other at their preferred lengths.
+
+    Returns:
+        ties between behaviours (of their first points), the behaviours that do not fit, and for each point at
+        a fixed time (behaviour, seconds of its first point).
+    """
+    ties = Ties(len(model.first))
+    strained: list[int] = []
+    held: list[tuple[int, float]] = []
+    tied = model.tied
+    ahead = (model.shift[tied] - model.chain[tied]).tolist()
+    hook: dict[int, tuple[int, float]] = {}
+    for b, root, start in zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True):
+        # The first point of b is `start` after the class's root.
+        if root == ORIGIN:
+            held.append((b, start))
+            continue
+        other, there = hook.setdefault(root, (b, start))
+        if abs(ties.tie(b, other, start - there)) > FITS:
+            strained.append(b)
+    return ties, strained, held
+
+
+def _relax(model: Model, chosen: Bool, at: Float64) -> None:
+    """Put the points of one shape, in place, where the sum of a (gap - preferred)^2 is least.
+
+    A stretch between two tied points is one spring, whatever lies between; so only tied points are unknowns.
+    """
+    owner, chain, slack = model.owner, model.chain, model.slack
+    knots = model.tied[chosen[owner[model.tied]]]
+    same = owner[knots[:-1]] == owner[knots[1:]]
+    p, q = knots[:-1][same], knots[1:][same]
+    length, give = chain[q] - chain[p], slack[q] - slack[p]
+    nodes, number = np.unique(model.root[knots], return_inverse=True)
+    i, j = number[:-1][same], number[1:][same]
+    loose = i != j
+    # Either the block's start, which is at 0, or any point: the shape is slid into its place later.
+    fixed = np.zeros(len(nodes), np.bool_)
+    fixed[0] = True
+    wanted = length - model.shift[q] + model.shift[p]
+    x = settle(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
+    time = x[number] + model.shift[knots]
+    # How much longer than preferred, for each unit of slack, after each knot; 0 after a behaviour's last one.
+    strain = np.zeros(len(knots))
+    strain[:-1][same] = (time[1:][same] - time[:-1][same] - length) / give
+    points = model.points_of(chosen)
+    place = np.searchsorted(knots, points, side="right") - 1
+    before = (place >= 0) & (owner[knots[place]] == owner[points])
+    place = np.where(before, place, np.minimum(place + 1, len(knots) - 1))
+    knot = knots[place]
+    pull = np.where(before, strain[place], 0.0)
+    at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
+
+
+def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64) -> Float64:
+    """Where the sum of stiffness * (x[j] - x[i] - wanted)^2 is least.
+
+    Args:
+        i, j: (s,) the two nodes of each spring. wanted, stiffness: (s,).
+        fixed: (m,) bool; at least one node of each set that springs connect.
+        x: (m,) where the fixed nodes are.
+
+    Returns:
+        (m,) float64.
+    """
+    m = len(x)
+    free = np.flatnonzero(~fixed)
+    if not len(free):
+        return x
+    pull = stiffness * (wanted - (x[j] * fixed[j] - x[i] * fixed[i]))
+    right = np.bincount(j, pull, m) - np.bincount(i, pull, m)
+    if len(free) < SPARSE_FROM:
+        matrix = np.bincount(
+            np.concatenate([i * m + j, j * m + i, i * m + i, j * m + j]),
+            np.concatenate([-stiffness, -stiffness, stiffness, stiffness]),
+            m * m,
+        ).reshape(m, m)
+        found = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+    else:
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        rows = np.concatenate([i, j, i, j])
+        columns = np.concatenate([j, i, i, j])
+        values = np.concatenate([-stiffness, -stiffness, stiffness, stiffness])
+        number = np.cumsum(~fixed) - 1
+        inner = ~fixed[rows] & ~fixed[columns]
+        sparse = csc_array(
+            (values[inner], (number[rows[inner]], number[columns[inner]])), shape=(len(free),) * 2
+        )
+        factors = splu(sparse, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        found = factors.solve(right[free])
+    y = x.copy()
+    y[free] = found
+    return y

@@ -1,0 +1,53 @@
+"""Union-find whose links carry seconds: equalities in, classes of points at fixed distances out."""
+
+from __future__ import annotations
+
+__all__ = ["Ties"]
+
+
+class Ties:
+    """n points; those tied together move as one. The smallest number of a class is its root.
+
+    Attributes:
+        parent, shift: time[i] = time[parent[i]] + shift[i]; after `find(i)` the parent is the root.
+    """
+
+    __slots__ = ("parent", "shift")
+
+    def __init__(self, n: int) -> None:
+        self.parent = list(range(n))
+        self.shift = [0.0] * n
+
+    def find(self, i: int) -> int:
+        """The root of i's class."""
+        parent = self.parent
+        root = parent[i]
+        if parent[root] == root:
+            return root
+        trail = []
+        while parent[i] != i:
+            trail.append(i)
+            i = parent[i]
+        shift, total = self.shift, 0.0
+        for k in reversed(trail):
+            total += shift[k]
+            shift[k] = total
+            parent[k] = i
+        return i
+
+    def tie(self, u: int, v: int, seconds: float) -> float:
+        """Hold time[u] = time[v] + seconds.
+
+        Returns:
+            0.0; or, where u and v were tied already, how much farther apart than they are this wants them.
+        """
+        a, b = self.find(u), self.find(v)
+        # time[a] + shift[u] = time[b] + shift[v] + seconds
+        apart = self.shift[v] + seconds - self.shift[u]
+        if a == b:
+            return apart
+        if a > b:
+            self.parent[a], self.shift[a] = b, apart
+        else:
+            self.parent[b], self.shift[b] = a, -apart
+        return 0.0
