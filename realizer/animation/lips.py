@@ -62,8 +62,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
     if track is None:
         return ()
     first, last = phonemes[0].start, max(phonemes[-1].end, phonemes[0].start + 2 / facts["rate"])
-    count = int(np.ceil((last - first) * facts["rate"])) + 1
-    times = np.minimum(first + np.arange(count) / facts["rate"], last)
+    times = np.linspace(first, last, int(np.ceil((last - first) * facts["rate"])) + 1)
     taken = _presence(track, times, facts["pauses"])
     mouth = _dominance(track, times, facts) * taken[:, None]
     _constrain(mouth, track, times, taken, facts)
@@ -87,7 +86,7 @@ def _track(phonemes: Sequence[Phoneme], facts: dict[str, Any]) -> Track | None:
             rows.append((at, at + part.share * length, part.mix, part.vowel, size))
             at += part.share * length
     silent = ((0, 1.0),)
-    if all(row[2] == silent for row in rows):
+    if all(row[2] in (silent, ()) for row in rows):
         return None
     # A short pause between sounds does not bring the mouth to rest; at the ends it always does.
     inner = range(1, len(rows) - 1)
@@ -178,7 +177,9 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     speed = facts["speed"]["lips"]
     # The upper lip clears the teeth for f v: raised where it is lower, then lowered wherever p b m close.
     raised = shapes[LABIODENTAL, column["upper"]] * taken
+    upper[:] = _reachable(upper, times, speed)
     upper[:] = -_reachable(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
+    upper[[0, -1]] = 0.0
     for lip, name in ((upper, "upper"), (lower, "lower")):
         lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * taken), lip)
     lower[:] = np.where(
@@ -187,11 +188,9 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     jaw[:] = np.where(closed | bitten, np.minimum(jaw, facts["closure"]["jaw"]), jaw)
     for name, members in CLASSES.items():
         limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
-        for member in members:
-            k = column[member]
-            mouth[:, k] = _smooth(
-                _reachable(mouth[:, k], times, limit), facts["articulators"][name]["smooth"] * facts["rate"]
-            )
+        reach = facts["articulators"][name]["smooth"] * facts["rate"]
+        block = slice(column[members[0]], column[members[-1]] + 1)
+        mouth[:, block] = _smooth(_reachable(mouth[:, block], times[:, None], limit), reach)
     # Lips that press meet; they do not pass through each other.
     least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
     lower[:] = np.maximum(lower, least - upper)
@@ -211,27 +210,33 @@ def _held(track: Track, viseme: int, times: Float64, hold: float, pad: float) ->
 
 
 def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
-    """The greatest curve that stays below `values` and is nowhere steeper than `speed`."""
-    values = np.minimum.accumulate(values - speed * times) + speed * times
-    rising = values[::-1] + speed * times[::-1]
-    return (np.minimum.accumulate(rising) - speed * times[::-1])[::-1]
+    """The greatest curves along axis 0 that stay below `values` and are nowhere steeper than `speed`."""
+    climb = speed * times
+    values = np.minimum.accumulate(values - climb) + climb
+    falling: Float64 = np.minimum.accumulate((values + climb)[::-1])[::-1] - climb
+    return falling
 
 
 def _smooth(values: Float64, reach: float) -> Float64:
-    """Mean under a bell that ends `reach` samples away; end values stay."""
+    """Mean along axis 0 under a bell that ends `reach` samples away; end values stay."""
     half = min(round(reach), len(values) - 1)
     if half < 1:
         return values
     bell = np.hanning(2 * half + 3)[1:-1]
-    padded = np.pad(values, half, mode="reflect", reflect_type="odd")
-    return np.convolve(padded, bell / bell.sum(), "valid")
+    bell /= bell.sum()
+    # Beyond its ends the curve is turned about its end point, so that the ends do not move.
+    padded = np.concatenate(
+        (2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1])
+    )
+    smooth: Float64 = sum(weight * padded[k : k + len(values)] for k, weight in enumerate(bell))  # type: ignore[assignment]
+    return smooth
 
 
 def _channels(
     times: Float64, mouth: Float64, taken: Float64, contour: dict[str, float]
 ) -> tuple[Channel, ...]:
     part = {name: mouth[:, k] for k, name in enumerate(SHAPE)}
-    # MPEG-4 counts the upper lip's FAPs downwards, the lower lip's upwards: an open mouth is negative in both.
+    # MPEG-4 counts upper lip FAPs downwards, lower lip FAPs upwards: an open mouth is negative in both.
     upper, lower = -part["upper"], -part["lower"]
     values: dict[tuple[int, ...], Float64] = {
         (3,): np.maximum(part["jaw"], 0.0),  # FAP 3 has one direction

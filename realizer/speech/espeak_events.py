@@ -1,4 +1,4 @@
-"""What espeak-ng reports in, times of our words, phonemes and marks out: merged words split, lost marks found."""
+"""What espeak-ng reports in, times of our words, phonemes and marks out: merged words split, marks found."""
 
 from __future__ import annotations
 
@@ -97,9 +97,9 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
         rate: Hz.
         spoken: words -> the phonemes of each alone; only asked where espeak-ng merged words.
     """
-    begins, sounds, word_events = _sounds(events, len(pcm))
+    begins, sounds, word_events = _sounds(_linked(events), len(pcm))
     words = _words(document, begins, sounds, word_events, len(pcm), spoken)
-    marks = _marks(document, events, words)
+    marks = _marks(document, _linked(events), words)
     phonemes = _phonemes(_with_closures(begins, sounds, pcm, rate), sounds, len(pcm), rate)
     return Timeline(
         words=tuple(
@@ -109,6 +109,23 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
         phonemes=phonemes,
         marks={name: sample / rate for name, sample in marks.items()},
     )
+
+
+def _linked(events: Sequence[Event]) -> list[Event]:
+    """The events with words and marks that come too early moved to their first phoneme.
+
+    Where a nasal runs on into a vowel ("one of", "am in"), espeak-ng reports the second word, after the
+    nasal in order, at the time when the nasal begins.
+    """
+    moved = list(events)
+    latest: tuple[int, str] = (-1, "")
+    for k, (kind, sample, place, text) in enumerate(moved):
+        if kind == PHONEME:
+            latest = (sample, text)
+        elif kind in (WORD, MARK) and latest[1] and sample <= latest[0]:
+            later = next((s for t, s, _, _ in moved[k:] if t in (PHONEME, END)), sample)
+            moved[k] = (kind, max(sample, later), place, text)
+    return moved
 
 
 def _sounds(events: Sequence[Event], end: int) -> tuple[list[int], list[str], list[tuple[int, int, int]]]:
@@ -133,7 +150,7 @@ def _words(
     end: int,
     spoken: Spoken,
 ) -> list[tuple[int, int, bool]]:
-    """For each of our words: first and last sample, and whether espeak-ng itself says that it begins there."""
+    """For each of our words: first and last sample, and whether espeak-ng says that it begins there."""
     if not document.words:
         return []
     starts = {place: index for index, (_, place) in enumerate(document.words)}

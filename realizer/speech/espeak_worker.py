@@ -4,7 +4,7 @@ espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said
 a process of its own, made ready once, and each request is served by a fork of that (or, where there is no
 fork, by a fresh process). Nothing of the realizer is imported, so that it starts at once.
 
-    first line out   {"rate", "variants": [...], "voices": [{"name", "id", "languages": [[priority, tag], ...]}]}
+    first line out   {"rate", "variants": [name], "voices": [{"name", "id", "languages": [[priority, tag]]}]}
     line in          {"op": "say", "text", "voice", "wpm"} | {"op": "phonemes", "voice", "words"}
     line out         {"bytes": n, "events": [[type, sample, place, text], ...]} and n bytes of int16 PCM
                      {"phonemes": [[ipa, ...], ...]} | {"error": text}

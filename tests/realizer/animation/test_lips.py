@@ -1,0 +1,262 @@
+"""Lips: what phonemes must look like, and laws for any sequence of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.animation.blend import blend
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.fap import to_fap
+from realizer.animation.lips import lip_channels
+from realizer.animation.visemes import coarticulation, lip_shapes, phoneme_features, sounds
+from realizer.speech.utterance import Phoneme
+from realizer.tables import faps
+
+IPA = sorted(phoneme_features())
+NUMBER = {row.name: row.fap for row in faps()}
+BILABIALS = [s for s, f in phoneme_features().items() if f.place == "bilabial" and f.manner != "fricative"]
+
+
+def say(text: str, length: float = 0.1, stressed: bool = True) -> tuple[Phoneme, ...]:
+    """Phonemes of `length` seconds each; "_" is a pause of 0.3 s."""
+    phonemes: list[Phoneme] = []
+    for ipa in text.split():
+        start = phonemes[-1].end if phonemes else 0.0
+        pause = ipa == "_"
+        end = start + (0.3 if pause else length)
+        phonemes.append(Phoneme(start, end, "" if pause else ipa, int(stressed)))
+    return tuple(phonemes)
+
+
+def values(channels: tuple[Channel, ...], fap: int) -> np.ndarray:
+    (found,) = (c.values for c in channels if NUMBER.get(c.target.name) == fap)
+    return found
+
+
+def gap(channels: tuple[Channel, ...]) -> np.ndarray:
+    """How far the inner lips are apart, MNS units; FAP 4 counts down, FAP 5 up."""
+    return -values(channels, 4) - values(channels, 5)
+
+
+def middle(text: str, fap: int) -> float:
+    """The FAP's greatest deviation in "_ t X t _"."""
+    found = values(lip_channels(say(f"_ t {text} t _", 0.14), 0.0), fap)
+    return float(found[np.abs(found).argmax()])
+
+
+def opening(text: str) -> float:
+    return float(gap(lip_channels(say(f"_ t {text} t _", 0.14), 0.0)).max())
+
+
+phonemes_of_speech = st.lists(
+    st.tuples(
+        st.sampled_from([*IPA, "", "", "oʊ", "aɪ", "əl", "ɔːɹ"]), st.floats(0.02, 0.5), st.integers(0, 2)
+    ),
+    min_size=1,
+    max_size=25,
+).map(
+    lambda rows: tuple(
+        Phoneme(sum(r[1] for r in rows[:k]), sum(r[1] for r in rows[: k + 1]), ipa, stress)
+        for k, (ipa, _, stress) in enumerate(rows)
+    )
+)
+
+
+@pytest.mark.parametrize("closed", BILABIALS)
+@pytest.mark.parametrize("vowel", ["ɑ", "i", "u"])
+def test_bilabials_close_the_lips_in_a_frame_of_any_phase(closed: str, vowel: str) -> None:
+    channels = lip_channels(say(f"_ {vowel} {closed} {vowel} _", 0.05), 0.0)
+    faps_at = lambda t: to_fap(blend(channels, t)).integers()  # noqa: E731
+    for phase in np.arange(0, 0.04, 0.005):
+        times = np.arange(phase, 0.75, 0.04)
+        frames = faps_at(times)
+        inside = (times > 0.32) & (times < 0.43)
+        for upper, lower in ((4, 5), (8, 10), (9, 11), (51, 52)):
+            between = -frames[inside, upper - 1] - frames[inside, lower - 1]
+            assert between.min() <= 0, (phase, upper)
+
+
+@pytest.mark.parametrize("bitten", ["f", "v", "ɱ", "ʋ"])
+def test_labiodentals_bring_the_lower_lip_to_the_teeth(bitten: str) -> None:
+    channels = lip_channels(say(f"_ ɑ {bitten} ɑ _"), 0.0)
+    inside = slice(43, 47)
+    assert values(channels, 5)[inside].min() > 50  # raised
+    assert values(channels, 4)[inside].max() < -50  # the upper lip clears the teeth
+    assert 0 < gap(channels)[inside].max() < 70
+
+
+def test_open_vowels_open_more_than_close_ones() -> None:
+    assert opening("ɑ") > opening("æ") > opening("ɛ") > opening("e") > opening("i") > opening("u")
+    assert 11 * 46 < opening("ɑ") < 14 * 46  # 11 to 14 mm
+    assert 3.5 * 46 < opening("i") < 5.5 * 46
+    assert 2 * 46 < opening("u") < 4 * 46
+
+
+def test_the_jaw_goes_with_the_vowel() -> None:
+    jaws = [middle(v, 3) for v in ("ɑ", "ɛ", "i")]
+    assert jaws == sorted(jaws, reverse=True)
+    assert middle("s", 3) < middle("k", 3)
+
+
+def test_spread_vowels_are_wide_and_round_ones_narrow_and_forward() -> None:
+    assert middle("i", 6) > 30
+    assert middle("u", 6) < -60
+    assert middle("u", 17) > 100 > abs(middle("i", 17))
+    assert middle("y", 17) > 100
+    assert middle("ʃ", 17) > 60
+
+
+def test_the_tongue_shows_for_th_and_rises_for_l() -> None:
+    assert middle("θ", 45) > 2 * abs(middle("k", 45))
+    assert middle("l", 44) > 100
+    assert middle("k", 46) > 80
+
+
+def test_rounding_starts_before_its_vowel() -> None:
+    plain = lip_channels(say("_ t s t i _"), 0.0)
+    round_ = lip_channels(say("_ t s t u _"), 0.0)
+    before = slice(40, 50)  # the s, 0.1 to 0.2 s before the vowel
+    assert (values(round_, 17)[before] > values(plain, 17)[before] + 10).all()
+
+
+def test_h_takes_the_mouth_of_its_neighbour() -> None:
+    channels = lip_channels(say("_ h ɑ _", 0.12), 0.0)
+    assert gap(channels)[36] > 0.5 * gap(channels).max()
+
+
+def test_stressed_vowels_reach_further() -> None:
+    strong = gap(lip_channels(say("_ t ɑ t _"), 0.0)).max()
+    weak = gap(lip_channels(say("_ t ɑ t _", stressed=False), 0.0)).max()
+    assert 0.7 * strong < weak < 0.95 * strong
+
+
+def test_long_pauses_let_go_of_the_lips_and_short_ones_do_not() -> None:
+    first = say("ɑ t ɑ")
+    for pause, free in ((0.2, False), (0.35, False), (0.8, True)):
+        start = first[-1].end + pause
+        second = tuple(Phoneme(p.start + start, p.end + start, p.ipa, 1) for p in first)
+        channels = lip_channels((*first, Phoneme(first[-1].end, start, ""), *second), 0.0)
+        lips = next(c for c in channels if c.target.name == "lips")
+        inside = lips.values[(lips.times > first[-1].end) & (lips.times < start)]
+        assert (inside.min() == 0) == free
+        between = gap(channels)[(lips.times > first[-1].end) & (lips.times < start)]
+        assert (between.min() > 100) == (pause == 0.2)
+
+
+def test_nothing_said_moves_nothing() -> None:
+    assert lip_channels((), 0.0) == ()
+    assert lip_channels(say("_ _"), 0.0) == ()
+    assert lip_channels(say("ʔ h"), 0.0) == ()
+
+
+def test_a_later_start_moves_every_key() -> None:
+    for here, later in zip(lip_channels(say("ɑ p"), 0.0), lip_channels(say("ɑ p"), 2.5), strict=True):
+        assert np.allclose(later.times, here.times + 2.5)
+        assert np.array_equal(later.values, here.values)
+        assert here.layer is Layer.SPEECH
+
+
+@given(phonemes_of_speech)
+def test_any_speech_begins_and_ends_at_rest_and_never_jumps(phonemes: tuple[Phoneme, ...]) -> None:
+    speed = coarticulation()["speed"]
+    for channel in lip_channels(phonemes, 0.0):
+        assert np.isfinite(channel.values).all()
+        assert channel.values[0] == pytest.approx(0, abs=1e-9)
+        assert channel.values[-1] == pytest.approx(0, abs=1e-9)
+        assert (np.diff(channel.times) > 0).all()
+        assert channel.times[-1] <= max(phonemes[-1].end, 0.02) + 1e-9
+        slope = np.abs(np.diff(channel.values) / np.diff(channel.times)).max()
+        if channel.target.name == "open_jaw":
+            assert slope <= speed["jaw"] * 1.001
+        elif channel.target.name != "lips":
+            # The lower lip that stops at the upper one may add the speed of both.
+            assert slope <= 2 * speed["lips"] * 1.001
+
+
+@given(phonemes_of_speech)
+def test_any_speech_is_symmetrical_and_within_what_a_face_can_do(phonemes: tuple[Phoneme, ...]) -> None:
+    channels = lip_channels(phonemes, 0.0)
+    if not channels:
+        return
+    for row in faps():
+        if any(NUMBER.get(c.target.name) == row.fap for c in channels):
+            found = values(channels, row.fap)
+            assert np.array_equal(found, row.sign * values(channels, row.mirror))
+            assert found.min() >= row.least
+            assert found.max() <= row.most
+    assert gap(channels).min() >= -37  # lips press; they do not pass through each other
+    assert gap(channels).max() < 14 * 46
+
+
+@given(phonemes_of_speech)
+def test_any_bilabial_closes(phonemes: tuple[Phoneme, ...]) -> None:
+    channels = lip_channels(phonemes, 0.0)
+    for phoneme in phonemes:
+        if phoneme.ipa in BILABIALS:
+            times = channels[0].times
+            centre = (phoneme.start + phoneme.end) / 2
+            near = np.abs(times - centre) <= 0.0225
+            assert gap(channels)[near].max() <= 1e-6
+
+
+def test_every_symbol_has_a_mouth_or_none_on_purpose() -> None:
+    for ipa, features in phoneme_features().items():
+        (sound,) = sounds(ipa)
+        parts = sum(part for _, part in sound.mix)
+        quiet = features.place in ("glottal", "pharyngeal", "epiglottal")
+        assert parts == pytest.approx(0 if quiet else 1)
+        assert all(0 < viseme <= 14 for viseme, _ in sound.mix)
+
+
+def test_all_visemes_of_the_standard_are_used() -> None:
+    used = {viseme for ipa in phoneme_features() for viseme, _ in sounds(ipa)[0].mix}
+    assert used == set(range(1, 15))
+    assert [row.viseme for row in lip_shapes()] == list(range(15))
+
+
+@pytest.mark.parametrize(
+    ("phonemes", "viseme"),
+    [("p b m", 1), ("f v", 2), ("θ ð", 3), ("t d", 4), ("k g", 5), ("tʃ dʒ ʃ", 6),
+     ("s z", 7), ("n l", 8), ("ɹ", 9),
+     ("ɑː", 10), ("ɛ", 11), ("ɪ", 12), ("ɒ", 13), ("ʊ", 14)],
+)  # fmt: skip
+def test_the_examples_of_the_standard_have_their_viseme(phonemes: str, viseme: int) -> None:
+    for ipa in phonemes.split():
+        mix = dict(sounds(ipa)[0].mix)
+        assert max(mix, key=lambda v: mix[v]) == viseme
+
+
+@pytest.mark.parametrize(
+    ("written", "plain"),
+    [
+        ("t͡ʃ", "tʃ"),
+        ("t̪", "t"),
+        ("õ", "o"),
+        ("aː", "a"),
+        ("n̩", "n"),
+        ("pʰ", "p"),
+        ("tʲ", "t"),
+        ("˥a", "a"),
+        ("ç", "ç"),
+        ("ɔ˞", "ɔ"),
+    ],
+)
+def test_diacritics_do_not_change_the_mouth(written: str, plain: str) -> None:
+    assert sounds(written) == sounds(plain)
+
+
+def test_strings_of_several_sounds_share_their_time() -> None:
+    assert [s.share for s in sounds("oʊ")] == pytest.approx([0.55, 0.45])
+    assert [s.vowel for s in sounds("ɔːɹ")] == [True, False]
+    assert sum(s.share for s in sounds("aɪəɹ")) == pytest.approx(1)
+    assert len(sounds("tʃ")) == 1
+    assert sounds("kʷ")[0].mix != sounds("k")[0].mix
+
+
+@given(st.text(max_size=8))
+def test_any_string_is_taken_for_ipa(text: str) -> None:
+    found = sounds(text)
+    assert not found or sum(s.share for s in found) == pytest.approx(1)

@@ -1,0 +1,430 @@
+"""espeak-ng: every known trap of the engine is a test here."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.errors import VoiceError
+from realizer.speech.espeak import KEPT, EspeakVoice, choose_voice
+from realizer.speech.espeak_worker import Event, label
+from realizer.speech.utterance import Say, Utterance
+
+pytestmark = pytest.mark.espeak
+
+HELLO = Say('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))
+
+
+def times(utterance: Utterance) -> tuple[object, ...]:
+    return utterance.words, utterance.phonemes, dict(utterance.marks), utterance.duration
+
+
+def starts(utterance: Utterance) -> dict[str, float]:
+    return {word.text: word.start for word in utterance.words}
+
+
+def same(a: Utterance, b: Utterance) -> bool:
+    return times(a) == times(b) and np.array_equal(a.pcm, b.pcm)
+
+
+def test_sound_is_exactly_as_long_as_it_says(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.pcm is not None
+    assert said.duration == len(said.pcm) / said.sample_rate
+    assert said.sample_rate == 22050
+    assert np.abs(said.pcm.astype(int)).max() > 3000
+
+
+def test_marks_are_where_their_word_is_heard(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.marks == {"s1": starts(said)["very"], "s2": starts(said)["meet"]}
+    assert said.pcm is not None
+    # Against the sound itself: "meet" starts with a hum that "to" before it does not have.
+    at = round(said.marks["s2"] * said.sample_rate)
+    spectrum = np.abs(np.fft.rfft(said.pcm[at : at + 1024]))
+    assert 2 < int(spectrum.argmax()) < 12  # 40-260 Hz: voiced from the mark on
+
+
+def test_phonemes_tile_the_sound(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.phonemes[0].start == 0
+    assert said.phonemes[-1].end == said.duration
+    assert [p.end for p in said.phonemes[:-1]] == [p.start for p in said.phonemes[1:]]
+    assert all(p.end > p.start for p in said.phonemes)
+    assert [p.ipa for p in said.phonemes if p.stress == 1] == ["oʊ", "ɛ", "iː", "iː"]
+
+
+def test_pauses_are_silent_and_everything_else_is_not(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.pcm is not None
+    for phoneme in said.phonemes:
+        part = said.pcm[round(phoneme.start * said.sample_rate) : round(phoneme.end * said.sample_rate)]
+        loud = np.abs(part.astype(int)).max()
+        if phoneme.ipa:
+            assert loud > 100, phoneme
+        elif phoneme.end - phoneme.start > 0.1:
+            assert np.sqrt(np.mean(part.astype(float) ** 2)) < 100, phoneme
+
+
+def test_a_closure_belongs_to_the_stop_that_it_closes(voice: EspeakVoice) -> None:
+    said = voice.say(Say("My happy puppy."))
+    stops = [p for p in said.phonemes if p.ipa == "p"]
+    assert said.pcm is not None
+    assert len(stops) == 3
+    for stop in stops:
+        first = round(stop.start * said.sample_rate)
+        assert np.abs(said.pcm[first + 20 : first + 400].astype(int)).max() < 100
+        assert stop.end - stop.start > 0.06
+
+
+@pytest.mark.parametrize(
+    ("language", "text"),
+    [
+        ("en-US", "One two. {}Three four. {}Five it is. {}End of it. {}Last one."),
+        ("nl-NL", "Een twee. {}Drie vier. {}Vijf zes. {}Zeven. {}Acht."),
+        ("fr-FR", "Un deux. {}Trois quatre. {}Cinq six. {}Sept. {}Huit."),
+        ("pl-PL", "Raz dwa. {}Trzy cztery. {}Pięć sześć. {}Siedem. {}Osiem."),
+    ],
+)
+def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, text: str) -> None:
+    marked = text.format(*(f'<mark name="{name}"/>' for name in "abcd"))
+    said = voice.say(Say(marked, tuple("abcd"), language))
+    assert list(said.marks) == list("abcd")
+    words = {word.start for word in said.words}
+    assert set(said.marks.values()) <= words
+    firsts = [s.split()[0].strip(".") for s in text.split("{}")[1:]]
+    assert [w.text for w in said.words if w.start in set(said.marks.values())] == firsts
+
+
+def test_words_that_the_dictionary_merges_come_apart(voice: EspeakVoice) -> None:
+    said = voice.say(Say("I am in the house, and it would have been the one of the best."))
+    assert [w.text for w in said.words] == [
+        *("I", "am", "in", "the", "house", "and", "it", "would"),
+        *("have", "been", "the", "one", "of", "the", "best"),
+    ]
+    assert all(word.end - word.start > 0.04 for word in said.words)
+    spans = {w.text: (w.start, w.end) for w in said.words[:2]}
+    within = lambda word: [p.ipa for p in said.phonemes if spans[word][0] <= p.start < spans[word][1]]  # noqa: E731
+    assert within("I") == ["aɪ"]
+    assert within("am") in (["ɐ", "m"], ["æ", "m"])
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "word"),
+    [
+        ("en-US", 'I <mark name="m"/>am here.', "am"),
+        ("pl-PL", 'nie <mark name="m"/>wiem tego', "wiem"),
+        ("fr-FR", 'Je ne sais <mark name="m"/>pas.', "pas"),
+    ],
+)
+def test_marks_inside_merged_words_stay_there(
+    voice: EspeakVoice, language: str, text: str, word: str
+) -> None:
+    said = voice.say(Say(text, ("m",), language))
+    assert said.marks["m"] == starts(said)[word] > 0.05
+    assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes} | {w.end for w in said.words}
+
+
+@pytest.mark.parametrize(
+    "mark", ["<mark name='x'/>", '<bookmark mark="x"/>', '<s:mark name="x"/>', "<mark name='x'></mark>"]
+)
+def test_every_spelling_of_a_mark_is_a_mark(voice: EspeakVoice, mark: str) -> None:
+    said = voice.say(Say(f"one two {mark}three", ("x",)))
+    assert said.marks == {"x": starts(said)["three"]}
+    assert not said.warnings
+
+
+def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
+    name = "a&quot;b'ü"
+    said = voice.say(Say(f'one <mark name="{name}"/>two', (name,)))
+    assert list(said.marks) == ["a\"b'ü"]
+
+
+def test_a_mark_before_a_break_is_before_the_silence(voice: EspeakVoice) -> None:
+    said = voice.say(Say('one <mark name="a"/><break time="800ms"/><mark name="b"/>two', ("a", "b")))
+    assert said.marks["a"] == pytest.approx(said.words[0].end, abs=0.05)
+    assert said.marks["b"] == said.words[1].start > said.marks["a"] + 0.7
+
+
+def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
+    first, second = EspeakVoice(), EspeakVoice()
+    try:
+        second.say(Say("Something quite different comes first.", language="nl"))
+        for k in range(5):
+            second.say(Say(f"Number {k}."))
+        assert same(first.say(HELLO), second.say(HELLO))
+    finally:
+        first.close()
+        second.close()
+
+
+def test_without_fork_the_samples_are_the_same(voice: EspeakVoice) -> None:
+    alone = EspeakVoice(options=("--no-fork",))
+    try:
+        assert same(alone.say(HELLO), voice.say(HELLO))
+        assert alone.say(Say("Again, I am."))  # each request its own process
+        assert alone.pid is None
+    finally:
+        alone.close()
+
+
+def test_a_known_request_does_not_reach_the_engine(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    said = lone.say(HELLO)
+    lone.close()
+    assert lone.say(replace(HELLO)) is said
+    assert lone.pid is None
+
+
+def test_only_so_many_utterances_are_kept() -> None:
+    lone = EspeakVoice()
+    try:
+        first = lone.say(Say("0"))
+        for k in range(1, KEPT + 1):
+            lone.say(Say(str(k)))
+        assert lone.say(Say("0")) is not first
+        assert same(lone.say(Say("0")), first)
+    finally:
+        lone.close()
+
+
+def test_many_threads_may_speak_at_once(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    said: dict[tuple[int, int], Utterance] = {}
+    texts = [Say(f"It is line {k}, I am sure.") for k in range(8)]
+
+    def speak(thread: int) -> None:
+        for k in range(8):
+            said[thread, k] = lone.say(texts[(k + thread) % 8])
+
+    threads = [threading.Thread(target=speak, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    lone.close()
+    assert len(said) == 32
+    assert all(same(said[n, k], voice.say(texts[(k + n) % 8])) for n, k in said)
+
+
+def test_a_killed_engine_fails_one_text_and_no_more(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    try:
+        lone.say(Say("first"))
+        assert lone.pid is not None
+        os.kill(lone.pid, signal.SIGKILL)
+        with pytest.raises(VoiceError, match="starts it again"):
+            lone.say(HELLO)
+        assert same(lone.say(HELLO), voice.say(HELLO))
+    finally:
+        lone.close()
+
+
+def test_a_hung_engine_is_replaced(voice: EspeakVoice) -> None:
+    lone = EspeakVoice(limit=5.0)
+    try:
+        lone.say(Say("first"))
+        lone._process._limit = 0.2
+        assert lone.pid is not None
+        os.kill(lone.pid, signal.SIGSTOP)
+        with pytest.raises(VoiceError, match="did not answer"):
+            lone.say(HELLO)
+        lone._process._limit = 5.0
+        assert same(lone.say(HELLO), voice.say(HELLO))
+    finally:
+        lone.close()
+
+
+def test_a_closed_or_forgotten_voice_leaves_no_process() -> None:
+    for close in (True, False):
+        lone = EspeakVoice()
+        lone.say(Say("first"))
+        pid = lone.pid
+        assert pid is not None
+        if close:
+            lone.close()
+            lone.close()
+        del lone
+        gc.collect()
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_the_engine_ends_with_its_parent() -> None:
+    import subprocess
+    import sys
+
+    from realizer.speech.espeak_process import WORKER
+
+    worker = subprocess.Popen(
+        [sys.executable, "-P", str(WORKER)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    assert worker.stdout.readline().startswith(b'{"rate"')
+    worker.stdin.close()  # what the system does for a parent that dies
+    assert worker.wait(10) == 0
+    worker.stdout.close()
+
+
+def test_data_behind_a_long_path_are_found(tmp_path: Path, voice: EspeakVoice) -> None:
+    import espeakng_loader  # the folder's name only; the engine stays in the worker
+
+    folder = tmp_path.joinpath(*["a" * 60] * 4)
+    folder.mkdir(parents=True)
+    data = folder / "espeak-ng-data"
+    data.symlink_to(espeakng_loader.get_data_path())
+    assert len(str(data)) > 200
+    lone = EspeakVoice(options=("--data", str(data)))
+    try:
+        assert same(lone.say(HELLO), voice.say(HELLO))
+        assert same(lone.say(Say("hallo", language="nl")), voice.say(Say("hallo", language="nl")))
+    finally:
+        lone.close()
+
+
+def test_data_that_are_not_there_are_an_error_with_words(tmp_path: Path) -> None:
+    lone = EspeakVoice(options=("--data", str(tmp_path)))
+    with pytest.raises(VoiceError, match="does not start"):
+        lone.say(HELLO)
+
+
+@pytest.mark.parametrize(
+    ("tag", "engine"),
+    [
+        ("fr-FR", "roa/fr"),
+        ("fr-fr", "roa/fr"),
+        ("nl-NL", "gmw/nl"),
+        ("nl_BE", "gmw/nl"),
+        ("en-GB", "gmw/en"),
+        ("en-US", "gmw/en-US"),
+        ("EN-us", "gmw/en-US"),
+        ("en-AU", "gmw/en"),
+        ("pt-BR", "roa/pt-BR"),
+        ("zh-CN", "sit/cmn"),
+        ("zh-yue", "sit/yue"),
+        ("no", "gmq/nb"),
+        ("es-MX", "roa/es-419"),
+    ],
+)
+def test_language_tags_find_their_voice(voice: EspeakVoice, tag: str, engine: str) -> None:
+    assert choose_voice(voice._process.hello(), None, tag) == (engine, ())
+    assert voice.say(Say("a", language=tag)).duration > 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "engine"),
+    [
+        ("nl", "gmw/nl"),
+        ("en-gb+f3", "gmw/en+f3"),
+        ("+m3", "gmw/de+m3"),
+        ("f2", "gmw/de+f2"),
+        ("Polish", "zlw/pl"),
+    ],
+)
+def test_voices_are_chosen_by_name_and_variant(voice: EspeakVoice, wanted: str, engine: str) -> None:
+    assert choose_voice(voice._process.hello(), wanted, "de-DE") == (engine, ())
+    assert voice.say(Say("a", voice=wanted, language="de-DE")).duration > 0
+
+
+def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) -> None:
+    said = voice.say(Say("hello", language="xx-YY", voice="nobody+nothing"))
+    assert said.duration > 0.3
+    assert [w.split(":")[0] for w in said.warnings] == [
+        "espeak-ng has no voice 'nobody'",
+        "espeak-ng has no variant 'nothing'",
+        "espeak-ng does not speak 'xx-YY'",
+    ]
+
+
+def test_language_flags_are_no_phonemes(voice: EspeakVoice) -> None:
+    said = voice.say(Say("c'est un weekend", language="fr"))
+    assert not any("(" in phoneme.ipa for phoneme in said.phonemes)
+
+
+def test_a_phoneme_of_eight_bytes_is_read_whole() -> None:
+    event = Event(type=7)
+    event.id.string = "ˈaɪəɹ".encode()[:8]
+    assert len("ˈaɪəɹ".encode()) == 9
+    assert label(event) == "ˈaɪə�"  # eight bytes, no end: nothing of what follows is read
+    event.id.string = "ˈaʊə".encode()
+    assert label(event) == "ˈaʊə"
+
+
+def test_rate_makes_speech_faster_within_what_the_engine_can(voice: EspeakVoice) -> None:
+    lengths = [voice.say(replace(HELLO, rate=rate)).duration for rate in (0.1, 0.5, 1.0, 2.0, 100.0)]
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[1] > 1.5 * lengths[2] > 2 * lengths[3]
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        ("one <b>two", "not well-formed"),
+        ("one < two & three", "not well-formed"),
+        ("one <!DOCTYPE a> two", "not well-formed"),
+        ("one &nothing; two", "not well-formed"),
+        ("one \x00\x07 two", "control characters"),
+        ("one \ud800 two", "control characters"),
+        ("one 😀 two", "emoji"),
+    ],
+)
+def test_bad_text_is_spoken_with_a_warning(voice: EspeakVoice, text: str, warning: str) -> None:
+    said = voice.say(Say(text))
+    assert {"one", "two"} <= set(starts(said))
+    assert any(warning in sentence for sentence in said.warnings)
+
+
+def test_marks_survive_wrong_ssml(voice: EspeakVoice) -> None:
+    said = voice.say(Say("one <mark name='a'/>two <b>three <mark name=\"c\">four", ("a", "c")))
+    assert said.marks == {"a": starts(said)["two"], "c": starts(said)["four"]}
+
+
+@pytest.mark.parametrize("text", ["", "   ", "😀", '<mark name="m"/>', "...", "\x00"])
+def test_an_empty_text_takes_no_time_and_is_said(voice: EspeakVoice, text: str) -> None:
+    said = voice.say(Say(text, ("m",)))
+    assert said.duration == 0
+    assert said.words == said.phonemes == ()
+    assert all(time == 0 for time in said.marks.values())
+    assert any("empty" in sentence for sentence in said.warnings)
+
+
+def test_a_text_of_200_kilobytes_is_refused_with_words(voice: EspeakVoice) -> None:
+    with pytest.raises(VoiceError, match="at most 20000 characters, got 200000"):
+        voice.say(Say("word " * 40_000))
+    assert voice.say(HELLO).duration > 2
+
+
+def test_a_long_text_is_spoken(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    said = lone.say(Say("I am here, and it is late. " * 100 + '<mark name="end"/>', ("end",)))
+    lone.close()
+    assert len(said.words) == 700
+    assert said.words[-1].end <= said.marks["end"] <= said.duration
+    assert all(a.end <= b.start for a, b in zip(said.words, said.words[1:], strict=False))
+
+
+def test_files_are_not_opened(voice: EspeakVoice, tmp_path: Path) -> None:
+    said = voice.say(Say(f'one <audio src="{tmp_path}/sound.wav">two</audio> three'))
+    assert [w.text for w in said.words] == ["one", "two", "three"]
+
+
+@pytest.mark.parametrize("language", ["ar", "hi", "zh", "ja", "ru", "el", "th", "ko", "de", "tr", "vi"])
+def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
+    texts = {
+        "ar": "مرحبا بالعالم", "hi": "नमस्ते दुनिया", "zh": "你好世界", "ja": "こんにちは", "ru": "Привет, мир",
+        "el": "καλημέρα κόσμε", "th": "สวัสดี", "ko": "안녕하세요", "de": "Grüß Gott",
+        "tr": "günaydın", "vi": "xin chào",
+    }  # fmt: skip
+    said = voice.say(Say(texts[language], language=language))
+    assert said.words
+    assert said.words[0].end > said.words[0].start
+    assert sum(bool(p.ipa) for p in said.phonemes) > 3
+    assert not said.warnings

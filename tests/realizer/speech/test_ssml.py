@@ -1,0 +1,81 @@
+"""Scripts: what is kept of SSML, and that nothing breaks the reader."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.errors import VoiceError
+from realizer.speech.espeak_events import write_document
+from realizer.speech.ssml import MOST_TEXT, Break, Mark, Tag, read_script
+from realizer.speech.utterance import Say
+
+
+def parts(ssml: str) -> tuple[object, ...]:
+    return read_script(Say(ssml)).parts
+
+
+def test_blanks_are_one_and_marks_keep_their_place() -> None:
+    assert parts(' a\n\t <mark name="m"/> b  &amp; c ') == ("a ", Mark("m"), "b & c ")
+
+
+def test_a_speak_element_inside_is_no_matter() -> None:
+    assert parts("<speak>a <mark name='m'/>b</speak>") == ("a ", Mark("m"), "b")
+
+
+def test_breaks_have_seconds_and_a_limit() -> None:
+    ssml = '<break time="250ms"/><break time="1.5s"/><break strength="none"/><break/><break time="9999s"/>'
+    assert parts(ssml) == (Break(0.25), Break(1.5), Break(0.0), Break(0.4), Break(10.0))
+
+
+def test_only_elements_and_attributes_of_speech_are_kept() -> None:
+    script = read_script(
+        Say('<prosody rate="fast" onclick="x">a</prosody><audio src="/etc/passwd">b</audio>')
+    )
+    assert script.parts == (Tag("prosody", (("rate", "fast"),)), "a", Tag("prosody", None), "b")
+    assert "passwd" not in write_document(script).text
+
+
+def test_a_bml_sync_is_a_mark() -> None:
+    assert read_script(Say('a <bml:sync id="x"/>b')).marks == ("x",)
+
+
+def test_attributes_are_written_in_double_quotes() -> None:
+    text = write_document(read_script(Say("<sub alias='say \"this\" &amp; that'>x</sub>"))).text
+    assert text == '<speak><sub alias="say  this  &amp; that">x</sub></speak>'
+
+
+def test_places_count_characters_of_what_is_written() -> None:
+    document = write_document(read_script(Say('a &amp; b <mark name="z"/>c')))
+    assert [(word, document.text[place - 1 :][: len(word)]) for word, place in document.words] == [
+        ("a", "a"),
+        ("&", "&"),
+        ("b", "b"),
+        ("c", "c"),
+    ]
+
+
+def test_the_longest_text_is_still_taken() -> None:
+    assert read_script(Say("a" * MOST_TEXT)).text
+    with pytest.raises(VoiceError, match="split it"):
+        read_script(Say("a" * (MOST_TEXT + 1)))
+
+
+@given(st.text(max_size=200))
+def test_any_text_makes_a_script_that_can_be_written(text: str) -> None:
+    script = read_script(Say(text))
+    document = write_document(script)
+    document.text.encode()
+    assert read_script(Say(document.text[7:-8])).text == script.text
+
+
+@given(
+    st.lists(
+        st.sampled_from(["one", "two.", " ", '<mark name="m"/>', "<p>", "</p>", "&amp;", "<", "'", "😀"])
+    )
+)
+def test_any_jumble_of_markup_keeps_its_words(pieces: list[str]) -> None:
+    script = read_script(Say("".join(pieces)))
+    assert script.text.count("one") == pieces.count("one")
+    assert len(script.marks) == pieces.count('<mark name="m"/>')
