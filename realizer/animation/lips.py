@@ -228,7 +228,7 @@ def _smooth(values: Float64, reach: float) -> Float64:
     padded = np.concatenate(
         (2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1])
     )
-    smooth: Float64 = sum(weight * padded[k : k + len(values)] for k, weight in enumerate(bell))  # type: ignore[assignment]
+    smooth: Float64 = sum(weight * padded[k : k + len(values)] for k, weight in enumerate(bell))
     return smooth
 
 

@@ -215,29 +215,24 @@ def _cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: set[in
         shares = np.concatenate(([0.0], np.cumsum(counts)[:-1])) / counts.sum()
         return [round(share * len(heard)) for share in shares]
     bare = [_bare(sound) for sound in heard]
-    rows, columns = len(flat) + 1, len(bare) + 1
-    cost = np.full((rows, columns), np.inf)
-    step = np.zeros((rows, columns), np.int8)  # 0 both, 1 expected alone, 2 heard alone
-    cost[0] = 0.7 * np.arange(columns)
-    step[0] = 2
-    for i in range(1, rows):
-        sound, opens = flat[i - 1]
-        for j in range(columns):
-            hint = -0.5 if opens and j - 1 in hints else 0.0
-            ways = (
-                cost[i - 1, j - 1] + _difference(sound, bare[j - 1]) + hint if j else np.inf,
-                cost[i - 1, j] + 0.7,
-                cost[i, j - 1] + 0.7 if j else np.inf,
-            )
-            step[i, j] = int(np.argmin(ways))
-            cost[i, j] = ways[step[i, j]]
+    # Plain lists: the groups are small, and indexing arrays one number at a time is slow.
+    cost = [0.7 * j for j in range(len(bare) + 1)]
+    steps = [[2] * (len(bare) + 1)]  # 0 both, 1 expected alone, 2 heard alone
+    for sound, opens in flat:
+        above, cost, step = cost, [cost[0] + 0.7], [1]
+        for j, other in enumerate(bare):
+            hint = -0.5 if opens and j in hints else 0.0
+            ways = (above[j] + _difference(sound, other) + hint, above[j + 1] + 0.7, cost[j] + 0.7)
+            cost.append(min(ways))
+            step.append(ways.index(cost[-1]))
+        steps.append(step)
     at = [0] * len(flat)  # for each expected phoneme, the first one heard from there on
     i, j = len(flat), len(bare)
     while i:
-        if step[i, j] == 2:
+        if steps[i][j] == 2:
             j -= 1
             continue
-        j -= step[i, j] == 0
+        j -= steps[i][j] == 0
         i -= 1
         at[i] = j
     cuts, passed = [], 0
