@@ -16,12 +16,12 @@ from realizer.tables import faps
 __all__: list[str] = []
 
 FAPS = 68
-# Rows after the FAPs': they are multiplied by 1 - cos and sin of an angle.
-JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN = range(FAPS, FAPS + 4)
-ROWS = FAPS + 4
+# Rows after the FAPs': they are multiplied by 1 - cos and sin of an angle, the last by metres.
+JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)
+ROWS = FAPS + 5
 
 ARRAYS = {
-    "row": 1,  # which FAP (its number) or extra row (70..73 are JAW_COS.. + 1), ascending
+    "row": 1,  # which FAP (its number) or extra row (69..73 are JAW_COS.. + 1), ascending
     "start": 1,  # where the row's part of vertex and move begins; one more than rows
     "vertex": 1,
     "move": 2,  # metres for each metre (radian) that the feature point is asked to move
@@ -46,7 +46,7 @@ def basis_from(
 
     Returns:
         moving: (first, last + 1), the vertices that any FAP but the head's moves.
-        fields: (72, 3 x moving) float32, metres per FAPU, then the four rows of the jaw and the tongue.
+        fields: (73, 3 x moving) float32, metres per FAPU, then the five rows of the jaw and the tongue.
         head: (n, 1) float32 0..1; head_pivot: (3,).
         chin: (2,) float64, y and z of 2.1 about the jaw's axis.
         eyes: ((first, last + 1), (3,) centre) for left and right; thrust: metres per FAPU of 27 and 28.
@@ -104,7 +104,8 @@ def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
     numbers, starts, vertices, moves = [], [0], [], []
     for number in sorted(rows):
         field = np.asarray(rows[number], np.float64)
-        least = threshold if number <= FAPS else threshold * 0.05  # these are metres from the pivot
+        # Turns are in metres from the pivot.
+        least = threshold if number <= FAPS or number == JAW_DROP + 1 else threshold * 0.05
         index: Int32 = np.flatnonzero(np.abs(field).max(axis=1) > least).astype(np.int32)
         numbers.append(number)
         vertices.append(index)

@@ -36,6 +36,7 @@ ORDER = (
 FLOOR = -0.31  # m; the bust ends in this plane
 NECK_TOP, NECK_END = -0.112, -0.185  # m; the head's turn fades out between them, along a plane that tilts with the jaw
 NECK_TILT = 0.30
+MIRROR = np.array([-1.0, 1.0, 1.0])
 EYE_INSET = 0.00015  # m; the ball lies that much inside the socket's fit
 
 
@@ -57,14 +58,18 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     recipe = _recipe(folder / "recipe.toml")
     data = _data(data)
     mesh = hm08.read_base(data)
+    twin = mesh.mirror()
     at = _identity(mesh, data, recipe)
+    at = (at + at[twin] * MIRROR) / 2
     balls = [_ball(at[np.unique(mesh.quads[f"helper-{k}-eye"])]) for k in "lr"]
     points = _landmarks(mesh, at)
     cache: dict[str, Float64] = {}
 
     def shape(unit: str) -> Float64:
         if unit not in cache:
-            cache[unit] = hm08.read_target(data, unit, len(at)) * hm08.DECIMETRE
+            # The data are rounded to a tenth of a millimetre, each side on its own: take the mean of both.
+            sides = [hm08.read_target(data, name, len(at)) for name in (unit, _other_side(unit))]
+            cache[unit] = (sides[0] + sides[1][twin] * MIRROR) / 2 * hm08.DECIMETRE
         return cache[unit]
 
     at = close_lips(Ground(mesh, at, points, shape))
@@ -75,6 +80,14 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     made = _parts(ground, lips, lids, balls, recipe)
     turn = _head_weight(at)
     return _write(folder, name, recipe, ground, made, fields, turn, lids, balls, jaw_pivot)
+
+
+def _other_side(unit: str) -> str:
+    """`eyeBlinkLeft` for `eyeBlinkRight` and the other way; names without a side stay."""
+    for one, other in (("Left", "Right"), ("Right", "Left")):
+        if unit.endswith(one):
+            return unit.removesuffix(one) + other
+    return unit
 
 
 def _recipe(path: Path) -> dict[str, Any]:
@@ -268,11 +281,12 @@ def _write(
 
 def _hang_on_jaw(rows: dict[int, Float64], mine: slice, vertices: Float64, pivot: Float64) -> None:
     """The lower teeth turn, thrust and shift with the jaw bone."""
-    from realizer.face.basis import JAW_COS, JAW_SIN
+    from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN
 
     arm = vertices - pivot
     rows[JAW_COS + 1][mine, 1:] = -arm[:, 1:]
     rows[JAW_SIN + 1][mine, 1], rows[JAW_SIN + 1][mine, 2] = -arm[:, 2], arm[:, 1]
+    rows[JAW_DROP + 1][mine] = [0, -1, 0]
     rows[14][mine] = [0, 0, 1]
     rows[15][mine] = [-1, 0, 0]
 

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 
 from realizer.arrays import Bool, Float32, Float64
-from realizer.face.basis import FAPS, JAW_COS, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
+from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
 from realizer.face.model import Face
 from realizer.units import ANGLE_UNIT
 
 __all__ = ["deform"]
 
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
+MOST_TURN = 0.42  # rad, 24 degrees
 # Rotated by these, the parts are driven apart from the product.
-DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49, 22, 23, 24, 25, 26, 27]
+DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49, 22, 23, 24, 25]
 
 
 def deform(face: Face, faps: Any) -> Float32:
@@ -50,23 +51,30 @@ def deform(face: Face, faps: Any) -> Float32:
     return out
 
 
-def jaw_angle(basis: Any, opening: Any) -> Float64:
-    """Radians by which the jaw turns so that the chin (2.1) sinks by `opening` metres, as far as it can."""
+def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
+    """How the jaw stands when the chin (2.1) has sunk by `opening` metres: radians turned, metres slid down.
+
+    A jaw turns about its joint, and where it opens far the joint slides down and forwards: what the turn cannot
+    reach, the slide does.
+    """
     y, z = basis["chin"]
+    opening = np.asarray(opening, np.float64)
     # y' = y cos a - z sin a, so y - y' = opening is one sine of a shifted angle.
-    length = float(np.hypot(y, z))
-    rest = float(np.arctan2(y, z))
-    return np.arcsin(np.clip((np.asarray(opening, np.float64) - y) / length, -1, 1)) + rest
+    length, rest = float(np.hypot(y, z)), float(np.arctan2(y, z))
+    turned = np.minimum(np.arcsin(np.clip((opening - y) / length, -1, 1)) + rest, MOST_TURN)
+    reached = y - (y * np.cos(turned) - z * np.sin(turned))
+    # The neutral face stays still to the last bit.
+    return np.where(opening == 0, 0, turned), np.where(opening == 0, 0, opening - reached)
 
 
 def _weights(basis: Any, rows: Float32) -> Float32:
-    """(n, 72): what the rows of the basis are multiplied by."""
+    """(n, 73): what the rows of the basis are multiplied by."""
     weights = np.zeros((len(rows), ROWS), np.float32)
     weights[:, 2:FAPS] = rows[:, 2:]
     weights[:, DRIVEN] = 0
-    jaw = jaw_angle(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
-    jaw[rows[:, OPEN_JAW] == 0] = 0  # the neutral face stays still to the last bit
+    jaw, slid = jaw_pose(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
     weights[:, JAW_COS], weights[:, JAW_SIN] = 1 - np.cos(jaw), np.sin(jaw)
+    weights[:, JAW_DROP] = slid
     roll = rows[:, TONGUE_ROLL] * ANGLE_UNIT
     weights[:, TONGUE_COS], weights[:, TONGUE_SIN] = 1 - np.cos(roll), np.sin(roll)
     return weights

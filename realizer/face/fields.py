@@ -12,11 +12,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from realizer.arrays import Float64
-from realizer.face.basis import JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN
+from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
 from realizer.face.hm08 import BaseMesh
 from realizer.face.lids import lid_fields
 from realizer.face.lips import Lips, lip_fields
 from realizer.face.parts import smooth
+from realizer.tables import faps
 
 __all__: list[str] = []
 
@@ -83,7 +84,18 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     fields |= _nose(ground, lips)
     fields |= _ears(ground)
     fields |= _tongue(ground)
-    return fields, lips
+    return _mirrored(ground, fields), lips
+
+
+def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
+    """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
+    twin, flip = ground.mesh.mirror(), np.array([-1.0, 1.0, 1.0])
+    table = faps()
+    out = {}
+    for number, field in fields.items():
+        mirror, sign = (table[number - 1].mirror, table[number - 1].sign) if number <= FAPS else (number, 1)
+        out[number] = (field + sign * fields[mirror][twin] * flip) / 2
+    return out
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
@@ -105,11 +117,15 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     turn_cos[:, 1:] = -arm[:, 1:]
     turn_sin[:, 1], turn_sin[:, 2] = -arm[:, 2], arm[:, 1]
     # Thrust and shift take the lower lip along; the upper one stays.
-    slides = drag * (1 - lips.upper) * (1 - 0.5 * lips.corners) + tongue
+    # The corners, shared by both, go 0.4 of the way.
+    cornered = lips.corners / np.maximum(lips.lips, 1e-9)
+    lip = np.where(lips.is_upper, 0.4 * cornered, 1 - 0.6 * cornered)
+    slides = drag * (1 - lips.lips + lips.lips * lip) + tongue
     slides /= slides[chin]
     return {
         JAW_COS + 1: turn_cos * opens[:, None],
         JAW_SIN + 1: turn_sin * opens[:, None],
+        JAW_DROP + 1: -opens[:, None] * UP,
         14: slides[:, None] * FORWARD,
         15: -slides[:, None] * LEFT,
     }
@@ -163,7 +179,8 @@ def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:
 def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
     points, out = ground.points, {}
     free = (1 - lips.lips)[:, None]
-    for side, half in _halves(ground, ground.shape("cheekPuff") * free).items():
+    far = smooth(lips.away, 0.0, 0.032)[:, None]
+    for side, half in _halves(ground, ground.shape("cheekPuff") * far).items():
         number, name = (39, "5.1") if side > 0 else (40, "5.2")
         puffed = np.where(ground.body[:, None], half, 0)
         # The whole puff goes along, forwards too; only what points inwards is kept out.

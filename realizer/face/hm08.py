@@ -33,6 +33,13 @@ class BaseMesh:
     uv: Float64
     quads: Mapping[str, Int32]
 
+    def mirror(self) -> Int32:
+        """(n,) each vertex's twin on the other side; itself where it has none."""
+        from scipy.spatial import cKDTree
+
+        off, twin = cKDTree(self.vertices).query(self.vertices * [-1, 1, 1])
+        return np.where(off < 2e-3, twin, np.arange(len(twin))).astype(np.int32)
+
     def loop(self, first: int, second: int) -> list[int]:
         """The edge loop of the body that starts with these two vertices, as far as vertices have four edges.
 

@@ -28,8 +28,6 @@ class Lid:
     """
 
     def __init__(self, ground: Ground, side: int) -> None:
-        from scipy.spatial import cKDTree
-
         from realizer.face.hm08 import walk
 
         self.side = side
@@ -41,9 +39,8 @@ class Lid:
             found = [walk(edges, first, tip) for tip in tips]
             rings.append(next(ring for ring in found if len(ring) == 28))
         if side < 0:
-            rest = ground.mesh.vertices
-            tree = cKDTree(rest)
-            rings = [[int(i) for i in tree.query(rest[ring] * [-1, 1, 1])[1]] for ring in rings]
+            twin = ground.mesh.mirror()
+            rings = [[int(i) for i in twin[ring]] for ring in rings]
         self.rings = rings
         edge = rings[0]
         inner = min(edge, key=lambda i: float(at[i, 0] * side))
@@ -73,8 +70,8 @@ class Lid:
 
 
 def lid_fields(ground: Ground) -> dict[int, Float64]:
-    """Fields of FAPs 19-22: straight down or up; `deform` pushes them over the balls."""
-    from realizer.face.fields import UP, scaled
+    """Fields of FAPs 19-22, and what 27 and 28 do to the lids: straight down or up; `deform` pushes them over the balls."""
+    from realizer.face.fields import FORWARD, UP, scaled
 
     out = {}
     for side, numbers, names in ((1, (19, 21), ("3.1", "3.3")), (-1, (20, 22), ("3.2", "3.4"))):
@@ -87,6 +84,9 @@ def lid_fields(ground: Ground) -> dict[int, Float64]:
         above = at[:, 1] > lid.middle(at[:, 0])
         edge_x = np.clip(at[:, 0] * side, lid.x[0], lid.x[-1]) * side
         gap = lid.gap(edge_x) / lid.aperture
+        # A ball that is pushed out takes the lids along; nothing else on the face does.
+        ball = ground.ellipsoid(centre + FORWARD * 0.002, (0.036, 0.026, 0.034), 0.55)
+        out[27 if side > 0 else 28] = ground.smoothed(ball, 1)[:, None] * FORWARD
         # How much of the edge's way a vertex goes: by how far above (below) the edge it lies; the CC0 blink
         # says where the lid ends.
         for number, name, upper in ((numbers[0], names[0], True), (numbers[1], names[1], False)):

@@ -26,7 +26,7 @@ RINGS = (
 )  # fmt: skip
 MEET, BORDER = 1, 7
 LOWER_MIDDLE = 19  # place in a ring of 38 of the middle of the lower lip
-TENSION = 0.35
+TENSION = 0.75  # so little that equal FAPs overshoot by less than 2 % between the knots
 KNOTS = 5  # right corner, right half, middle, left half, left corner
 APART = 0.00005  # m that is left between closed lips
 ARC = 0.30  # metres forwards for each metre that the lower lip rises: it moves on the jaw's arc
@@ -205,9 +205,8 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
             put(number, name, lower * share * knot, UP + ARC * FORWARD, UP)
     out |= _corners(ground, lips, left, right, inner, outer)
     bow = (1 + np.cos(np.pi * np.clip(lips.u, -1, 1))) / 2
-    profile = 0.12 + 0.88 * bow
-    put(17, "2.2", upper * profile, FORWARD, FORWARD)
-    put(16, "2.3", lower * profile, FORWARD, FORWARD)
+    put(17, "2.2", upper * bow, FORWARD, FORWARD)
+    put(16, "2.3", lower * bow, FORWARD, FORWARD)
     boss = ground.ellipsoid(ground.point("2.10") - [0, 0.002, 0], (0.024, 0.0155, 0.03))
     field = (boss * (1 - lips.lips))[:, None] * (UP + 0.15 * FORWARD)
     out[18] = scaled(ground.smoothed(field, 1), points["2.10"], UP)

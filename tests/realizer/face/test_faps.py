@@ -1,0 +1,243 @@
+"""What MPEG-4 says of each FAP, on every face folder."""
+
+import numpy as np
+import pytest
+
+from realizer.face import Face, deform, list_faces, load_face
+from realizer.tables import Fap, faps
+
+FACES = [info.name for info in list_faces()]
+LOW_LEVEL = faps()[2:]
+WAYS = {
+    "up": (0, 1, 0),
+    "down": (0, -1, 0),
+    "left": (1, 0, 0),
+    "right": (-1, 0, 0),
+    "forward": (0, 0, 1),
+}
+TURNS = ("yaw_l_eyeball", "yaw_r_eyeball", "pitch_l_eyeball", "pitch_r_eyeball", "head_pitch", "head_yaw", "head_roll")
+SPECIAL = (*TURNS, "tongue_roll", "dilate_l_pupil", "dilate_r_pupil", "open_jaw")
+STRAIGHT = [row for row in LOW_LEVEL if row.name not in SPECIAL]
+UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
+LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
+CORNERS = ("2.4", "2.5", "8.3", "8.4")
+
+
+@pytest.fixture(params=FACES)
+def face(request: pytest.FixtureRequest) -> Face:
+    return load_face(request.param)
+
+
+def rows(values: dict[int, float]) -> np.ndarray:
+    out = np.zeros((1, 68), np.float32)
+    for fap, value in values.items():
+        out[0, fap - 1] = value
+    return out
+
+
+def moved(face: Face, values: dict[int, float]) -> np.ndarray:
+    """(n_vertices, 3) metres from the neutral face."""
+    return deform(face, rows(values))[0].astype(float) - face.vertices
+
+
+def usual(row: Fap) -> float:
+    """A value that people's faces reach: what animation asks for, not the most that can be coded."""
+    reach = {"MNS": 250, "MW": 150, "ENS": 100, "ES": 100, "IRISD": 300, "angle_unit": 20000}[row.unit]
+    if row.name.startswith("thrust") and row.unit == "ES":
+        reach = 30  # eyeballs: 2 mm
+    return min(reach, row.most)
+
+
+def whole(row: Fap, value: float) -> dict[int, float]:
+    """The FAP, and for a lip corner its other contour: nobody moves one contour of a corner through the other."""
+    partners = {6: 53, 7: 54, 12: 59, 13: 60}
+    partners |= {b: a for a, b in partners.items()}
+    return {row.fap: value} | ({partners[row.fap]: value} if row.fap in partners else {})
+
+
+def both(row: Fap) -> list[float]:
+    return [usual(row)] if row.least == 0 else [usual(row), -usual(row)]
+
+
+def test_there_is_a_default_face() -> None:
+    assert load_face().name in FACES
+
+
+def test_neutral_faps_leave_the_mesh_still(face: Face) -> None:
+    assert np.array_equal(deform(face, np.zeros((3, 68)))[1], face.vertices)
+
+
+@pytest.mark.parametrize("row", STRAIGHT, ids=lambda row: row.name)
+def test_fap_moves_its_feature_point_by_value_times_fapu(face: Face, row: Fap) -> None:
+    for value in both(row):
+        move = moved(face, {row.fap: value})[face.feature_points[row.feature_point]]
+        asked = value * face.fapu.metres(row.unit)
+        assert move @ np.array(WAYS[row.direction]) == pytest.approx(asked, rel=0.02)
+
+
+def test_open_jaw_lowers_the_chin_by_value_times_fapu_and_leaves_the_lips(face: Face) -> None:
+    for value in (150, 600, 1500):
+        move = moved(face, {3: value})
+        asked = value * face.fapu.metres("MNS")
+        assert -move[face.feature_points["2.1"], 1] == pytest.approx(asked, rel=0.02)
+        for name in (*UPPER, *LOWER, *CORNERS):
+            assert np.linalg.norm(move[face.feature_points[name]]) < 0.05 * asked, name
+
+
+def test_open_jaw_takes_lower_teeth_and_tongue_and_not_the_upper_teeth(face: Face) -> None:
+    move = np.linalg.norm(moved(face, {3: 800}), axis=1)
+    for part in ("lower_teeth", "tongue"):
+        assert move[slice(*face.parts[part])].min() > 0.0005
+    assert move[slice(*face.parts["upper_teeth"])].max() < 1e-6
+    first, last = face.parts["lower_teeth"]
+    before = face.vertices[first:last]
+    after = deform(face, rows({3: 800}))[0, first:last]
+    size = lambda at: np.linalg.norm(at - at[0], axis=1)  # noqa: E731
+    assert np.allclose(size(before), size(after), atol=5e-5)
+
+
+@pytest.mark.parametrize(("side", "part", "yaw", "pitch"), [(0, "left_eye", 23, 25), (1, "right_eye", 24, 26)])
+def test_eyeballs_turn_by_the_angle(face: Face, side: int, part: str, yaw: int, pitch: int) -> None:
+    _, centre = face.basis["eyes"][side]
+    pupil = face.feature_points["3.5" if side == 0 else "3.6"]
+    for fap, way in ((yaw, (1, 0)), (pitch, (0, -1))):
+        for value in (30000, -30000):
+            at = deform(face, rows({fap: value}))[0, pupil] - centre
+            angle = np.arctan2(at[0] * way[0] + at[1] * way[1], at[2])
+            assert angle == pytest.approx(value * 1e-5, rel=0.02)
+    other = "right_eye" if side == 0 else "left_eye"
+    assert np.abs(moved(face, {yaw: 30000})[slice(*face.parts[other])]).max() == 0
+    assert part in face.parts
+
+
+@pytest.mark.parametrize(("fap", "part"), [(29, "left_eye"), (30, "right_eye")])
+def test_pupils_widen_by_value_times_fapu(face: Face, fap: int, part: str) -> None:
+    first, last = face.parts[part]
+    eye = 0 if part == "left_eye" else 1
+    _, centre = face.basis["eyes"][eye]
+    out = np.hypot(*(face.vertices[first:last] - centre)[:, :2].T)
+    dark = np.flatnonzero(face.colours[first:last].max(axis=1) < 40)
+    edge = dark[np.isclose(out[dark], out[dark][out[dark] < 0.004].max(), atol=1e-5)]
+    for value in (200, -200):
+        after = deform(face, rows({fap: value}))[0, first:last] - centre
+        grown = 2 * (np.hypot(*after[:, :2].T) - out)[edge].mean()
+        assert grown == pytest.approx(value * face.fapu.metres("IRISD"), rel=0.05)
+
+
+def test_the_head_turns_by_the_angle_about_its_point_and_the_bust_stays(face: Face) -> None:
+    tip, pivot = face.feature_points["9.3"], face.points["7.1"]
+    before = face.vertices[tip] - pivot
+    for fap, plane, sign in ((48, (2, 1), -1), (49, (2, 0), 1), (50, (1, 0), -1)):
+        for value in (25000, -25000):
+            after = deform(face, rows({fap: value}))[0]
+            a = np.arctan2(before[plane[1]], before[plane[0]])
+            b = np.arctan2((after[tip] - pivot)[plane[1]], (after[tip] - pivot)[plane[0]])
+            turned = (b - a + np.pi) % (2 * np.pi) - np.pi
+            assert sign * turned == pytest.approx(value * 1e-5, rel=0.02)
+            low = face.vertices[:, 1] < -0.24
+            assert np.abs(after[low] - face.vertices[low]).max() < 1e-6
+
+
+def test_tongue_roll_lifts_both_borders_by_the_angle(face: Face) -> None:
+    after = deform(face, rows({47: 60000}))[0]
+    for name in ("6.3", "6.4"):
+        vertex = face.feature_points[name]
+        rise = after[vertex, 1] - face.vertices[vertex, 1]
+        assert rise == pytest.approx(abs(face.vertices[vertex, 0]) * np.sin(0.6), rel=0.02)
+
+
+@pytest.mark.parametrize("row", LOW_LEVEL, ids=lambda row: row.name)
+def test_mirrored_faps_mirror(face: Face, row: Fap) -> None:
+    from scipy.spatial import cKDTree
+
+    value = usual(row)
+    # Hair, brows and teeth are mirrored in place, not vertex by vertex; the skin is.
+    skin = slice(*face.parts["skin"])
+    at = face.vertices[skin].astype(float)
+    off, twin = cKDTree(at).query(at * [-1, 1, 1])
+    pairs = off < 1e-5
+    assert pairs.mean() > 0.95
+    here = moved(face, {row.fap: value})[skin]
+    there = moved(face, {row.mirror: value * row.sign})[skin][twin] * [-1, 1, 1]
+    largest = np.abs(here).max()
+    assert np.abs(here - there)[pairs].max() <= max(0.01 * largest, 2e-6)
+
+
+@pytest.mark.parametrize("row", [r for r in LOW_LEVEL if r.feature_point in UPPER + LOWER], ids=lambda r: r.name)
+def test_the_opposite_lip_stays(face: Face, row: Fap) -> None:
+    opposite = LOWER if row.feature_point in UPPER else UPPER
+    move = np.linalg.norm(moved(face, {row.fap: usual(row)}), axis=1)
+    asked = usual(row) * face.fapu.metres(row.unit)
+    for name in opposite:
+        assert move[face.feature_points[name]] < 0.05 * asked, name
+
+
+@pytest.mark.parametrize(("fap", "others"), [(19, "3.3 3.1"), (20, "3.4 3.2"), (21, "3.1 3.3"), (22, "3.2 3.4")])
+def test_the_opposite_lid_stays(face: Face, fap: int, others: str) -> None:
+    opposite, _ = others.split()
+    move = moved(face, {fap: 300})
+    assert np.linalg.norm(move[face.feature_points[opposite]]) < 0.05 * 300 * face.fapu.metres("IRISD")
+
+
+@pytest.mark.parametrize("upper", [1024, 700, 512])
+def test_lids_meet_when_their_faps_add_up_to_the_aperture(face: Face, upper: int) -> None:
+    closed = deform(face, rows({19: upper, 20: upper, 21: 1024 - upper, 22: 1024 - upper}))[0]
+    for high, low in (("3.1", "3.3"), ("3.2", "3.4")):
+        gap = closed[face.feature_points[high]] - closed[face.feature_points[low]]
+        assert abs(gap[1]) < 0.0003
+        assert np.linalg.norm(gap) < 0.0015
+
+
+def test_eyeballs_never_poke_through_the_lids_of_a_blink(face: Face) -> None:
+    for share in np.linspace(0.1, 1, 8):
+        upper, lower = 700 * share, 324 * share
+        at = deform(face, rows({19: upper, 20: upper, 21: lower, 22: lower}))[0]
+        for eye, (ball, centre) in enumerate(face.basis["eyes"]):
+            radius = np.linalg.norm(face.vertices[slice(*ball)] - centre, axis=1).max()
+            lids = face.basis["lid"][face.basis["lid_eye"] == eye]
+            assert np.linalg.norm(at[lids] - centre, axis=1).min() > radius
+
+
+@pytest.mark.parametrize("row", LOW_LEVEL, ids=lambda row: row.name)
+def test_no_triangle_of_the_skin_flips_at_usual_values(face: Face, row: Fap) -> None:
+    first, last = face.parts["skin"]
+    mine = face.triangles[(face.triangles < last).all(axis=1)]
+    inside = np.asarray(face.occlusion)[mine].max(axis=1) < 0.30  # behind the lips, in the sockets
+
+    def ups(at: np.ndarray) -> np.ndarray:
+        a, b, c = (at[mine[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
+
+    rest = ups(face.vertices.astype(float))
+    value = usual(row)
+    for v in (value, -value) if row.least < 0 else (value,):
+        # The head's turn turns triangles: compare what is left when it is taken away.
+        if row.name.startswith("head"):
+            continue
+        now = ups(deform(face, rows(whole(row, v)))[0].astype(float))
+        flipped = (rest * now).sum(axis=1) < -0.2 * np.linalg.norm(rest, axis=1) * np.linalg.norm(now, axis=1)
+        assert not (flipped & ~inside).any(), np.flatnonzero(flipped & ~inside)[:10]
+    assert first == 0
+
+
+def test_equal_lip_faps_move_a_lip_as_one_without_a_w(face: Face) -> None:
+    move = moved(face, dict.fromkeys((5, 10, 11, 52, 57, 58), -300))[:, 1]
+    inner = [move[face.feature_points[name]] for name in ("2.8", "2.3", "2.9")]
+    assert np.ptp(inner) < 0.02 * abs(inner[1])
+    skin = slice(*face.parts["skin"])
+    assert move[skin].min() > 1.025 * inner[1]  # nothing between the points sinks below them
+
+
+def test_batches_equal_single_frames(face: Face) -> None:
+    rng = np.random.default_rng(7)
+    table = np.array([[row.least, row.most] for row in faps()])
+    frames = (rng.uniform(-0.2, 0.2, (9, 68)) * np.abs(table).max(axis=1)).astype(np.float32)
+    batch = deform(face, frames)
+    for frame, vertices in zip(frames, batch, strict=True):
+        assert np.allclose(deform(face, frame[None])[0], vertices, atol=1e-6)
+
+
+@pytest.mark.parametrize("bad", [np.zeros(68), np.zeros((2, 67)), np.full((1, 68), np.nan)])
+def test_wrong_rows_are_refused(bad: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="faps: wanted"):
+        deform(load_face(), bad)
