@@ -11,7 +11,7 @@ from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, smooth, weights
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, PRESENCES, axis, region
+from realizer.animation.targets import AU_NAMES, axis, region
 from realizer.arrays import Bool, Float64
 
 __all__ = ["blend"]
@@ -37,46 +37,59 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     """
     times = np.asarray(times, np.float64)
     alive = _alive(channels, times)
+    # Only the columns that something moves are worked on; `place` says where each of them stands.
+    columns = sorted({channel.target.column for channel in alive})
+    place = {column: i for i, column in enumerate(columns)}
     sampled = sample(alive, times)
-    sums = _sums()
-    shape = (len(axis()), len(times))
+    sums = _sums()[columns]
+    shape = (len(columns), len(times))
     base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for channel, row in zip(alive, sampled, strict=True):
-        column = channel.target.column
+        i = place[channel.target.column]
         if channel.layer is Layer.DIRECT:
             continue
         if channel.layer is Layer.BASE:
-            base[column] += row
-        elif channel.layer is Layer.GAZE and sums[column]:
-            gaze[column] += row
-        elif sums[column]:
-            over[column] += row
+            base[i] += row
+        elif channel.layer is Layer.GAZE and sums[i]:
+            gaze[i] += row
+        elif sums[i]:
+            over[i] += row
         else:
-            np.maximum(over[column], row, out=over[column])
-    for name, part in _regions().items():
-        taken = gaze[axis()[name].column]
-        if taken.any():
-            gaze[part] /= np.maximum(taken, 1.0)
-            base[part] *= 1.0 - np.minimum(taken, 1.0)
+            np.maximum(over[i], row, out=over[i])
+    for name, aus in _regions().items():
+        if (taken := place.get(axis()[name].column)) is not None:
+            share = gaze[taken].copy()
+            part = [place[column] for column in (*aus, axis()[name].column) if column in place]
+            gaze[part] /= np.maximum(share, 1.0)
+            base[part] *= 1.0 - np.minimum(share, 1.0)
     over += gaze
     # Base states and expressions: the stronger one shows; rotations add up.
     values = np.where(sums[:, None], base + over, np.maximum(base, over))
-    _override(values, alive, sampled, times)
-    # AUs come first on the axis, presences last; the FAPs between them have limits of their own.
-    for limited in (values[: len(AU_NAMES())], values[-len(PRESENCES) :]):
-        np.clip(limited, 0.0, 1.0, out=limited)
-    return AUFrames(times, np.ascontiguousarray(values.T, np.float32))
+    _override(values, place, alive, sampled, times)
+    # The FAPs between AUs and presences have limits of their own.
+    limited = np.array([not 0 <= column - len(AU_NAMES()) < 68 for column in columns], bool)
+    np.clip(values, 0.0, 1.0, out=values, where=limited[:, None])
+    frames = np.zeros((len(times), len(axis())), np.float32)
+    frames[:, columns] = values.T
+    return AUFrames(times, frames)
 
 
 def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
     if not len(times):
         return []
     first, last = float(np.min(times)), float(np.max(times))
-    return [c for c in channels if c.span[0] <= last and c.span[1] >= first]
+    alive = []
+    for channel in channels:
+        begin, end = channel.span
+        if begin <= last and end >= first:
+            alive.append(channel)
+    return alive
 
 
-def _override(values: Float64, channels: list[Channel], sampled: Float64, times: Float64) -> None:
-    """Lay the DIRECT channels over `values` (n_targets, n), in place."""
+def _override(
+    values: Float64, place: dict[int, int], channels: list[Channel], sampled: Float64, times: Float64
+) -> None:
+    """Lay the DIRECT channels over `values` (columns that are moved, n), in place."""
     rows = [i for i, channel in enumerate(channels) if channel.layer is Layer.DIRECT]
     if not rows:
         return
@@ -97,7 +110,7 @@ def _override(values: Float64, channels: list[Channel], sampled: Float64, times:
             weight = np.maximum(weight, other_weight)
         direct[column] = value, weight
     for column, (value, weight) in direct.items():
-        values[column] = values[column] * (1.0 - weight) + value
+        values[place[column]] = values[place[column]] * (1.0 - weight) + value
 
 
 @cache

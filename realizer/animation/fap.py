@@ -38,7 +38,7 @@ def to_fap(frames: AUFrames, rows: tuple[AuToFap, ...] | None = None) -> FAPFram
     Returns:
         n frames; the mask is the same for all frames of one table.
     """
-    demand = _compile(tables.au_to_fap() if rows is None else rows)
+    demand = _compile(rows)
     aus = np.ascontiguousarray(frames.aus.T)
     positive, negative = demand.extremes(aus)
     _close_lids(positive, negative, demand.closed)
@@ -108,7 +108,9 @@ def _close_lids(positive: Float32, negative: Float32, closed: Float32) -> None:
 
 
 @lru_cache(maxsize=16)
-def _compile(rows: tuple[AuToFap, ...]) -> Demand:
+def _compile(rows: tuple[AuToFap, ...] | None) -> Demand:
+    if rows is None:
+        rows = tables.au_to_fap()
     units = [row.unit for row in tables.faps()]
     speech_owns = np.array([row.speech_owns for row in tables.faps()])
     hinges: list[tuple[int, float, float, int]] = []
