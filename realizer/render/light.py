@@ -56,6 +56,8 @@ class Light:
     highlight: float
     dull: float
     sharp: float
+    glint: float  # a glint stands on the eyes towards key + glint x v: 1 is the mirror's place, more is lower
+    glint_width: float  # radians from its middle to its edge
     exposure: float
     knee: float
     backdrop_middle: Triple  # sRGB 0..1, behind the head
@@ -73,16 +75,19 @@ class Light:
 def preset() -> Light:
     """A portrait: soft warm key from above and the viewer's left, cool fill, a thin rim from behind."""
     return Light(
-        key=Lamp((-0.55, 0.62, 0.90), (0.98, 0.93, 0.87), (0.42, 0.30, 0.26)),
-        fill=Lamp((0.80, 0.10, 0.75), (0.20, 0.22, 0.26), (0.50, 0.50, 0.50)),
+        key=Lamp((-0.55, 0.62, 0.90), (1.0, 0.945, 0.88), (0.42, 0.30, 0.26)),
+        fill=Lamp((0.80, 0.10, 0.75), (0.15, 0.165, 0.195), (0.50, 0.50, 0.50)),
         rim=Lamp((0.75, 0.45, -0.60), (0.85, 0.88, 0.95), (0.30, 0.30, 0.30)),
         rim_power=3.0,
-        sky=(0.25, 0.26, 0.29),
+        sky=(0.22, 0.23, 0.26),
         ground=(0.13, 0.105, 0.09),
-        shadow=0.55,
+        shadow=0.8,
         highlight=0.9,
         dull=8.0,
         sharp=160.0,
+        # The mirror's place would be under the upper lid; photographers lower the lamp, we lower its image.
+        glint=2.2,
+        glint_width=0.115,
         exposure=1.0,
         knee=0.72,
         backdrop_middle=(0.36, 0.385, 0.41),

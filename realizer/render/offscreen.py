@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
+from realizer.arrays import Float32, Int32, UInt8
 from realizer.errors import RenderError
 from realizer.face.model import Face
 from realizer.render.cameras import Camera
+from realizer.render.glints import Glints
 from realizer.render.light import Light, Shader
 
 __all__ = ["Canvas"]
@@ -22,8 +23,8 @@ NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
 class Canvas:
     """A head on the graphics card (or its stand-in in software), drawn again and again.
 
-    Belongs to the thread that made it, as its GL context does; one at a time in a process. Light is worked out a vertex, in numpy, and
-    drawn flat: four times as fast as a lit shader on a software GL.
+    Belongs to the thread that made it, as its GL context does; one at a time in a process. Light is worked
+    out a vertex, in numpy, and drawn flat: four times as fast as a lit shader on a software GL.
     """
 
     def __init__(self, face: Face, size: tuple[int, int], camera: Camera, light: Light) -> None:
@@ -34,12 +35,19 @@ class Canvas:
         """
         pyrender = _pyrender()
         self.size = size
+        self._glints = Glints(face, light, camera.towards)
         self._shader = Shader(light, face.colours, face.occlusion, face.gloss, camera.towards)
+        self._backdrop = backdrop(size, light)
+        self._count = len(face.vertices)
+        vertices = np.concatenate([face.vertices, self._glints(face.vertices)])
         # x y z r g b a, as pyrender lays a primitive of positions and colours out in its one buffer.
-        self._interleaved = np.ones((len(face.vertices), 7), np.float32)
-        self._head = _primitive(pyrender, face.vertices, np.ones((len(face.vertices), 3)), face.triangles)
-        self._scene = pyrender.Scene(bg_color=[*light.backdrop_edge, 1.0])
-        self._scene.add(pyrender.Mesh([_backdrop(pyrender, camera, size, light)]))
+        self._interleaved = np.ones((len(vertices), 7), np.float32)
+        triangles = np.concatenate([_visible_triangles(face), self._glints.triangles + self._count])
+        material = pyrender.MetallicRoughnessMaterial(baseColorFactor=[1.0, 1.0, 1.0, 1.0])
+        # Colours must be floats: pyrender takes integers 0/1 for 0..255 and draws black.
+        colours = np.ones((len(vertices), 4), np.float32)
+        self._head = pyrender.Primitive(vertices, color_0=colours, indices=triangles, material=material)
+        self._scene = pyrender.Scene(bg_color=[0.0, 0.0, 0.0, 0.0])
         self._scene.add(pyrender.Mesh([self._head]))
         lens = pyrender.PerspectiveCamera(yfov=camera.fovy, znear=camera.near, zfar=camera.far)
         self._scene.add(lens, pose=camera.pose)
@@ -51,19 +59,62 @@ class Canvas:
         """(h, w, 3) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out` if given."""
         from OpenGL import GL
 
-        self._interleaved[:, :3] = vertices
-        self._interleaved[:, 3:6] = self._shader(normals)
+        self._interleaved[: self._count, :3] = vertices
+        self._interleaved[: self._count, 3:6] = self._shader(normals)
+        self._interleaved[self._count :, :3] = self._glints(vertices)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._head._buffers[0])
         GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._interleaved.nbytes, self._interleaved)
         pixels: UInt8 = self._offscreen.render(self._scene, self._flags)
         if out is None:
-            return pixels.copy()
-        out[...] = pixels
-        return out
+            out = np.empty((*pixels.shape[:2], 3), np.uint8)
+        return over(pixels, self._backdrop, out)
 
     def close(self) -> None:
         """Free the context."""
         self._offscreen.delete()
+
+
+def backdrop(size: tuple[int, int], light: Light) -> UInt8:
+    """(h, w, 3) uint8: a soft gradient, lighter in the middle, so that the head stands off."""
+    width, height = size
+    y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
+    out = np.clip(np.hypot(x, y * 0.9 + 0.1) / 1.35, 0, 1)[..., None]
+    mix = out * out * (3 - 2 * out)
+    colours = np.asarray(light.backdrop_middle) * (1 - mix) + np.asarray(light.backdrop_edge) * mix
+    # Half a step of ordered noise hides the bands that 8 bits would make of so slow a gradient.
+    noise = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16 - 0.47
+    tiles = np.tile(noise, (-(-height // 4), -(-width // 4)))[:height, :width, None]
+    return np.rint(colours * 255 + tiles).clip(0, 255).astype(np.uint8)
+
+
+def over(pixels: UInt8, behind: UInt8, out: UInt8) -> UInt8:
+    """(h, w, 4) premultiplied pixels over (h, w, 3): eight times as fast as drawing the backdrop with MSAA."""
+    out[...] = behind
+    alpha = pixels[..., 3]
+    rows = np.flatnonzero(alpha.any(axis=1))
+    if not len(rows):
+        return out
+    columns = np.flatnonzero(alpha.any(axis=0))
+    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    inside, colours, cover = out[box], pixels[box][..., :3], alpha[box]
+    np.copyto(inside, colours, where=(cover == 255)[..., None])
+    y, x = np.nonzero((cover > 0) & (cover < 255))  # the outline
+    part = inside[y, x].astype(np.uint16) * (255 - cover[y, x].astype(np.uint16))[:, None]
+    inside[y, x] = np.minimum(colours[y, x] + (part + 127) // 255, 255)
+    return out
+
+
+# Parts with an inside that is never seen; all others (hair, clothes, lashes) may be sheets.
+SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue")
+
+
+def _visible_triangles(face: Face) -> Int32:
+    """The triangles, those of sheets in both directions: culling what faces away saves a quarter of the time."""
+    solid = np.zeros(len(face.vertices), bool)
+    for name in SOLID:
+        solid[slice(*face.parts.get(name, (0, 0)))] = True
+    sheets = face.triangles[~solid[face.triangles].all(axis=1)]
+    return np.concatenate([face.triangles, sheets[:, ::-1]])
 
 
 def _pyrender() -> Any:
@@ -95,9 +146,8 @@ def _open(pyrender: Any, size: tuple[int, int]) -> Any:
             box = (0, 0, width, height)
             GL.glBlitFramebuffer(*box, *box, GL.GL_COLOR_BUFFER_BIT, GL.GL_NEAREST)
             GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb)
-            GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
-            pixels = np.empty((height, width, 3), np.uint8)
-            GL.glReadPixels(0, 0, width, height, GL.GL_RGB, GL.GL_UNSIGNED_BYTE, pixels)
+            pixels = np.empty((height, width, 4), np.uint8)
+            GL.glReadPixels(0, 0, width, height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, pixels)
             return pixels[::-1]  # GL counts rows from the bottom
 
     class Offscreen(pyrender.OffscreenRenderer):  # type: ignore[misc]
@@ -116,34 +166,6 @@ def _open(pyrender: Any, size: tuple[int, int]) -> Any:
             if isinstance(error, ValueError):  # no device of that number: the first fault tells more
                 break
     raise RenderError(f"{NO_GL} ({_first_line(fault)})")
-
-
-def _primitive(pyrender: Any, vertices: Any, colours: Any, triangles: Any) -> Any:
-    # Colours must be floats: pyrender takes integers 0/1 for 0..255 and draws black.
-    rgba = np.ones((len(vertices), 4), np.float32)
-    rgba[:, :3] = colours
-    material = pyrender.MetallicRoughnessMaterial(baseColorFactor=[1.0, 1.0, 1.0, 1.0], doubleSided=True)
-    return pyrender.Primitive(
-        positions=np.asarray(vertices, np.float32), color_0=rgba, indices=triangles, material=material
-    )
-
-
-def _backdrop(pyrender: Any, camera: Camera, size: tuple[int, int], light: Light) -> Any:
-    """A screen that fills the picture behind the head: lighter in the middle, so the head stands off."""
-    steps = 25
-    along = np.linspace(-1, 1, steps)
-    x, y = (grid.ravel() for grid in np.meshgrid(along, along))
-    depth = camera.far * 0.98
-    high = depth * np.tan(camera.fovy / 2) * 1.01
-    local = np.stack([x * high * size[0] / size[1], y * high, np.full(len(x), -depth)], axis=1)
-    vertices = local @ camera.pose[:3, :3].T + camera.position
-    far_out = np.clip(np.hypot(x, y * 0.9 - 0.1) / 1.35, 0, 1)
-    mix = (far_out * far_out * (3 - 2 * far_out))[:, None]
-    colours = np.asarray(light.backdrop_middle) * (1 - mix) + np.asarray(light.backdrop_edge) * mix
-    corner = (np.arange(steps - 1)[:, None] * steps + np.arange(steps - 1)).ravel()
-    quads = [[corner, corner + 1, corner + steps], [corner + 1, corner + steps + 1, corner + steps]]
-    triangles = np.concatenate([np.stack(q, axis=1) for q in quads])
-    return _primitive(pyrender, vertices, colours, triangles)
 
 
 def _first_line(error: BaseException | None) -> str:

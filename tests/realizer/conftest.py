@@ -20,7 +20,9 @@ def ball(centre: tuple[float, float, float], radii: tuple[float, float, float], 
     down, turn = np.meshgrid(
         np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, around, endpoint=False), indexing="ij"
     )
-    ups = np.stack([np.sin(down) * np.sin(turn), np.cos(down), np.sin(down) * np.cos(turn)], -1).reshape(-1, 3)
+    ups = np.stack([np.sin(down) * np.sin(turn), np.cos(down), np.sin(down) * np.cos(turn)], -1).reshape(
+        -1, 3
+    )
     ring, step = np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij")
     a, b = (ring * around + step).ravel(), (ring * around + (step + 1) % around).ravel()
     triangles = np.concatenate([np.stack([a, a + around, b], 1), np.stack([b, a + around, b + around], 1)])
@@ -57,7 +59,10 @@ def balls() -> tuple[Face, np.ndarray]:
         gloss=np.concatenate(gloss).astype(np.float32),
         parts=parts,
         feature_points={"2.1": 0, "11.1": 0},
-        points={"2.1": np.array([0, -0.12, -0.03], np.float32), "11.1": np.array([0, 0.06, -0.02], np.float32)},
+        points={
+            "2.1": np.array([0, -0.12, -0.03], np.float32),
+            "11.1": np.array([0, 0.06, -0.02], np.float32),
+        },
         fapu=Fapu(0.012, 0.064, 0.05, 0.03, 0.05),
         basis={},
     )

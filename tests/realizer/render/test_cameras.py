@@ -25,7 +25,9 @@ def test_front_puts_hairline_to_chin_in_the_middle_half_with_its_centre_at_47_pe
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_puts_hairline_and_chin_where_it_says(balls, name):
     face, _ = balls
-    places = camera_for(face, name).project([face.points["11.1"], face.points["2.1"]], (400, 1000))[:, 1] / 1000
+    places = (
+        camera_for(face, name).project([face.points["11.1"], face.points["2.1"]], (400, 1000))[:, 1] / 1000
+    )
     assert places == pytest.approx([PRESETS[name].hairline, PRESETS[name].chin])
 
 

@@ -1,0 +1,89 @@
+"""What a picture costs: medians in ms a frame, and film in frames a second.
+
+python tests/benchmarks/draw.py [--face NAME] [--size 512x512] [--frames 60]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
+
+import numpy as np
+from realizer.face import deform, load_face, normals
+from realizer.outputs.film import FORMATS, RATE, encode_film
+from realizer.render import Renderer
+from realizer.render.cameras import camera_for
+from realizer.render.light import Shader, preset
+from realizer.render.offscreen import Canvas
+from realizer.render.worker import encode_jpeg
+
+
+def median(work: Callable[[], object], repeats: int) -> float:
+    """Milliseconds; the first run, which fills caches, does not count."""
+    work()
+    spent = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - began)
+    return 1000 * statistics.median(spent)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--face", default="default")
+    options.add_argument("--size", default="512x512")
+    options.add_argument("--frames", type=int, default=60)
+    chosen = options.parse_args()
+    width, height = (int(n) for n in chosen.size.split("x"))
+    size = (width, height)
+    face = load_face(chosen.face)
+    rows = np.zeros((chosen.frames, 68), np.float32)
+    rows[:, 2] = 300 + 300 * np.sin(np.arange(len(rows)) / 3)
+    rows[:, 48] = 8000 * np.sin(np.arange(len(rows)) / 7)
+    print(f"{face.name}: {len(face.vertices)} vertices, {len(face.triangles)} triangles, {width}x{height}")
+
+    def line(name: str, ms: float) -> None:
+        print(f"{name:42} {ms:7.2f} ms")
+
+    camera = camera_for(face)
+    shader = Shader(preset(), face.colours, face.occlusion, face.gloss, camera.towards)
+    batch = rows[:16]
+    vertices = deform(face, batch)
+    ups = normals(face, vertices)
+    line("deform, a frame of a batch of 16", median(lambda: deform(face, batch), 20) / 16)
+    line("normals, likewise", median(lambda: normals(face, vertices), 20) / 16)
+    line("deform and normals, one frame alone", median(lambda: normals(face, deform(face, rows[:1])), 40))
+    line("shade", median(lambda: shader(ups[0]), 100))
+    canvas = Canvas(face, size, camera, preset())
+    picture = canvas.draw(vertices[0], ups[0])
+    line("shade, upload, draw (MSAA x4), read back", median(lambda: canvas.draw(vertices[0], ups[0]), 60))
+    canvas.close()
+    line("JPEG, quality 85", median(lambda: encode_jpeg(picture, 85), 60))
+
+    with Renderer(chosen.face, size) as renderer:
+        line("Renderer.jpeg, one row, all of it", median(lambda: renderer.jpeg(rows[0]), 40))
+        each = median(lambda: renderer.draw(rows), 3) / len(rows)
+        line("Renderer.draw, a frame of a long call", each)
+        for suffix, form in FORMATS.items():
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / f"film{suffix}"
+                sound = np.zeros(RATE, np.int16)
+                ms = median(
+                    lambda path=path, form=form: encode_film(
+                        path, form, renderer.frames(rows), len(rows), 25.0, sound
+                    ),
+                    3,
+                )
+            print(f"{'film ' + suffix + ', all of it':42} {1000 * len(rows) / ms:7.1f} frames a second")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""A small realization made by hand: one nod, two words, a second and a half."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.targets import AU_NAMES, axis
+from realizer.pipeline import Performance, Realization
+from realizer.player import Speaking
+from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.utterance import Utterance, Word
+
+FPS = 25.0
+DURATION = 1.5
+RATE = 16000
+
+
+@pytest.fixture
+def realization() -> Realization:
+    times = np.arange(38) / FPS
+    columns = axis()
+    targets = np.zeros((38, len(columns)), np.float32)
+    targets[:, AU_NAMES().index("12L")] = np.linspace(0, 1, 38)
+    values = np.zeros((38, 68), np.float32)
+    values[:, 2] = 400 * np.sin(times * 4) ** 2
+    values[:, 47] = -5000.4 * np.sin(times)
+    mask = np.zeros(68, bool)
+    mask[[2, 3, 47]] = True
+    points = ("start", "stroke", "end")
+    nod = Schedule("greeting", {"nod": points}, {"nod": np.array([0.0, 0.61, 1.2])}, start=0.2)
+    tone = (9000 * np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE)).astype(np.int16)
+    hello = Utterance(
+        1.0, (Word(0.0, 0.4, "Hello"), Word(0.4, 0.9, "R&D <team>")), (), {}, sample_rate=RATE, pcm=tone
+    )
+    return Realization(
+        fps=FPS,
+        duration=DURATION,
+        face_name="default",
+        characters={None: Performance(AUFrames(times, targets), FAPFrames(times, values, mask))},
+        schedules=(nod,),
+        feedback=("<blockProgress/>",),
+        warnings=(Warning("greeting:wave", "IMPOSSIBLE_TO_SCHEDULE", "too short"),),
+        speaking=(Speaking(0.25, 1.25, hello, 0),),
+    )

@@ -1,0 +1,147 @@
+"""Films, read back."""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.film import FORMATS, RATE, encode_film
+
+av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")
+
+COUNT, FPS = 30, 25.0
+
+
+def pictures(count=COUNT, size=(120, 160)):
+    """A bright square that walks to the right over a coloured slope."""
+    y, x = np.mgrid[0 : size[0], 0 : size[1]]
+    for k in range(count):
+        picture = np.stack([x, 40 + y // 2, np.full_like(x, 90)], -1).astype(np.uint8)
+        picture[40:80, 4 * k : 4 * k + 30] = (220, 180, 150)
+        yield picture
+
+
+def beep(at: float, length: float = 0.2, total: float = COUNT / FPS):
+    t = np.arange(round(total * RATE)) / RATE
+    return (12000 * np.sin(2 * np.pi * 1000 * t) * ((t >= at) & (t < at + length))).astype(np.int16)
+
+
+def film_of(path, suffix, sound, fps=FPS, **kwargs):
+    encode_film(path, FORMATS[suffix], pictures(**kwargs), kwargs.get("count", COUNT), fps, sound)
+    return path
+
+
+def seen(path):
+    with av.open(str(path)) as film:
+        return [(float(f.time), f.to_ndarray(format="rgb24")) for f in film.decode(video=0)]
+
+
+def heard(path):
+    """(n,) float from time 0 at RATE, placed by the packets' times."""
+    with av.open(str(path)) as film:
+        line = np.zeros(4 * RATE)
+        for frame in film.decode(audio=0):
+            pcm = frame.to_ndarray()[0].astype(float)
+            pcm = pcm / 32768 if frame.format.name.startswith("s16") else pcm
+            first = round(float(frame.time) * RATE)
+            if first < 0:
+                pcm, first = pcm[-first:], 0
+            line[first : first + len(pcm)] = pcm
+        return line
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_film_has_every_picture_at_its_time(tmp_path, suffix):
+    shown = seen(film_of(tmp_path / f"x{suffix}", suffix, beep(0.5)))
+    assert len(shown) == COUNT
+    assert [t for t, _ in shown] == pytest.approx([k / FPS for k in range(COUNT)], abs=0.002)
+    for (_, got), wanted in zip(shown, pictures(), strict=True):
+        assert np.abs(got.astype(int) - wanted).mean() < 6
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_sound_is_heard_when_its_picture_is_seen(tmp_path, suffix):
+    line = heard(film_of(tmp_path / f"x{suffix}", suffix, beep(0.5)))
+    loud = np.flatnonzero(np.abs(line) > 0.1)
+    assert loud[0] / RATE == pytest.approx(0.5, abs=0.01)
+    assert loud[-1] / RATE == pytest.approx(0.7, abs=0.02)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_where_nobody_speaks_there_is_a_silent_track_to_the_end(tmp_path, suffix):
+    path = film_of(tmp_path / f"x{suffix}", suffix, np.zeros(0, np.int16))
+    with av.open(str(path)) as film:
+        (track,) = film.streams.audio
+        assert track.rate == RATE
+        assert film.duration / 1e6 == pytest.approx(COUNT / FPS, abs=0.03)
+        last = max(float(f.time) + f.samples / f.sample_rate for f in film.decode(audio=0))
+    assert last >= COUNT / FPS - 0.002
+    assert np.abs(heard(path)).max() < 1e-3
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_two_runs_write_the_same_film(tmp_path, suffix):
+    films = {film_of(tmp_path / f"{k}{suffix}", suffix, beep(0.3)).read_bytes() for k in range(4)}
+    assert len(films) == 1
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_odd_sizes_lose_a_row_and_not_the_film(tmp_path, suffix):
+    shown = seen(film_of(tmp_path / f"x{suffix}", suffix, beep(0.3), count=3, size=(121, 161)))
+    assert shown[0][1].shape == (120, 160, 3)
+
+
+@pytest.mark.parametrize("fps", [10.0, 29.97, 50.0])
+def test_other_rates_keep_their_clock(tmp_path, fps):
+    shown = seen(film_of(tmp_path / "x.mp4", ".mp4", beep(0.3), fps=fps))
+    assert shown[-1][0] == pytest.approx((COUNT - 1) / fps, abs=0.002)
+
+
+def test_an_mp4_starts_with_its_index_so_that_a_browser_can_begin(tmp_path):
+    content = film_of(tmp_path / "x.mp4", ".mp4", beep(0.3)).read_bytes()
+    assert 0 < content.index(b"moov") < content.index(b"mdat")
+
+
+def test_colours_are_tagged_bt709(tmp_path):
+    with av.open(str(film_of(tmp_path / "x.mp4", ".mp4", beep(0.3)))) as film:
+        context = film.streams.video[0].codec_context
+        assert (context.colorspace, context.color_primaries, context.color_trc) == (1, 1, 1)
+
+
+def test_a_long_film_reports_its_progress(tmp_path, caplog):
+    with caplog.at_level(logging.INFO, "realizer.outputs.film"):
+        film_of(tmp_path / "x.mp4", ".mp4", beep(0.3), count=260, size=(16, 16))
+    assert [r.message for r in caplog.records] == ["film: 250 of 260 pictures"]
+
+
+def test_without_pyav_a_sentence_says_what_to_install(tmp_path):
+    code = (
+        "import sys; sys.modules['av'] = None\n"
+        "import numpy as np\n"
+        "from realizer.errors import RealizerError\n"
+        "from realizer.outputs.film import FORMATS, encode_film\n"
+        "try: encode_film('x.mp4', FORMATS['.mp4'], [], 0, 25.0, np.zeros(0, np.int16))\n"
+        "except RealizerError as error: print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert done.stdout == "films need PyAV: pip install 'bml-realizer[film]'\n"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_realization_becomes_a_film_of_its_face(realization, tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    OUTPUTS[suffix].write(realization, path, Drawing(size=(129, 128)))
+    shown = seen(path)
+    assert len(shown) == 38
+    assert shown[0][1].shape == (128, 130, 3)
+    assert shown[0][1].std() > 20
+    assert np.abs(shown[0][1].astype(int) - shown[10][1]).max() > 20
+    assert np.abs(heard(path)[int(0.4 * RATE) : RATE]).max() > 0.1

@@ -1,0 +1,65 @@
+"""Contact sheets and stills of a realization."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.png import moments, row_at
+from realizer.scheduling.timing import Schedule
+
+
+def test_a_sheet_shows_first_last_and_every_sync_point(realization):
+    shown = moments(realization)
+    assert shown[0].frame == 0
+    assert shown[-1].frame == 37
+    named = {m.frame: m.points for m in shown if m.points}
+    assert named == {5: ("nod:start",), 20: ("nod:stroke",), 35: ("nod:end",)}
+    assert [m.frame for m in shown] == sorted({m.frame for m in shown})
+    assert 8 <= len(shown) <= 24
+
+
+def test_a_crowded_sheet_keeps_24_pictures_from_first_to_last(realization):
+    from dataclasses import replace
+
+    times = np.linspace(0, 1.4, 36)
+    crowd = Schedule("b", {"g": tuple(f"stroke:{k}" for k in range(36))}, {"g": times})
+    shown = moments(replace(realization, schedules=(crowd,)))
+    assert len(shown) == 24
+    assert (shown[0].frame, shown[-1].frame) == (0, 37)
+    assert max(np.diff([m.frame for m in shown])) <= 5
+
+
+@pytest.mark.parametrize(("seconds", "frame"), [(0, 0), (0.4, 10), (-1, 0), (99, 37)])
+def test_an_instant_on_a_frame_is_that_frame(realization, seconds, frame):
+    assert row_at(realization, seconds) == pytest.approx(realization.faps.values[frame], rel=1e-5, abs=1e-3)
+
+
+def test_an_instant_between_frames_lies_between_them(realization):
+    wanted = realization.faps.values[10:12].mean(0)
+    assert row_at(realization, 0.42) == pytest.approx(wanted, rel=1e-4, abs=0.01)
+
+
+def drawn(realization, path, drawing) -> np.ndarray:
+    OUTPUTS[".png"].write(realization, path, drawing)
+    return np.asarray(Image.open(io.BytesIO(path.read_bytes())))
+
+
+@pytest.mark.gl
+def test_with_an_instant_the_png_is_one_picture_of_that_size(realization, tmp_path):
+    picture = drawn(realization, tmp_path / "x.png", Drawing((160, 120), at=0.4))
+    assert picture.shape == (120, 160, 3)
+    assert picture.std() > 15
+    later = drawn(realization, tmp_path / "y.png", Drawing((160, 120), at=0.8))
+    assert not np.array_equal(picture, later)
+
+
+@pytest.mark.gl
+def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_path):
+    first = drawn(realization, tmp_path / "x.png", Drawing((160, 120)))
+    drawn(realization, tmp_path / "y.png", Drawing((160, 120)))
+    assert first.shape[1] > 3 * 80
+    assert (tmp_path / "x.png").read_bytes() == (tmp_path / "y.png").read_bytes()

@@ -1,0 +1,140 @@
+"""The encodings that need no pictures."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import wave
+
+import numpy as np
+import pytest
+from realizer.animation.targets import AU_NAMES
+from realizer.outputs import OUTPUTS, Drawing, output_for
+from realizer.outputs.fap_reader import read_fap
+from realizer.tables import faps
+
+TEXTS = (".fap", ".json", ".csv", ".vtt", ".wav")
+
+
+def written(realization, tmp_path, suffix) -> bytes:
+    path = tmp_path / f"out{suffix}"
+    output_for(path).write(realization, path, Drawing())
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]  # no draft is left
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("suffix", OUTPUTS)
+def test_every_output_says_what_it_is(suffix):
+    output = OUTPUTS[suffix]
+    assert output.suffix == suffix
+    assert re.fullmatch(r"\w+/[\w.+-]+", output.media_type)
+    assert output.says
+    assert "\n" not in output.says
+
+
+def test_the_suffix_picks_the_encoder_in_either_case():
+    assert output_for("x/Clip.FAP") is OUTPUTS[".fap"]
+
+
+@pytest.mark.parametrize("path", ["clip.avi", "clip", ".fap"])
+def test_an_unknown_suffix_lists_the_known_ones(path):
+    with pytest.raises(
+        ValueError, match=r"wanted a suffix of \.fap \.json \.csv \.vtt \.wav \.png \.mp4 \.webm"
+    ):
+        output_for(path)
+
+
+@pytest.mark.parametrize("suffix", TEXTS)
+def test_two_runs_write_the_same_bytes(realization, tmp_path, suffix):
+    first = written(realization, tmp_path, suffix)
+    assert first == written(realization, tmp_path, suffix)
+    assert first
+
+
+@pytest.mark.parametrize("suffix", TEXTS)
+def test_the_file_s_name_is_not_in_the_bytes(realization, tmp_path, suffix):
+    for name in ("a", "b"):
+        OUTPUTS[suffix].write(realization, tmp_path / f"{name}{suffix}", Drawing())
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_a_failing_write_leaves_the_old_file(realization, tmp_path):
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    broken = realization.faps.values
+    realization.aus.values[0, 0] = np.nan
+    with pytest.raises(ValueError, match="JSON"):
+        OUTPUTS[".json"].write(realization, path, Drawing())
+    assert broken is realization.faps.values
+    assert path.read_text() == "old"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_pipe_is_written_to_as_it_is(realization):
+    from pathlib import Path
+
+    OUTPUTS[".csv"].write(realization, Path("/dev/null"), Drawing())
+    assert not Path("/dev/null").is_file()
+
+
+def test_fap_has_the_integers_of_the_frames(realization, tmp_path):
+    text = written(realization, tmp_path, ".fap").decode()
+    assert text.splitlines()[0] == "2.1 greeting 25 38"
+    clip = read_fap(text)
+    assert clip.notes == ()
+    assert np.array_equal(clip.values, realization.faps.integers())
+    assert np.array_equal(clip.mask, realization.faps.mask)
+
+
+def test_json_is_the_realization(realization, tmp_path):
+    assert json.loads(written(realization, tmp_path, ".json")) == json.loads(
+        json.dumps(realization.to_json())
+    )
+
+
+def test_csv_has_a_row_a_frame_and_a_column_an_au_and_a_fap(realization, tmp_path):
+    header, *rows = csv.reader(io.StringIO(written(realization, tmp_path, ".csv").decode()))
+    assert header[0] == "time"
+    assert header[1 : 1 + len(AU_NAMES())] == [f"AU{name}" for name in AU_NAMES()]
+    assert header[1 + len(AU_NAMES()) :] == [row.name for row in faps()]
+    assert len(set(header)) == len(header)
+    assert len(rows) == 38
+    last = dict(zip(header, rows[-1], strict=True))
+    assert float(last["time"]) == pytest.approx(37 / 25)
+    assert float(last["AU12L"]) == 1
+    assert int(last["open_jaw"]) == realization.faps.integers()[-1, 2]
+
+
+CUE = re.compile(r"(\d\d):(\d\d):(\d\d\.\d{3}) --> (\d\d):(\d\d):(\d\d\.\d{3})\n<c\.(\w+)>(.*)</c>")
+
+
+def test_vtt_has_every_word_and_every_sync_point(realization, tmp_path):
+    text = written(realization, tmp_path, ".vtt").decode()
+    assert text.startswith("WEBVTT\n\n")
+    cues = [
+        (int(h) * 3600 + int(m) * 60 + float(s), int(h2) * 3600 + int(m2) * 60 + float(s2), kind, said)
+        for h, m, s, h2, m2, s2, kind, said in CUE.findall(text)
+    ]
+    assert [(a, b, t) for a, b, k, t in cues if k == "word"] == [
+        (0.25, 0.65, "Hello"),
+        (0.65, 1.15, "R&amp;D &lt;team&gt;"),
+    ]
+    assert [(a, t) for a, _, k, t in cues if k == "sync"] == [
+        (0.2, "greeting:nod:start"),
+        (0.81, "greeting:nod:stroke"),
+        (1.4, "greeting:nod:end"),
+    ]
+    assert all(end > start for start, end, *_ in cues)
+    assert [c[0] for c in cues] == sorted(c[0] for c in cues)
+    assert len(cues) == text.count("-->")
+
+
+def test_wav_is_sixteen_bit_mono_and_as_long_as_the_realization(realization, tmp_path):
+    with wave.open(io.BytesIO(written(realization, tmp_path, ".wav"))) as file:
+        assert (file.getnchannels(), file.getsampwidth(), file.getframerate()) == (1, 2, 22050)
+        assert file.getnframes() == round(1.5 * 22050)
+        pcm = np.frombuffer(file.readframes(file.getnframes()), "<i2")
+    assert np.abs(pcm[: int(0.25 * 22050)]).max() == 0
+    assert np.abs(pcm[int(0.3 * 22050) : int(1.2 * 22050)]).max() > 8000

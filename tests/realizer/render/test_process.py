@@ -1,0 +1,222 @@
+"""The drawing process: what it draws, and what happens when it dies."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import realizer
+from PIL import Image
+from realizer.errors import RenderError
+from realizer.render import Renderer
+
+SIZE = (96, 80)
+
+
+def rows(count: int) -> np.ndarray:
+    out = np.zeros((count, 68), np.float32)
+    out[:, 48] = np.linspace(0, 30000, count)  # head_yaw: every picture differs
+    return out
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[Renderer]:
+    with Renderer("default", SIZE) as renderer:
+        yield renderer
+
+
+@pytest.mark.gl
+def test_a_long_call_gives_every_picture_in_order(renderer):
+    """More rows than the shared memory holds: each slot is drawn several times."""
+    pictures = renderer.draw(rows(41))
+    assert pictures.shape == (41, 80, 96, 3)
+    assert pictures.dtype == np.uint8
+    for k in (0, 7, 8, 15, 16, 40):
+        assert np.array_equal(renderer.draw(rows(41)[k : k + 1])[0], pictures[k])
+    assert len({picture.tobytes() for picture in pictures}) > 35
+
+
+@pytest.mark.gl
+def test_no_rows_give_no_pictures(renderer):
+    assert renderer.draw(np.zeros((0, 68), np.float32)).shape == (0, 80, 96, 3)
+
+
+@pytest.mark.gl
+def test_jpeg_is_the_same_picture(renderer):
+    (picture,) = renderer.draw(rows(1))
+    encoded = np.asarray(Image.open(io.BytesIO(renderer.jpeg(rows(1)[0], quality=95))))
+    assert encoded.shape == (80, 96, 3)
+    assert np.abs(encoded.astype(int) - picture).mean() < 3
+    assert len(renderer.jpeg(rows(1)[0], quality=20)) < len(renderer.jpeg(rows(1)[0], quality=95))
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("left_after", [1, 8, 9, 30])
+def test_pictures_that_nobody_takes_do_not_mix_with_the_next_call(renderer, left_after):
+    pictures = renderer.frames(rows(41))
+    for _ in range(left_after):
+        next(pictures)
+    pictures.close()
+    before = renderer.pid
+    assert np.array_equal(renderer.draw(rows(41)[20:21])[0], renderer.draw(rows(41))[20])
+    assert renderer.pid == before
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("call", ["draw", "jpeg"])
+def test_a_killed_process_is_an_error_once_and_replaced_at_the_next_call(call):
+    with Renderer("default", SIZE) as renderer:
+        first = renderer.draw(rows(1))
+        killed = renderer.pid
+        os.kill(killed, signal.SIGKILL)
+        with pytest.raises(RenderError, match=r"ended .*-9.*; the next call starts a new one"):
+            renderer.draw(rows(1)) if call == "draw" else renderer.jpeg(rows(1)[0])
+        assert np.array_equal(renderer.draw(rows(1)), first)
+        assert renderer.pid != killed
+
+
+@pytest.mark.gl
+def test_calls_from_two_threads_do_not_mix(renderer):
+    wanted = renderer.draw(rows(6))
+    got: dict[int, np.ndarray] = {}
+
+    def work(k: int) -> None:
+        for _ in range(3):
+            got[k] = renderer.draw(rows(6)[k : k + 1])[0]
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in (0, 5)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert np.array_equal(got[0], wanted[0])
+    assert np.array_equal(got[5], wanted[5])
+
+
+@pytest.mark.gl
+def test_close_ends_the_process_and_leaves_no_memory_behind():
+    shared = Path("/dev/shm")
+    renderer = Renderer("default", SIZE)
+    assert renderer.pid is None
+    renderer.draw(rows(1))
+    pid = renderer.pid
+    assert not [p for p in shared.glob("realizer-*") if p.stat().st_size == 16 * 96 * 80 * 3]
+    renderer.close()
+    renderer.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+@pytest.mark.gl
+def test_the_process_dies_with_its_owner():
+    """The owner is killed, so it can tidy nothing; its drawing process sees the pipe close."""
+    code = (
+        "import sys, numpy as np\n"
+        "from realizer.render import Renderer\n"
+        "r = Renderer('default', (32, 32)); r.draw(np.zeros((1, 68)))\n"
+        "print(r.pid, flush=True); sys.stdin.read()\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(Path(realizer.__path__[0]).parent)}
+    owner = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=env
+    )
+    assert owner.stdin is not None
+    assert owner.stdout is not None
+    pid = int(owner.stdout.readline())
+    owner.kill()
+    owner.wait()
+    # The drawing process holds a copy of the owner's stderr only; its end is seen through its own pidfd.
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:
+        handle = None
+    if handle is not None:
+        import select
+
+        ended, _, _ = select.select([handle], [], [], 20)
+        os.close(handle)
+        assert ended
+    owner.stdin.close()
+    owner.stdout.close()
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(
+    ("face", "camera", "says"),
+    [("default", "top", "camera: wanted one of front"), ("nobody", "front", "nobody")],
+)
+def test_what_cannot_be_drawn_says_why(face, camera, says):
+    with Renderer(face, SIZE, camera) as renderer, pytest.raises(RenderError, match=says):
+        renderer.draw(rows(1))
+
+
+@pytest.mark.parametrize("shape", [(68,), (2, 67), (1, 2, 68)])
+def test_rows_of_another_shape_are_refused_before_anything_starts(shape):
+    renderer = Renderer("default", SIZE)
+    with pytest.raises(ValueError, match=r"faps: wanted \(n, 68\), got"):
+        renderer.draw(np.zeros(shape, np.float32))
+    assert renderer.pid is None
+
+
+def test_a_size_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="size: wanted 1..8192 pixels each way, got 0x10"):
+        Renderer("default", (0, 10))
+
+
+def check(tmp_path: Path, site: str, **env: str) -> subprocess.CompletedProcess[str]:
+    """`available()`'s question, asked on a machine that lacks something."""
+    (tmp_path / "sitecustomize.py").write_text(site)
+    paths = os.pathsep.join([str(tmp_path), str(Path(realizer.__path__[0]).parent)])
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "realizer.render.worker", "--check"],
+        env={**os.environ, "PYTHONPATH": paths, **env},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_without_pyrender_the_sentence_names_the_extra(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['pyrender'] = None")
+    assert done.returncode == 3
+    assert "pip install 'bml-realizer[render]'" in done.stdout
+
+
+@pytest.mark.gl
+def test_without_gl_the_sentence_names_the_packages(tmp_path):
+    """A machine whose loader finds no libEGL and no libGL."""
+    hide = (
+        "import ctypes, ctypes.util\n"
+        "real = ctypes.CDLL.__init__\n"
+        "def init(self, name=None, *a, **k):\n"
+        "    if name and any(x in str(name) for x in ('EGL', 'libGL', 'OpenGL', 'GLESv2')):\n"
+        "        raise OSError(f'{name}: cannot open shared object file')\n"
+        "    real(self, name, *a, **k)\n"
+        "ctypes.CDLL.__init__ = init\n"
+        "find = ctypes.util.find_library\n"
+        "ctypes.util.find_library = lambda n: None if n in ('EGL', 'GL', 'OpenGL', 'GLESv2') else find(n)\n"
+    )
+    done = check(tmp_path, hide)
+    assert done.returncode == 3, done.stderr
+    assert "install Debian packages libegl1 and libgl1" in done.stdout
+
+
+@pytest.mark.gl
+def test_jpeg_without_simplejpeg_is_written_by_pillow(tmp_path):
+    code = (
+        "import sys; sys.modules['simplejpeg'] = None\n"
+        "import numpy as np\n"
+        "from realizer.render.worker import encode_jpeg\n"
+        "sys.stdout.buffer.write(encode_jpeg(np.full((20, 30, 3), 90, np.uint8)[::-1], 85))\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(Path(realizer.__path__[0]).parent)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=env)
+    assert np.asarray(Image.open(io.BytesIO(done.stdout))).shape == (20, 30, 3)
