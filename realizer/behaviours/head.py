@@ -26,6 +26,10 @@ __all__ = ["KINDS"]
 SAME = Gap("same", 0.0, 0.0, 1e4, "BML 1.0 gives the plain stroke of a repeated movement no meaning; ours")
 
 
+# The eyes' AU that takes back a turn of the head: left by right, up by down.
+BACK = {51: 62, 52: 61, 53: 64, 54: 63}
+
+
 def timing(node: Head, world: World) -> Timing:
     """start ready strokeStart stroke strokeEnd relax end; with repetition n > 1 instead of the stroke
     stroke:1 .. stroke:n, and `stroke` with the last of them.
@@ -43,7 +47,9 @@ def timing(node: Head, world: World) -> Timing:
 
 
 def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
-    """The lexeme's poses at its sync points; between two strokes, half way, the head is back."""
+    """The lexeme's poses at its sync points; between two strokes, half way, the head is back. The eyes stay
+    on whom they look at, as far as the lexeme says.
+    """
     lexeme = head_lexemes()[node.lexeme.upper()]
     start, ready, stroke_start, *strokes, stroke_end, relax, end = times
     if len(strokes) > 1:
@@ -59,18 +65,18 @@ def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
     last = lexeme.decay ** (len(strokes) - 1)
     keys += [stroke_end, relax, end]
     poses += [(lexeme.back, last), (lexeme.back, last), ({}, 1.0)]
-    moved = {number for pose, _ in poses for number in pose}
-    return tuple(
-        Channel(
-            au(number)[0],
-            np.array(keys),
-            np.array([pose.get(number, 0.0) * size for pose, size in poses])
-            * (node.amount / degrees()[number]),
-            layer=Layer.HEAD,
-            source=node.id,
-        )
-        for number in sorted(moved)
-    )
+    channels = []
+    for number in sorted({number for pose, _ in poses for number in pose}):
+        turned = node.amount * np.array([pose.get(number, 0.0) * size for pose, size in poses])
+        channels.append(_turned(number, keys, turned, node.id))
+        if lexeme.eyes and number in BACK:
+            channels.append(_turned(BACK[number], keys, turned * lexeme.eyes, node.id))
+    return tuple(channels)
+
+
+def _turned(number: int, keys: list[float], turned: Float64, source: str) -> Channel:
+    values = turned / degrees()[number]
+    return Channel(au(number)[0], np.array(keys), values, layer=Layer.HEAD, source=source)
 
 
 def check(node: Head, world: World) -> tuple[Fault, ...]:

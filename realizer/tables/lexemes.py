@@ -34,6 +34,7 @@ class HeadLexeme:
         stroke: at each stroke.
         back: between strokes, and from strokeEnd to relax.
         decay: each further stroke beside the one before it, 0..1.
+        eyes: part of a turn that the eyes take back, 0..1.
     """
 
     name: str
@@ -41,6 +42,7 @@ class HeadLexeme:
     stroke: Mapping[int, float]
     back: Mapping[int, float]
     decay: float
+    eyes: float
 
 
 @cache
@@ -67,6 +69,7 @@ def head_lexemes() -> Mapping[str, HeadLexeme]:
             stroke=_pose(name, row, "stroke"),
             back=_pose(name, row, "back"),
             decay=float(row["decay"]),
+            eyes=float(row["eyes"]),
         )
         for name, row in _rows("head").items()
     }

@@ -28,7 +28,9 @@ def frames(*rows: dict[str, float]) -> AUFrames:
 
 
 def shown(**aus: float) -> Float32:
-    return to_fap(frames({name.removeprefix("au"): value for name, value in aus.items()})).values[0]
+    clip = frames({name.removeprefix("au"): value for name, value in aus.items()})
+    row: Float32 = to_fap(clip).values[0]
+    return row
 
 
 def value(number: int, **aus: float) -> float:

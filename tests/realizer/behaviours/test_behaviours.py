@@ -215,6 +215,13 @@ def test_a_nod_is_lowest_exactly_at_its_stroke() -> None:
     assert pitch.max() > 0  # the head comes up a little before it goes down
 
 
+def test_the_eyes_stay_with_their_partner_while_the_head_nods() -> None:
+    nod = expand('<head id="x" lexeme="NOD" amount="1"/>', SEVEN)
+    head, eyes = degrees(nod, "head", 0.5)[0][1], degrees(nod, "eyes", 0.5)[0][1]
+    assert eyes == pytest.approx(-head_lexemes()["NOD"].eyes * head, abs=1e-3)
+    assert degrees(nod, "eyes", 1.0) == [(0, 0)]
+
+
 def test_a_repeated_nod_has_a_numbered_stroke_each_and_is_down_at_each() -> None:
     element = '<head id="x" lexeme="NOD" repetition="3" amount="1"/>'
     wanted = timing(element)
@@ -223,7 +230,10 @@ def test_a_repeated_nod_has_a_numbered_stroke_each_and_is_down_at_each() -> None
         *("stroke", "strokeEnd", "relax", "end"),
     )
     times = dict(zip(wanted.points, keys(wanted), strict=True))
-    pitch = lambda t: degrees(expand(element), "head", t)[0][1]  # noqa: E731
+
+    def pitch(t: float) -> float:
+        return degrees(expand(element), "head", t)[0][1]
+
     for k in (1, 2, 3):
         here = times[f"stroke:{k}"]
         assert pitch(here) < pitch(here - 0.05)

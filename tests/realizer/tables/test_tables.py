@@ -41,7 +41,7 @@ def test_every_file_names_source_units_and_licence(name: str) -> None:
 
 def test_faps_are_the_68_of_the_standard_in_order() -> None:
     assert [row.fap for row in tables.faps()] == list(range(1, 69))
-    sizes = defaultdict(int)
+    sizes: dict[int, int] = defaultdict(int)
     for row in tables.faps():
         sizes[row.group] += 1
     assert list(sizes.values()) == [2, 16, 12, 8, 4, 5, 3, 10, 4, 4]
