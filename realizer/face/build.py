@@ -184,13 +184,20 @@ def _parts(
     place = tongue.positions(at)
     deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
     made.append(
-        Part("tongue", tongue, place, tongue.triangles, np.repeat(np.array([look["tongue"]], float), len(place), 0),
-             np.full(len(place), 0.6), 0.62 * smooth(deep, 0.8, 0.0) + 0.08)
+        Part("tongue", tongue, place, tongue.triangles, _tongue_colours(place, look["tongue"]),
+             np.full(len(place), 0.35), 0.60 * smooth(deep, 0.65, 0.0) + 0.06)
     )  # fmt: skip
     made.append(head.hair(skin, at, look["hair"], look["skin"]))
     made.append(head.bun(np.array(recipe["bun"]["centre"]), np.array(recipe["bun"]["radii"]), look["hair"]))
     made.append(head.shirt(body, at, look["shirt"]))
     return sorted(made, key=lambda part: ORDER.index(part.name))
+
+
+def _tongue_colours(place: Float64, colour: list[float]) -> Float64:
+    """Darker in the groove along the middle and at the sides."""
+    across = np.abs(place[:, 0]) / np.abs(place[:, 0]).max()
+    shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
+    return np.array(colour, float) * shade[:, None]
 
 
 def _bake(made: list[Part]) -> None:

@@ -71,8 +71,9 @@ def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: d
     for k, dark in ((0, 0.55), (1, 0.70), (2, 0.90)):
         out[lips.rings[k]] *= dark
     inside = lips.inside
-    out[inside] = mouth * np.clip(lips.fade[inside], 0.12, 1)[:, None]
-    gloss[inside] = 0.3
+    # Wet near the lips, dark and dull behind: a shine deep in the mouth looks like metal.
+    out[inside] = mouth * np.clip(lips.fade[inside], 0.30, 1)[:, None]
+    gloss[inside] = 0.3 * np.clip(lips.fade[inside] * 2 - 1, 0, 1)
     for ring in rings:
         # The wet edge of the lids is pink, the upper one darkened by the lashes' roots.
         top = at[ring[0]][:, 1] > np.median(at[ring[0]][:, 1])

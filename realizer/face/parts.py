@@ -171,7 +171,7 @@ def brow_curve(points: dict[str, Float64], side: float) -> tuple[Any, Any]:
     a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
     x = np.abs([a[0] - np.sign(a[0]) * 0.001, (a[0] + b[0]) / 2, b[0], c[0] + np.sign(c[0]) * 0.0015])
     # The points lie on the bone; a calm brow begins a little higher and arches a little less.
-    y = np.array([a[1] + 0.0016, (a[1] + b[1]) / 2 + 0.0012, b[1] - 0.0010, c[1] - 0.0004])
+    y = np.array([a[1] + 0.0022, (a[1] + b[1]) / 2 + 0.0014, b[1] - 0.0010, c[1] - 0.0004])
     return x, y
 
 
@@ -199,7 +199,7 @@ def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, c
     ups = vertex_normals(at, piece.triangles)
     inner = np.clip(height(at), 0, 0.003)
     piece = piece.moved(ups * (0.0006 + 0.20 * inner)[:, None])
-    hair = 1 + 0.16 * np.sin(at[:, 0] * 2600 + at[:, 1] * 1500)
+    hair = 1 + 0.16 * np.sin(np.abs(at[:, 0]) * 2600 + at[:, 1] * 1500)
     t = np.clip((at[:, 0] * side - x[0]) / (x[-1] - x[0]), 0, 1)
     # Thinner, hence lighter, at the inner end and along the edge.
     thin = (1 - smooth(inner, 0.0, 0.0016)) * 0.42 + 0.30 * (1 - smooth(t, 0.0, 0.22))

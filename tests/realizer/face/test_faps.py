@@ -225,7 +225,7 @@ def test_equal_lip_faps_move_a_lip_as_one_without_a_w(face: Face) -> None:
     inner = [move[face.feature_points[name]] for name in ("2.8", "2.3", "2.9")]
     assert np.ptp(inner) < 0.02 * abs(inner[1])
     skin = slice(*face.parts["skin"])
-    assert move[skin].min() > 1.025 * inner[1]  # nothing between the points sinks below them
+    assert move[skin].min() > 1.04 * inner[1]  # nothing between the points sinks below them
 
 
 def test_batches_equal_single_frames(face: Face) -> None:
