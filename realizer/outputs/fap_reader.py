@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from realizer.arrays import Bool
 from realizer.errors import RealizerError
 from realizer.outputs.fap_text import FAPClip
 from realizer.tables import faps
@@ -91,7 +92,7 @@ def _header(lines: list[Line], text: str, notes: _Notes) -> tuple[str, float, in
         raise RealizerError(f"line {number}: wanted a header '2.1 NAME FPS COUNT' or a mask, got {version!r}")
     if version != "2.1":
         notes.add(f"version {version}, read like 2.1", number)
-    numbers = []
+    numbers: list[float] = []
     while rest and len(numbers) < 2 and (value := _number(rest[-1])) is not None:
         numbers.insert(0, value)
         rest.pop()
@@ -133,7 +134,7 @@ def _frame(mask: Line, values: Line, notes: _Notes) -> _Frame:
     number, numbers = _integer(words[0], notes, line), [_integer(w, notes, line) for w in words[1:]]
     widths = _widths(used, len(numbers))
     if widths is None:
-        widths = {fap: 1 for fap in used}
+        widths = dict.fromkeys(used, 1)
         notes.add(f"wanted {len(used)} values, got {len(numbers)}", line)
     elif any(widths[fap] == 1 for fap in (1, 2) if fap in widths):
         notes.add("a compound FAP as one number", line)
@@ -173,15 +174,9 @@ def _clip(name: str, fps: float, frames: list[_Frame], notes: _Notes) -> FAPClip
     if len(seen) and not (seen == seen[0]).all():
         notes.add("the mask varies; where a frame does not give a FAP it is neutral")
     _note_ranges(values[:, 1:], notes)
-    return FAPClip(
-        name,
-        fps,
-        values[:, 1:].astype(np.int32),
-        given[:, 1:].any(0),
-        compound[1],
-        compound[2],
-        notes.sentences(),
-    )
+    used: Bool = np.asarray(given[:, 1:].any(axis=0))
+    integers = values[:, 1:].astype(np.int32)
+    return FAPClip(name, fps, integers, used, compound[1], compound[2], notes.sentences())
 
 
 def _places(frames: list[_Frame], notes: _Notes) -> list[int]:

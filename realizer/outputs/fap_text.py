@@ -1,4 +1,4 @@
-"""FAP frames as MPEG-4 text (.fap, version 2.1): what Xface, Greta and others read; the reader is `fap_reader`."""
+"""FAP frames as MPEG-4 text (.fap, version 2.1), as Xface and Greta read it; `fap_reader` reads it back."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class FAPClip:
         )
 
     def frames(self) -> FAPFrames:
-        """The values on a clock that starts at 0; FAP 1 and 2 are left out, as frames have no place for them."""
+        """The values on a clock that starts at 0; FAP 1 and 2 are left out: frames have no place for them."""
         mask = self.mask.copy()
         mask[:2] = False
         return FAPFrames(np.arange(len(self.values)) / self.fps, self.values.astype(np.float32), mask)
@@ -76,7 +76,7 @@ class FAPClip:
 def encode(clip: FAPClip) -> str:
     """The text. The header is the first line, the mask is the same in every frame, frames count from 0.
 
-    Readers take a FAP without a mask bit as neutral, so what any frame uses is written in all, zeros included.
+    Readers take a FAP without a mask bit as neutral, so what any frame uses is written in all of them.
 
     Raises:
         ValueError: fps is not a positive number.

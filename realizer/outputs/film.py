@@ -20,7 +20,7 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.pipeline import Realization
 
-__all__ = ["OUTPUTS", "FORMATS", "Format", "encode_film", "write_film"]
+__all__ = ["FORMATS", "OUTPUTS", "Format", "encode_film", "write_film"]
 
 log = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ def encode_film(
     The sound is filled up with silence to the last picture's end, so the track is always there.
 
     Args:
-        pictures: `count` times (h, w, 3) uint8; an odd last row or column is left out (4:2:0 needs even sizes).
+        pictures: `count` times (h, w, 3) uint8; an odd last row or column is left out: 4:2:0 wants even.
         sound: (n,) int16 mono at `rate`.
 
     Raises:

@@ -33,7 +33,7 @@ class Moment:
 
 
 def moments(realization: Realization, most: int = MOST) -> tuple[Moment, ...]:
-    """The frames worth a picture, in order: first, last, those with a sync point, then the widest gaps halved.
+    """The frames worth a picture, in order: first, last, sync points, then the widest gaps halved.
 
     Where more than `most` frames have a sync point, those closest to the one before go first.
     """
@@ -54,13 +54,14 @@ def moments(realization: Realization, most: int = MOST) -> tuple[Moment, ...]:
 
 
 def row_at(realization: Realization, seconds: float) -> Float32:
-    """(68,) FAPs at an instant, between the two frames around it; before the first or after the last: that one."""
+    """(68,) FAPs at an instant, between the two frames around it; outside of all, the nearest."""
     frames = realization.faps.values
     place = min(max(seconds * realization.fps, 0.0), len(frames) - 1)
     below = int(place)
     above = min(below + 1, len(frames) - 1)
     part = np.float32(place - below)
-    return (frames[below] * (1 - part) + frames[above] * part).astype(np.float32)
+    row: Float32 = frames[below] * (1 - part) + frames[above] * part
+    return row
 
 
 def encode_png(pixels: UInt8) -> bytes:
@@ -87,7 +88,7 @@ def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
     with Renderer(realization.face_name, half, drawing.camera) as renderer:
         pictures = renderer.draw(realization.faps.values[[moment.frame for moment in shown]])
     titles = [f"{moment.time:.2f} s" for moment in shown]
-    write_bytes(path, encode_png(sheet(pictures, titles, [moment.points for moment in shown])))
+    write_bytes(path, encode_png(sheet(list(pictures), titles, [moment.points for moment in shown])))
 
 
 def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:

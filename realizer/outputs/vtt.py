@@ -29,7 +29,7 @@ class _Cue:
 
 
 def encode_vtt(realization: Realization) -> str:
-    """Cues by start time. Words are `<c.word>`; sync points are `<c.sync>block:behaviour:point`, a frame long."""
+    """Cues by start time: words as `<c.word>`, sync points as `<c.sync>`, named and a frame long."""
     cues = sorted([*_words(realization), *_syncs(realization)], key=lambda cue: (cue.start, cue.kind, cue.id))
     blocks = ["WEBVTT"]
     for cue in cues:

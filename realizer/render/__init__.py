@@ -1,4 +1,4 @@
-"""FAP rows become pictures: light, cameras, an offscreen canvas in a process of its own, and contact sheets."""
+"""FAP rows become pictures: light, cameras, a canvas in a process of its own, contact sheets."""
 
 from realizer.render.process import Renderer, available
 

@@ -1,4 +1,4 @@
-"""A face and a preset's name in; a camera out: where it stands, what it sees, and where a point lands in the picture."""
+"""A face and a preset's name in; a camera out: where it stands, and where a point lands in the picture."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def camera_for(face: Face, name: str = "front") -> Camera:
 
 
 def _sideways(face: Face, right: Float64, yaw: float) -> float:
-    """Metres along `right` of the picture's middle: half-way between the head's outermost points above the chin.
+    """Metres along `right` of the picture's middle: half-way between the outermost points above the chin.
 
     From the front that is the nose's plane, whatever the hair does.
     """

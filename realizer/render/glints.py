@@ -43,7 +43,7 @@ class Glints:
 
 
 class _Ball:
-    """An eyeball's centre as a fixed mixture of its vertices, which holds however it moves, and its radius."""
+    """An eyeball's radius, and its centre as a fixed mixture of its vertices: true however it moves."""
 
     def __init__(self, face: Face, first: int, last: int) -> None:
         points = face.vertices[first:last].astype(np.float64)
@@ -60,4 +60,5 @@ class _Ball:
         self._range = slice(first, last)
 
     def centre(self, vertices: Float32) -> Float32:
-        return self._weights @ vertices[self._range]
+        centre: Float32 = self._weights @ vertices[self._range]
+        return centre

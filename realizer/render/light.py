@@ -1,4 +1,4 @@
-"""Normals, colours and one table of lamps in; sRGB colours a vertex out. The page gets the same table as JSON."""
+"""Normals, colours and a table of lamps in; sRGB a vertex out. The page gets the same table as JSON."""
 
 from __future__ import annotations
 
@@ -147,7 +147,8 @@ class Shader:
         total[self._shiny] += self._shine * (facing**self._power)[:, None]
         steps = len(self._curve) - 1
         index = np.minimum(total * np.float32(steps / BRIGHTEST), np.float32(steps))
-        return self._curve[index.astype(np.int32)]
+        shaded: Float32 = self._curve[index.astype(np.int32)]
+        return shaded
 
 
 BRIGHTEST = 4.0  # linear light at the end of the curve; beyond it all is white

@@ -75,7 +75,7 @@ class Canvas:
 
 
 def backdrop(size: tuple[int, int], light: Light) -> UInt8:
-    """(h, w, 3) uint8: a soft gradient, lighter in the middle, so that the head stands off."""
+    """(h, w, 4) uint8, opaque: a soft gradient, lighter in the middle, so that the head stands off."""
     width, height = size
     y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
     out = np.clip(np.hypot(x, y * 0.9 + 0.1) / 1.35, 0, 1)[..., None]
@@ -84,23 +84,28 @@ def backdrop(size: tuple[int, int], light: Light) -> UInt8:
     # Half a step of ordered noise hides the bands that 8 bits would make of so slow a gradient.
     noise = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16 - 0.47
     tiles = np.tile(noise, (-(-height // 4), -(-width // 4)))[:height, :width, None]
-    return np.rint(colours * 255 + tiles).clip(0, 255).astype(np.uint8)
+    rgba = np.full((height, width, 4), 255, np.uint8)
+    rgba[..., :3] = np.rint(colours * 255 + tiles).clip(0, 255)
+    return rgba
 
 
 def over(pixels: UInt8, behind: UInt8, out: UInt8) -> UInt8:
-    """(h, w, 4) premultiplied pixels over (h, w, 3): eight times as fast as drawing the backdrop with MSAA."""
-    out[...] = behind
-    alpha = pixels[..., 3]
-    rows = np.flatnonzero(alpha.any(axis=1))
-    if not len(rows):
-        return out
-    columns = np.flatnonzero(alpha.any(axis=0))
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    inside, colours, cover = out[box], pixels[box][..., :3], alpha[box]
-    np.copyto(inside, colours, where=(cover == 255)[..., None])
-    y, x = np.nonzero((cover > 0) & (cover < 255))  # the outline
-    part = inside[y, x].astype(np.uint16) * (255 - cover[y, x].astype(np.uint16))[:, None]
-    inside[y, x] = np.minimum(colours[y, x] + (part + 127) // 255, 255)
+    """(h, w, 4) premultiplied pixels over (h, w, 4) opaque ones, as (h, w, 3).
+
+    1.0 ms at 512x512, where drawing the backdrop with MSAA took 11.
+    """
+    # A pixel at a time as one integer, then a channel at a time: numpy is slow along an axis of three.
+    height, width = pixels.shape[:2]
+    cover = pixels[..., 3]
+    whole = np.where(cover == 255, pixels.view(np.uint32)[..., 0], behind.view(np.uint32)[..., 0])
+    merged = whole.view(np.uint8).reshape(height, width, 4)
+    for channel in range(3):
+        out[..., channel] = merged[..., channel]
+    outline = np.flatnonzero(cover - np.uint8(1) < np.uint8(254))  # neither 0, which wraps round, nor 255
+    y, x = np.divmod(outline, width)
+    rest = 255 - cover[y, x].astype(np.uint16)[:, None]
+    shows = (behind[y, x, :3] * rest + 127) // 255
+    out[y, x] = np.minimum(pixels[y, x, :3] + shows, 255)
     return out
 
 
@@ -109,7 +114,7 @@ SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue"
 
 
 def _visible_triangles(face: Face) -> Int32:
-    """The triangles, those of sheets in both directions: culling what faces away saves a quarter of the time."""
+    """The triangles, those of sheets both ways round: culling what faces away saves a quarter."""
     solid = np.zeros(len(face.vertices), bool)
     for name in SOLID:
         solid[slice(*face.parts.get(name, (0, 0)))] = True

@@ -64,7 +64,7 @@ def sheet(
 
 def columns_for(count: int, width: int, height: int) -> int:
     """Columns that make the whole about 3:2."""
-    best = (1.5 * count * height / width) ** 0.5
+    best: float = (1.5 * count * height / width) ** 0.5
     return min(count, max(1, round(best)))
 
 

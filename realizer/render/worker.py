@@ -15,7 +15,7 @@ from realizer.face.model import Face
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.offscreen import Canvas
-from realizer.render.wire import Draw, Failed, Jpeg, Message, Open, Pixels, connection
+from realizer.render.wire import Draw, Failed, Message, Open, Pixels, connection
 
 __all__: list[str] = []
 

@@ -16,6 +16,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
 
 import numpy as np
+
 from realizer.face import deform, load_face, normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
 from realizer.render import Renderer
@@ -77,7 +78,7 @@ def main() -> None:
                 path = Path(folder) / f"film{suffix}"
                 sound = np.zeros(RATE, np.int16)
                 ms = median(
-                    lambda path=path, form=form: encode_film(
+                    lambda path=path, form=form, sound=sound: encode_film(
                         path, form, renderer.frames(rows), len(rows), 25.0, sound
                     ),
                     3,

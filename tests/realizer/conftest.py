@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from realizer.face.model import Face, Fapu
 from realizer.render import available
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.targets import AU_NAMES, axis
 from realizer.pipeline import Performance, Realization

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.film import FORMATS, RATE, encode_film
 

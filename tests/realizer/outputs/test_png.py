@@ -7,6 +7,7 @@ import io
 import numpy as np
 import pytest
 from PIL import Image
+
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.png import moments, row_at
 from realizer.scheduling.timing import Schedule

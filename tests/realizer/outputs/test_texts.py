@@ -10,6 +10,7 @@ import wave
 
 import numpy as np
 import pytest
+
 from realizer.animation.targets import AU_NAMES
 from realizer.outputs import OUTPUTS, Drawing, output_for
 from realizer.outputs.fap_reader import read_fap

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from realizer.errors import RenderError
 from realizer.render.cameras import PRESETS, camera_for, camera_names
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+
 from realizer.face import deform, load_face
 from realizer.render import Renderer
 from realizer.render.cameras import camera_for

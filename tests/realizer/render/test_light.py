@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from realizer.render.light import Shader, linear, preset, srgb, unit
 
 FRONT = np.array([0, 0, 1], np.float32)

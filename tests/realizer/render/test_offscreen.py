@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.offscreen import Canvas

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import realizer
 from PIL import Image
+
+import realizer
 from realizer.errors import RenderError
 from realizer.render import Renderer
 
@@ -167,7 +168,7 @@ def test_rows_of_another_shape_are_refused_before_anything_starts(shape):
 
 
 def test_a_size_of_nothing_is_refused():
-    with pytest.raises(ValueError, match="size: wanted 1..8192 pixels each way, got 0x10"):
+    with pytest.raises(ValueError, match=r"size: wanted 1\.\.8192 pixels each way, got 0x10"):
         Renderer("default", (0, 10))
 
 
