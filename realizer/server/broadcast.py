@@ -228,7 +228,7 @@ class Broadcast:
         self._views = wanted
         for view in wanted.values():
             fps = view.timeline.fps
-            if view.busy is not None and now >= view.begun + DRAW_DEADLINE:
+            if view.busy is not None and now + EPSILON >= view.begun + DRAW_DEADLINE:
                 view.busy = None
             newest = last_at(now, fps)
             if view.busy is not None or newest < view.next:

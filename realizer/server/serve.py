@@ -147,7 +147,10 @@ class Server:
         if self._closed.is_set():
             return
         if self._socket is not None:
-            self._socket.close()
+            self._socket.close(close_connections=False)
+            for socket in list(self._socket.connections):
+                # After a drain the door is closed already; its connections are closed one by one.
+                self._loop.create_task(socket.close(1001, "the service ends"))
             await self._socket.wait_closed()
         for timer in (*self._timers.values(), self._sweeper):
             if timer is not None:

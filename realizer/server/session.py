@@ -42,6 +42,7 @@ from realizer.server.messages import (
     parse_control,
 )
 from realizer.server.preparation import Preparation, Waiting
+from realizer.server.streams import EPSILON
 from realizer.settings import Settings
 from realizer.speech.utterance import Say, Utterance
 from realizer.tables import faps
@@ -214,7 +215,7 @@ class Session:
         self._effects += self._broadcast.due(self._connections.values(), t)
         if self._read_one(t):
             self._publish(t)
-        for speak in self._preparation.overdue(t - SPEAK_DEADLINE):
+        for speak in self._preparation.overdue(t + EPSILON - SPEAK_DEADLINE):
             self._silently(speak, f"the voice has not answered for {SPEAK_DEADLINE:g} s")
         if self._submit_ready(t):
             self._publish(t)
@@ -350,7 +351,7 @@ class Session:
 
     def _publish(self, t: float) -> None:
         """Number what is due, keep it, and send it to every connection that has not switched it off."""
-        for feedback in self.player.due(t):
+        for feedback in self.player.due(t + EPSILON):
             self._seq += 1
             self._log.append(feedback.to_xml(self._seq))
         for connection in self._connections.values():

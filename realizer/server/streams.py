@@ -27,7 +27,7 @@ WINDOW = 2.0  # s
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
 AHEAD = 0.1  # s
-# Rounding of k / fps on a clock of days.
+# Rounding of k / fps, and of times that go from one clock to another and back, on a clock of days.
 EPSILON = 1e-6  # s
 
 

@@ -1,0 +1,64 @@
+"""Sessions by name: joined, made, moved between, and closed when nobody comes back."""
+
+from __future__ import annotations
+
+import pytest
+from realizer.server.hub import Hub, HubError
+from realizer.server.session import Session
+from realizer.settings import Settings
+
+
+@pytest.fixture
+def hub() -> Hub:
+    settings = Settings(keep=60.0)
+    return Hub(lambda id, now, named: Session(id, settings, now, named=named), 3)
+
+
+def test_a_name_is_shared_and_no_name_is_ones_own(hub) -> None:
+    shared = hub.open(1, "show", 0.0)
+    assert hub.open(2, "show", 0.0) is shared
+    assert hub.open(3, None, 0.0) is not shared
+    assert hub.session_of(2) is shared
+
+
+def test_an_unnamed_session_is_gone_with_its_connection(hub) -> None:
+    hub.open(1, None, 0.0)
+    hub.leave(1, 1.0)
+    assert not hub.sessions
+    assert hub.session_of(1) is None
+
+
+def test_a_named_session_stays_until_it_is_swept(hub) -> None:
+    session = hub.open(1, "show", 0.0)
+    hub.leave(1, 10.0)
+    hub.sweep(69.0)
+    assert hub.open(2, "show", 69.0) is session
+    hub.leave(2, 70.0)
+    hub.sweep(131.0)
+    assert not hub.sessions
+
+
+@pytest.mark.parametrize("name", ["", "a b", "x" * 65, "../etc", "é"])
+def test_a_bad_name_is_refused_with_what_was_wanted(hub, name) -> None:
+    with pytest.raises(HubError, match="wanted 1..64") as caught:
+        hub.open(1, name, 0.0)
+    assert caught.value.status == 400
+
+
+def test_too_many_sessions_are_refused_but_joining_is_not(hub) -> None:
+    for k in range(3):
+        hub.open(k, f"s{k}", 0.0)
+    with pytest.raises(HubError) as caught:
+        hub.open(9, "more", 0.0)
+    assert caught.value.status == 503
+    hub.open(10, "s0", 0.0)
+
+
+def test_hello_moves_a_connection_to_the_session_it_names(hub) -> None:
+    there = hub.open(1, "show", 0.0)
+    here = hub.open(2, None, 0.0)
+    here.receive(2, '{"type":"hello","session":"show","seen":0}', 0.5)
+    effects = hub.effects(here, 0.5)
+    assert hub.session_of(2) is there
+    assert here.id not in hub.sessions
+    assert '"session":"show"' in effects[0].data

@@ -1,0 +1,76 @@
+"""Control messages: good ones become models, bad ones an error that says what was wanted and what came."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from realizer.server.messages import (
+    STREAMS,
+    SUPPORTED,
+    ErrorMessage,
+    Subscribe,
+    Welcome,
+    parse_control,
+)
+
+
+def test_every_supported_type_is_understood() -> None:
+    extra = {
+        "subscribe": ',"stream":"fap"',
+        "unsubscribe": ',"stream":"fap"',
+        "scene": ',"objects":{"cup":{"x":0.2,"y":0,"z":1}}',
+        "character": ',"id":"Ada"',
+    }
+    for kind in SUPPORTED:
+        message = parse_control(f'{{"type":"{kind}"{extra.get(kind, "")}}}')
+        assert not isinstance(message, ErrorMessage), message
+        assert message.type == kind
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "where", "says"),
+    [
+        ("{", "bad-json", None, "JSON object"),
+        ("{" * 100_000, "bad-json", None, "JSON object"),
+        ('{"a":' * 50_000, "bad-json", None, "nested too deeply"),
+        ("{}", "unsupported", "type", "hello, subscribe"),
+        ('{"type":"dance"}', "unsupported", "type", '"dance"'),
+        ('{"type":["hello"]}', "unsupported", "type", "hello"),
+        ('{"type":"anticipate"}', "unsupported", "type", "hello"),
+        ('{"type":"subscribe","stream":"arkit"}', "unsupported", "subscribe.stream", "fap, au"),
+        ('{"type":"subscribe","stream":[]}', "unsupported", "subscribe.stream", "fap, au"),
+        ('{"type":"subscribe","stream":"fap","fps":-1}', "invalid", "subscribe.fps", "greater than 0"),
+        ('{"type":"subscribe","stream":"fap","fps":1e9}', "invalid", "subscribe.fps", "240"),
+        ('{"type":"subscribe","stream":"fap","fps":NaN}', "invalid", "subscribe.fps", ""),
+        ('{"type":"subscribe","stream":"fap","colour":1}', "invalid", "subscribe.colour", "not permitted"),
+        ('{"type":"set","aus":{"12":7}}', "invalid", "set.aus.12", "less than or equal to 1"),
+        ('{"type":"scene","objects":{"a":{"x":1e99,"y":0,"z":0}}}', "invalid", "scene.objects.a.x", "10000"),
+        ('{"type":"hello","session":"a b"}', "invalid", "hello.session", "pattern"),
+        ('{"type":"hello","token":"' + "x" * 300_000 + '"}', "too-large", None, "at most"),
+    ],
+)
+def test_a_bad_message_is_told_what_was_wanted(text, code, where, says) -> None:
+    error = parse_control(text)
+    assert isinstance(error, ErrorMessage)
+    assert (error.code, error.where) == (code, where)
+    assert says in error.message
+
+
+@given(st.text(max_size=200))
+def test_any_text_gives_a_message_or_an_error(text) -> None:
+    parse_control("{" + text)
+
+
+def test_a_subscription_has_the_defaults_of_the_protocol() -> None:
+    message = parse_control('{"type":"subscribe","stream":"video"}')
+    assert isinstance(message, Subscribe)
+    assert (message.size, message.camera, message.quality, message.fps) == ((512, 512), "front", 85, None)
+    assert {stream: encodings[0] for stream, encodings in STREAMS.items()}["fap"] == "binary"
+
+
+def test_replies_leave_out_what_they_do_not_say() -> None:
+    text = ErrorMessage(code="x", message="y").text()
+    assert text == '{"type":"error","code":"x","message":"y"}'
+    welcome = Welcome(session="s", time=0.5, seq=0, capabilities={}, limits={}).text()
+    assert '"version":1' in welcome

@@ -1,0 +1,194 @@
+"""The real service on loopback: a WebSocket client, HTTP, several clients, and its end."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import urllib.error
+import urllib.request
+from collections.abc import Awaitable, Callable
+
+import pytest
+from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
+from realizer.server.serve import Server
+from realizer.server.wire import FrameKind, unpack
+from realizer.settings import Settings
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+DOCUMENT = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
+  <speech id="s"><text>One <sync id="m"/>two</text></speech>
+  <head id="n" lexeme="NOD" stroke="s:m"/>
+  <faceLexeme id="f" lexeme="SMILE" end="s:end"/>
+</bml>"""
+POINTS = {
+    "s": ["start", "m", "end"],
+    "n": ["start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end"],
+    "f": ["start", "attackPeak", "relax", "end"],
+}
+LIMIT = 30  # s; a hung test ends
+
+
+def serving(test: Callable[[Server], Awaitable[None]], **settings) -> None:
+    """Run a test against a service of its own."""
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent", **settings)) as server:
+            await test(server)
+
+    asyncio.run(run())
+
+
+async def until(socket, last: str) -> list[str | bytes]:
+    """Messages up to the block progress `last`."""
+    messages = []
+    async for message in socket:
+        messages.append(message)
+        if isinstance(message, str) and f'id="{last}"' in message:
+            return messages
+    raise AssertionError(f"the connection ended before {last}")
+
+
+def test_a_document_plays_over_the_wire() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send(json.dumps({"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25}))
+            await socket.send(json.dumps({"type": "subscribe", "stream": "au", "fps": 50}))
+            await socket.send(DOCUMENT)
+            messages = await until(socket, "b:end")
+        feedback = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
+        progress = [f for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)]
+        assert [progress[0].id, progress[-1].id] == ["b:start", "b:end"]
+        for behaviour, points in POINTS.items():
+            own = [f.id.split(":", 2)[2] for f in progress if f.id.startswith(f"b:{behaviour}:")]
+            assert own == points
+        assert [f.global_time for f in progress] == sorted(f.global_time for f in progress)
+        of = {f.id: f.time for f in progress if isinstance(f, SyncPointProgress)}
+        assert of["b:n:stroke"] == pytest.approx(of["b:s:m"], abs=1e-3)
+
+        frames = [m for m in map(json.loads, (m for m in messages if str(m).startswith("{"))) if m["type"] == "fap"]
+        numbers = [f["frame"] for f in frames]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert all(f["time"] == pytest.approx(f["frame"] / 25) and len(f["values"]) == 68 for f in frames)
+        binary = [unpack(m) for m in messages if isinstance(m, bytes)]
+        assert {f.kind for f in binary} == {FrameKind.AU}
+        assert all(f.time == pytest.approx(f.frame / 50) for f in binary)
+        assert [f.frame for f in binary] == sorted({f.frame for f in binary})
+
+    serving(test)
+
+
+def test_the_mesh_moves_and_fits_the_face_that_is_served() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send(json.dumps({"type": "subscribe", "stream": "mesh", "fps": 10}))
+            told = json.loads(await socket.recv())
+            frame = unpack(await socket.recv())
+        assert frame.values.shape == (told["vertices"], 3)
+        face = await asyncio.to_thread(fetch, server.page + f"faces/{told['face']}")
+        assert face[0] == 200
+
+    serving(test)
+
+
+def test_a_broken_document_leaves_the_connection_alive() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send("<bml id='x'><oops")
+            assert "warningFeedback" in await socket.recv()
+            await socket.send("{nonsense")
+            assert json.loads(await socket.recv())["code"] == "bad-json"
+            await socket.send('<bml id="b"><wait id="w" duration="0.05"/></bml>')
+            await until(socket, "b:end")
+
+    serving(test)
+
+
+def test_two_clients_share_a_named_session_and_others_do_not() -> None:
+    async def test(server: Server) -> None:
+        show = f"{server.url}?session=show"
+        async with connect(show) as manager, connect(show) as viewer, connect(server.url) as stranger:
+            await manager.send('<bml id="b"><wait id="w" duration="0.05"/></bml>')
+            sent, seen = await until(manager, "b:end"), await until(viewer, "b:end")
+            assert sent == seen
+            await stranger.send('{"type":"state"}')
+            assert json.loads(await stranger.recv())["session"] != "show"
+        async with connect(f"{show}&seen=2") as again:
+            assert await until(again, "b:end") == sent[2:]
+
+    serving(test)
+
+
+def test_a_client_that_leaves_in_the_middle_disturbs_nobody() -> None:
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=show") as stays:
+            leaves = await connect(f"{server.url}?session=show")
+            await leaves.send(json.dumps({"type": "subscribe", "stream": "fap", "fps": 240}))
+            await leaves.recv()
+            await leaves.send(DOCUMENT)
+            leaves.transport.abort()
+            await until(stays, "b:end")
+
+    serving(test)
+
+
+def test_a_bad_session_name_is_refused_before_the_handshake() -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as caught:
+            await connect(f"{server.url}?session=a%20b")
+        assert caught.value.response.status_code == 400
+        assert b"wanted 1..64" in caught.value.response.body
+        with pytest.raises(InvalidStatus) as caught:
+            await connect(server.url.replace("/ws", "/other"))
+        assert caught.value.response.status_code == 404
+
+    serving(test)
+
+
+def fetch(url: str) -> tuple[int, str, bytes]:
+    try:
+        with urllib.request.urlopen(url, timeout=LIMIT) as answer:
+            return answer.status, answer.headers["Content-Type"], answer.read()
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, error.headers["Content-Type"], error.read()
+
+
+def test_http_is_answered_on_the_same_port() -> None:
+    async def test(server: Server) -> None:
+        status, media_type, body = await asyncio.to_thread(fetch, server.page + "healthz")
+        assert (status, media_type) == (200, "application/json; charset=utf-8")
+        assert json.loads(body)["status"] == "ok"
+        assert (await asyncio.to_thread(fetch, server.page + "nothing"))[0] == 404
+        assert (await asyncio.to_thread(fetch, server.page + "ws"))[0] == 426
+
+    serving(test)
+
+
+def test_a_drain_lets_what_plays_end_and_takes_no_more() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send('<bml id="b"><wait id="w" duration="0.4"/></bml>')
+            assert "predictionFeedback" in await socket.recv()
+            draining = asyncio.create_task(server.drain())
+            await until(socket, "b:start")
+            await socket.send('<bml id="late"><wait id="w"/></bml>')
+            messages = await until(socket, "b:end")
+            assert any('id="late"' in m and "ending" in m for m in messages)
+            await draining
+            with pytest.raises(OSError):
+                await connect(server.url)
+            await server.close()
+            with pytest.raises(ConnectionClosed):
+                while True:
+                    await socket.recv()
+
+    serving(test)
+
+
+def test_an_address_in_use_is_an_os_error() -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(OSError, match="in use"):
+            await Server(Settings(port=server.port)).start()
+
+    serving(test)
