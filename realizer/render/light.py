@@ -99,55 +99,50 @@ class Shader:
     """A light, a camera direction and a head's fixed colours made into one product a frame.
 
     Every term but the highlight and the edge is max(0, affine in the normal), so one (n, 3) x (3, 12)
-    product gives them all; 0.7 ms for 10,000 vertices.
+    product gives them all; 1.1 ms for 10,000 vertices.
     """
 
     def __init__(
         self, light: Light, colours: UInt8, occlusion: Float32, gloss: Float32, towards_camera: Float32
     ) -> None:
         """The view direction is one for the whole head: with a long lens it turns by 6 degrees at most."""
-        reach = 1 - light.shadow * (1 - occlusion)
-        self._albedo = linear(colours) * np.float32(light.exposure)
-        self._reach = reach[:, None].astype(np.float32)
-        self._open = occlusion[:, None].astype(np.float32)
+        # A channel a row: numpy is three times as fast along vertices as along colours.
+        reach = (1 - light.shadow * (1 - occlusion)).astype(np.float32)
+        albedo = linear(colours).T * np.float32(light.exposure)
+        self._lit = np.ascontiguousarray(albedo * reach)
+        self._hidden = np.ascontiguousarray(albedo * occlusion)
         self._rim_power = light.rim_power
         view = unit(towards_camera)
-        key = unit(light.key.direction)
-        half = unit(key + view)
-        columns, offsets = [], []
-        for lamp in (light.key, light.fill, light.rim):
-            slope, offset = _affine(lamp)
-            columns.append(slope)
-            offsets.append(offset)
+        half = unit(unit(light.key.direction) + view)
         sky, ground = np.asarray(light.sky), np.asarray(light.ground)
-        columns.append(np.outer([0, 1, 0], (sky - ground) / 2))
-        offsets.append((sky + ground) / 2)
-        self._slopes = np.hstack([*columns, view[:, None], half[:, None]]).astype(np.float32)
-        self._offsets = np.hstack([*offsets, [0, 0]]).astype(np.float32)
-        self._shiny = np.flatnonzero(gloss > 0.01)
-        shiny = gloss[self._shiny].astype(np.float32)
-        self._power = (light.dull * (light.sharp / light.dull) ** shiny).astype(np.float32)
-        strength = (shiny * light.highlight * light.exposure * reach[self._shiny])[:, None]
-        self._shine = (strength * np.asarray(light.key.colour)).astype(np.float32)
+        lamps = [_affine(lamp) for lamp in (light.key, light.fill, light.rim)]
+        ambient = (np.outer([0, 1, 0], (sky - ground) / 2), (sky + ground) / 2)
+        plain = (np.stack([view, half], axis=1), np.zeros(2))
+        slopes, offsets = zip(*lamps, ambient, plain, strict=True)
+        self._slopes = np.ascontiguousarray(np.hstack(slopes).T, np.float32)
+        self._offsets = np.hstack(offsets).astype(np.float32)[:, None]
+        self._power = (light.dull * (light.sharp / light.dull) ** gloss).astype(np.float32)
+        strength = gloss * light.highlight * light.exposure * reach
+        self._shine = np.outer(light.key.colour, strength).astype(np.float32)
         self._curve = _curve(light.knee)
 
     def __call__(self, normals: Float32) -> Float32:
         """(n_vertices, 3) float32 sRGB 0..1 from (n_vertices, 3) unit normals."""
-        terms = normals @ self._slopes
+        terms = self._slopes @ normals.T
         terms += self._offsets
-        np.maximum(terms[:, :9], 0, out=terms[:, :9])
-        edge = 1 - np.clip(terms[:, 12:13], 0, 1)
-        total: Float32 = terms[:, 6:9] * edge**self._rim_power
-        total += terms[:, 0:3]
-        total += terms[:, 3:6]
-        total *= self._reach
-        total += terms[:, 9:12] * self._open
-        total *= self._albedo
-        facing = np.maximum(terms[self._shiny, 13], 1e-6)
-        total[self._shiny] += self._shine * (facing**self._power)[:, None]
+        key, fill, rim, ambient, (facing_camera, facing_half) = np.split(terms, (3, 6, 9, 12))
+        np.maximum(terms[:9], 0, out=terms[:9])
+        edge = (1 - np.clip(facing_camera, 0, 1)) ** self._rim_power
+        total: Float32 = rim * edge
+        total += key
+        total += fill
+        total *= self._lit
+        total += ambient * self._hidden
+        total += self._shine * np.maximum(facing_half, 1e-6) ** self._power
         steps = len(self._curve) - 1
-        index = np.minimum(total * np.float32(steps / BRIGHTEST), np.float32(steps))
-        shaded: Float32 = self._curve[index.astype(np.int32)]
+        total *= np.float32(steps / BRIGHTEST)
+        np.minimum(total, np.float32(steps), out=total)
+        shaded: Float32 = self._curve[total.astype(np.int32)].T
         return shaded
 
 
