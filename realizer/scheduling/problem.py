@@ -112,7 +112,7 @@ class Problem:
                 number.update((old + i, new + i) for i in range(len(self.timings[b].points)))
         for u, v, seconds, part, says in self.equalities:
             # `add` has already made what holds a rigid behaviour together.
-            if id(part) not in gone and v in number and says[1] != "rigid":
+            if id(part) not in gone and u in number and v in number and says[1] != "rigid":
                 smaller.equalities.append(Relation(number[u], number[v], seconds, part, says))
         for u, v, seconds, part, says in self.orders:
             if id(part) not in gone and u in number and v in number:

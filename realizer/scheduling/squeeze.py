@@ -190,7 +190,10 @@ def _interior_point(quadratic: _Quadratic) -> tuple[Float64, Float64, Float64] |
     import clarabel
 
     m = len(quadratic.nodes)
-    gi, gj, a, d = quadratic.gi, quadratic.gj, quadratic.stiffness, quadratic.wanted
+    # What lies within one class cannot change.
+    elastic = quadratic.gi != quadratic.gj
+    gi, gj = quadratic.gi[elastic], quadratic.gj[elastic]
+    a, d = quadratic.stiffness[elastic], quadratic.wanted[elastic]
     rows = np.flatnonzero(quadratic.u != quadratic.v)
     u, v, w = quadratic.u[rows], quadratic.v[rows], quadratic.w[rows]
     # Node 0 stands at 0 and is no unknown, so every column is one lower; the upper triangle is wanted.

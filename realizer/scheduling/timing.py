@@ -43,7 +43,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Warning:  # noqa: A001 - the standard's word
+class Warning:  # the standard's word
     """One BML warning: `id` is a block or "block:behaviour", `type` of the standard's list."""
 
     id: str
