@@ -17,7 +17,8 @@ from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle import idle_channels
-from realizer.animation.targets import AU_NAMES, Target, axis
+from realizer.animation.targets import AU_NAMES, axis
+from realizer.animation.targets import region as region_of
 from realizer.arrays import Float64
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
@@ -382,7 +383,7 @@ class Player:
                 moving += own
             else:
                 times = schedule.times[behaviour] + start
-                regions = frozenset({region, *(_region(c.target) for c in own)})
+                regions = frozenset({region, *(region_of(c.target) for c in own)})
                 shifts.append(Shift(float(times[0]), float(times[-1]), regions, own))
         speech = tuple(
             Speaking(start + float(schedule.times[b][0]), float("inf"), utterance, character)
@@ -425,7 +426,7 @@ class Player:
         for index, shift in enumerate(ordered):
             # The next shift of a region takes it over; until then a base state holds.
             for channel in shift.channels:
-                region = _region(channel.target)
+                region = region_of(channel.target)
                 heir = next((s for s in ordered[index + 1 :] if region in s.regions), None)
                 channels.append(channel if heir is None else channel.faded(heir.begin, heir.end))
         return [*channels, *own.direct.values()]
@@ -457,10 +458,3 @@ class Player:
         self.revision += 1
         self.changed_from = since
 
-
-def _region(target: Target) -> str:
-    """Which base state a target belongs to: eyes, head or face."""
-    number = target.name.rstrip("LR")
-    if number.isdigit():
-        return {5: "head", 6: "eyes"}.get(int(number) // 10, "face") if int(number) > 50 else "face"
-    return target.name if target.name in ("eyes", "head") else "face"

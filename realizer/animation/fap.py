@@ -50,7 +50,9 @@ def to_fap(frames: AUFrames, rows: tuple[AuToFap, ...] | None = None) -> FAPFram
     if lips.any():
         values *= 1.0 - own[:, None] * lips
     faps = np.clip(values.T + frames.faps, least, most)
-    return FAPFrames(frames.times, np.ascontiguousarray(faps, np.float32), demand.mask)
+    # What a client sets directly counts too, wherever the table does not reach.
+    mask = demand.mask | faps.any(axis=0)
+    return FAPFrames(frames.times, np.ascontiguousarray(faps, np.float32), mask)
 
 
 @dataclass(frozen=True, eq=False)
