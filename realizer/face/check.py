@@ -56,16 +56,24 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     return tuple(faults)
 
 
-def _mesh_faults(folder: Path, vertices: np.ndarray, triangles: np.ndarray, mesh: dict[str, np.ndarray]) -> list[str]:
+def _mesh_faults(
+    folder: Path, vertices: np.ndarray, triangles: np.ndarray, mesh: dict[str, np.ndarray]
+) -> list[str]:
     path, n = folder / "mesh.npz", len(vertices)
     faults = []
     bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(bad):
-        faults.append(f"{path}: vertices: {len(bad)} are not finite, the first is {bad[0]}; build the face again")
+        faults.append(
+            f"{path}: vertices: {len(bad)} are not finite, the first is {bad[0]}; build the face again"
+        )
     if vertices.shape[1] != 3 or triangles.shape[1] != 3:
-        faults.append(f"{path}: wanted vertices and triangles of 3 columns, got {vertices.shape}, {triangles.shape}")
+        faults.append(
+            f"{path}: wanted vertices and triangles of 3 columns, got {vertices.shape}, {triangles.shape}"
+        )
     elif len(triangles) and (triangles.min() < 0 or triangles.max() >= n):
-        faults.append(f"{path}: triangles: wanted indices 0..{n - 1}, got {triangles.min()}..{triangles.max()}")
+        faults.append(
+            f"{path}: triangles: wanted indices 0..{n - 1}, got {triangles.min()}..{triangles.max()}"
+        )
     faults += [
         f"{path}: {name}: wanted {n} rows, one a vertex, got {len(mesh[name])}"
         for name in ("colours", "occlusion", "gloss")
@@ -110,10 +118,14 @@ def _field_faults(folder: Path, face: Face) -> list[str]:
     moved = np.abs(deform(face, rows) - face.vertices).max(axis=(1, 2))
     faults = []
     if moved[0] > 1e-6:
-        faults.append(f"{folder / 'fields.npz'}: the neutral face moves by {moved[0]:.6f} m; build the face again")
+        faults.append(
+            f"{folder / 'fields.npz'}: the neutral face moves by {moved[0]:.6f} m; build the face again"
+        )
     for row in faps()[2:]:
         if moved[row.fap] < 1e-6:
-            faults.append(f"{folder / 'fields.npz'}: FAP {row.fap} {row.name} moves nothing; build the face again")
+            faults.append(
+                f"{folder / 'fields.npz'}: FAP {row.fap} {row.name} moves nothing; build the face again"
+            )
     return faults
 
 
@@ -121,7 +133,9 @@ def _hole_faults(folder: Path, face: Face) -> list[str]:
     """Closed rims of the skin beyond the cut under the collar."""
     first, last = face.parts["skin"]
     triangles = face.triangles[(face.triangles >= first).all(axis=1) & (face.triangles < last).all(axis=1)]
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
     pairs, counts = np.unique(edges, axis=0, return_counts=True)
     rim = pairs[counts == 1]
     if not len(rim):
@@ -139,6 +153,6 @@ def _hole_faults(folder: Path, face: Face) -> list[str]:
     bottom = label[int(np.argmin(lowest))]
     other = names[label != bottom]
     return [
-        f"{folder / 'mesh.npz'}: the skin has {count - 1} holes beside the cut under the collar, one at vertex "
-        f"{other[0]}, {np.round(face.vertices[other[0]], 4).tolist()}; close it"
+        f"{folder / 'mesh.npz'}: the skin has {count - 1} holes beside the cut under the collar, one at "
+        f"vertex {other[0]}, {np.round(face.vertices[other[0]], 4).tolist()}; close it"
     ]

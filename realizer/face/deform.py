@@ -1,4 +1,4 @@
-"""FAP rows in, vertices out: one matrix product, then the parts that turn and the lids that slide."""
+"""FAP rows in, vertices out: one sparse product, then the parts that turn and the lids that slide."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from realizer.units import ANGLE_UNIT
 __all__ = ["deform"]
 
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
+CHUNK = 16  # frames at once: what a cache holds
 MOST_TURN = 0.42  # rad, 24 degrees
 # Rotated by these, the parts are driven apart from the product.
 DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49, 22, 23, 24, 25]
@@ -38,24 +39,25 @@ def deform(face: Face, faps: Any) -> Float32:
         raise ValueError("faps: wanted finite values, got NaN or infinity")
     basis = face.basis
     out = np.empty((len(rows), *face.vertices.shape), np.float32)
-    out[:] = face.vertices
     weights = _weights(basis, rows)
-    used = np.flatnonzero(weights.any(axis=0))
-    if len(used):
-        first, last = basis["moving"]
-        moves = weights[:, used] @ basis["fields"][used]
-        out[:, first:last] += moves.reshape(len(rows), -1, 3)
-    _turn_eyes(basis, rows, out)
-    _keep_lids_over_balls(basis, rows, out)
-    _turn_head(basis, rows, out)
+    first, last = basis["moving"]
+    for start in range(0, len(rows), CHUNK):
+        part = slice(start, start + CHUNK)
+        here = out[part]
+        here[:] = face.vertices
+        moves = basis["fields"] @ np.ascontiguousarray(weights[part].T)
+        here.reshape(len(here), -1)[:, 3 * first : 3 * last] += moves.T
+        _turn_eyes(basis, rows[part], here)
+        _keep_lids_over_balls(basis, rows[part], here)
+        _turn_head(basis, rows[part], here)
     return out
 
 
 def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
     """How the jaw stands when the chin (2.1) has sunk by `opening` metres: radians turned, metres slid down.
 
-    A jaw turns about its joint, and where it opens far the joint slides down and forwards: what the turn cannot
-    reach, the slide does.
+    A jaw turns about its joint, and where it opens far the joint slides: what the turn cannot reach, the
+    slide does.
     """
     y, z = basis["chin"]
     opening = np.asarray(opening, np.float64)
@@ -108,8 +110,8 @@ def _turn_eyes(basis: Any, rows: Float32, out: Float32) -> None:
 
 
 def _keep_lids_over_balls(basis: Any, rows: Float32, out: Float32) -> None:
-    """Push lid vertices forward until they lie as far from the ball's centre as at rest: lids slide over balls."""
-    moved: Bool = rows[:, 18:22].any(axis=1) | rows[:, THRUST].any(axis=1)
+    """Push lid vertices forward until they are as far from the ball's centre as at rest: lids slide over."""
+    moved: Bool = np.logical_or(rows[:, 18:22].any(axis=1), rows[:, THRUST].any(axis=1))
     if not moved.any():
         return
     lid, side = basis["lid"], basis["lid_eye"]
@@ -128,7 +130,8 @@ def _turn_head(basis: Any, rows: Float32, out: Float32) -> None:
     angles = rows[:, HEAD] * np.float32(ANGLE_UNIT)
     if not angles.any():
         return
-    turn = rotations(*angles.T) - np.eye(3, dtype=np.float32)
-    moves = (out - basis["head_pivot"]) @ turn.transpose(0, 2, 1)
-    moves *= basis["head"]
-    out += moves
+    turns = rotations(*angles.T) - np.eye(3, dtype=np.float32)
+    for vertices, turn in zip(out, turns, strict=True):
+        moves = (vertices - basis["head_pivot"]) @ turn.T
+        moves *= basis["head"]
+        vertices += moves

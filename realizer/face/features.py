@@ -17,7 +17,8 @@ __all__: list[str] = []
 
 HEAD = """\
 # source: measured on this face's mesh; ISO/IEC 14496-2 annex C names the points
-# units: x, y, z in metres, origin between the eyes, +x the character's left, +y up, +z forward; vertex counts from 0
+# units: x, y, z in metres, origin between the eyes, +x the character's left, +y up, +z forward
+# vertex: index into mesh.npz, from 0
 # licence: CC0-1.0
 """
 # The 84 points of ISO/IEC 14496-2 annex C: how many there are in each group.

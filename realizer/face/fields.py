@@ -59,7 +59,7 @@ class Ground:
         return field
 
     def ellipsoid(self, centre: Any, radii: Any, plateau: float = 0.0) -> Float64:
-        """Influence (n,) of an ellipsoid: 1 at the centre, 0 outside, raised cosine between (Paul 2010, 4.3.3)."""
+        """Influence (n,) of an ellipsoid: 1 at the centre, 0 outside (Paul 2010, 4.3.3)."""
         away = np.linalg.norm((self.at - np.asarray(centre)) / np.asarray(radii), axis=1)
         away = np.clip((away - plateau) / (1 - plateau), 0, 1)
         return np.where(self.body, (1 + np.cos(np.pi * away)) / 2, 0.0)
@@ -133,7 +133,10 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
 
 def _brows(ground: Ground) -> dict[int, Float64]:
     at, points = ground.at, ground.points
-    raise_ = sum((ground.shape(name) for name in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")), np.zeros_like(at))
+    raise_ = sum(
+        (ground.shape(name) for name in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")),
+        np.zeros_like(at),
+    )
     raise_ = np.where(ground.body[:, None], raise_, 0)
     stations = [ground.point(name) for name in ("4.1", "4.3", "4.5")]
     across = np.array([p[0] for p in stations])
@@ -191,7 +194,9 @@ def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
     }.items():
         lifted = np.where(ground.body[:, None], ground.shape(shape), 0) * free
         eye = ground.point("3.3" if side > 0 else "3.4")
-        lifted = lifted * (1 - ground.ellipsoid(eye + [0, 0.004, 0], (0.024, 0.012, 0.03), 0.5))[:, None]
+        lifted = (
+            lifted * (1 - ground.ellipsoid(eye + np.array([0, 0.004, 0]), (0.024, 0.012, 0.03), 0.5))[:, None]
+        )
         mound = ground.ellipsoid(ground.point(name), (0.030, 0.024, 0.035))[:, None] * (UP + 0.35 * FORWARD)
         here = lifted[points[name], 1]
         mixed = mound + (lifted / here if here > 1e-4 else 0)
@@ -203,7 +208,9 @@ def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
     points, free = ground.points, (1 - lips.lips)[:, None]
     out = {}
     for number, name, side in ((61, "9.1", 1), (62, "9.2", -1)):
-        reach = ground.ellipsoid(ground.point(name), (0.011, 0.012, 0.014)) * smooth(ground.at[:, 0] * side, 0.001, 0.008)
+        reach = ground.ellipsoid(ground.point(name), (0.011, 0.012, 0.014)) * smooth(
+            ground.at[:, 0] * side, 0.001, 0.008
+        )
         out[number] = scaled(ground.smoothed(reach[:, None] * (side * LEFT), 1), points[name], side * LEFT)
     tip = ground.point("9.3")
     reach = ground.ellipsoid(tip - [0, 0.001, 0.006], (0.022, 0.020, 0.030), 0.15)[:, None]
@@ -218,7 +225,7 @@ def _ears(ground: Ground) -> dict[int, Float64]:
     for side, names in {1: ("10.1", "10.3", 65, 67), -1: ("10.2", "10.4", 66, 68)}.items():
         top, back, up, pull = names
         centre = (ground.point(top) + ground.point("10.5" if side > 0 else "10.6")) / 2
-        reach = ground.ellipsoid(centre + [0.006 * side, 0, -0.004], (0.022, 0.046, 0.030), 0.45)
+        reach = ground.ellipsoid(centre + np.array([0.006 * side, 0, -0.004]), (0.022, 0.046, 0.030), 0.45)
         reach = ground.smoothed(reach, 1)[:, None]
         out[up] = scaled(reach * UP, points[top], UP)
         # Pulled out, the ear swings about its front edge.

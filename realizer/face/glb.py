@@ -22,8 +22,8 @@ def to_glb(face: Face) -> bytes:
     """The face's rest mesh as GLB.
 
     One primitive with POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _GLOSS. The mesh's
-    `extras` hold what a client of streamed vertices needs: scale and offset, parts (name -> first and last + 1
-    vertex, first and last + 1 triangle), FAPU in metres, source and licence.
+    `extras` hold what a client of streamed vertices needs: scale and offset, parts (name -> first and last
+    + 1 vertex, first and last + 1 triangle), FAPU in metres, source and licence.
     """
     # glTF wants unit normals; a vertex without a triangle gets one that points forward.
     ups = normals(face, face.vertices[None])[0]
@@ -98,7 +98,9 @@ def to_glb(face: Face) -> bytes:
     }
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    chunks = (
+        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    )
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 

@@ -94,4 +94,3 @@ def shirt(skin: Patch, base: Float64, colour: list[float]) -> Part:
     tint = np.repeat(np.array([colour], float), len(piece), 0)
     tint *= (1 - 0.22 * smooth(low, 0.012, 0.009))[:, None]
     return Part("shirt", piece, piece.positions(base), piece.triangles, tint, np.zeros(len(piece)))
-

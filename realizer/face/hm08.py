@@ -104,9 +104,7 @@ def read_base(data: Path) -> BaseMesh:
     uv = np.zeros((len(vertices), 2))
     for vertex, place in corners:
         uv[vertex] = texture[place]
-    return BaseMesh(
-        np.array(vertices), uv, {name: np.array(rows, np.int32) for name, rows in quads.items()}
-    )
+    return BaseMesh(np.array(vertices), uv, {name: np.array(rows, np.int32) for name, rows in quads.items()})
 
 
 def read_target(data: Path, name: str, n_vertices: int) -> Float64:

@@ -35,7 +35,7 @@ class Lid:
         edges = ground.mesh._edges()
         rings = []
         for first, _ in RINGS:
-            tips = [tuple(e - {first})[0] for e in edges if first in e]
+            tips = [next(iter(e - {first})) for e in edges if first in e]
             found = [walk(edges, first, tip) for tip in tips]
             rings.append(next(ring for ring in found if len(ring) == 28))
         if side < 0:
@@ -62,7 +62,9 @@ class Lid:
 
     def gap(self, x: Float64) -> Float64:
         """Metres between the lids at x, 0 beyond the corners."""
-        return np.asarray(np.interp(x * self.side, self.x, np.maximum(self.high - self.low, 0), left=0, right=0))
+        return np.asarray(
+            np.interp(x * self.side, self.x, np.maximum(self.high - self.low, 0), left=0, right=0)
+        )
 
     def middle(self, x: Float64) -> Float64:
         """Height half-way between the lids at x."""
@@ -70,7 +72,7 @@ class Lid:
 
 
 def lid_fields(ground: Ground) -> dict[int, Float64]:
-    """Fields of FAPs 19-22, and what 27 and 28 do to the lids: straight down or up; `deform` pushes them over the balls."""
+    """Fields of FAPs 19-22, and what 27 and 28 do to the lids; `deform` pushes them over the balls."""
     from realizer.face.fields import FORWARD, UP, scaled
 
     out = {}
@@ -113,5 +115,7 @@ def lid_fields(ground: Ground) -> dict[int, Float64]:
                 for vertex in ring:
                     belongs = above[vertex] if upper else not above[vertex]
                     weight[vertex] = gap[vertex] if belongs else 0.0
-            out[number] = scaled(weight[:, None] * (-UP if upper else UP), ground.points[name], -UP if upper else UP)
+            out[number] = scaled(
+                weight[:, None] * (-UP if upper else UP), ground.points[name], -UP if upper else UP
+            )
     return out

@@ -1,7 +1,7 @@
 """The lips: two contours of feature points joined by splines, so that equal FAPs move a lip as one.
 
-A place on the lips has two coordinates: u runs from the right corner (-1) over the middle (0) to the left corner
-(1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP owns a knot.
+A place on the lips has two coordinates: u runs from the right corner (-1) over the middle (0) to the left
+corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP owns a knot.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _STRETCH = _stretch()
 
 
 def hats(u: Any) -> Float64:
-    """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; each 1 at its knot, 0 at the others, sum 1.
+    """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; 1 at their own knot, 0 at the others.
 
     Their sum being 1 everywhere is what keeps a lip whose FAPs are equal from bending into a w.
     """
@@ -59,7 +59,10 @@ def hats(u: Any) -> Float64:
         value = np.eye(KNOTS)[knot]
         slope = np.gradient(value) * (1 - TENSION)
         out[knot] = (
-            basis[0] * value[piece] + basis[1] * slope[piece] + basis[2] * value[piece + 1] + basis[3] * slope[piece + 1]
+            basis[0] * value[piece]
+            + basis[1] * slope[piece]
+            + basis[2] * value[piece + 1]
+            + basis[3] * slope[piece + 1]
         )
     return out
 
@@ -72,7 +75,7 @@ class Lips:
         is_upper: (n,) bool.
         inside: (n,) bool, in the mouth.
         away: (n,) metres from the red's border, 0 on the lips and in the mouth.
-        lips: (n,) 1 on the lips and just inside, falling to 0 within a centimetre: what other FAPs leave alone.
+        lips: (n,) 1 on the lips and just inside, 0 from a centimetre on: what other FAPs leave alone.
         upper, corners: (n,) the upper lip's and the corners' part of that.
         around: (n,) 1 on the lips, falling to 0 towards the chin boss: what FAP 3 leaves to the lip FAPs.
     """
@@ -151,7 +154,8 @@ class Lips:
         line = at[ring[k]] * (1 - part) + at[ring[k + 1]] * part
         u = self.u[ring[k]] * (1 - part[:, 0]) + self.u[ring[k + 1]] * part[:, 0]
         upper = self.is_upper[ring[np.where(part[:, 0] < 0.5, k, k + 1)]]
-        self.away, nearest = cKDTree(line).query(at)
+        away, nearest = (np.asarray(found) for found in cKDTree(line).query(at))
+        self.away: Float64 = away.astype(np.float64)
         other = ground.body & ~inside & ((on_ring < 0) | (on_ring > BORDER))
         self.u[other], self.is_upper[other], self.w[other] = u[nearest[other]], upper[nearest[other]], 1
 
@@ -175,7 +179,7 @@ def close_lips(ground: Ground) -> Float64:
 
 def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     """Fields of FAPs 4-13, 16-18 and 51-60."""
-    from realizer.face.fields import FORWARD, LEFT, UP, scaled
+    from realizer.face.fields import FORWARD, UP, scaled
 
     at, points = ground.at, ground.points
     knots = hats(lips.u)
@@ -216,7 +220,7 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
 def _corners(
     ground: Ground, lips: Lips, left: Float64, right: Float64, inner: Float64, outer: Float64
 ) -> dict[int, Float64]:
-    """FAPs 6, 7, 12, 13 (inner) and 53, 54, 59, 60 (outer): the spline on the lips, the CC0 shapes in the cheeks."""
+    """FAPs 6, 7, 12, 13 (inner) and 53, 54, 59, 60 (outer): splines on the lips, CC0 shapes in the cheeks."""
     from realizer.face.fields import LEFT, UP, scaled
 
     at, points, out = ground.at, ground.points, {}
@@ -230,9 +234,13 @@ def _corners(
         (-1, right, ((7, 13), (54, 60)), ("2.5", "8.4"), "Right"),
     ):
         corner = points[names[1]]
-        smile, stretch = (np.where(ground.body[:, None], ground.shape(f"mouth{k}{word}"), 0) for k in ("Smile", "Stretch"))
+        smile, stretch = (
+            np.where(ground.body[:, None], ground.shape(f"mouth{k}{word}"), 0) for k in ("Smile", "Stretch")
+        )
         # Two shapes, mixed so that the corner goes straight up, or straight out.
-        pull = np.array([[smile[corner, 0] * side, stretch[corner, 0] * side], [smile[corner, 1], stretch[corner, 1]]])
+        pull = np.array(
+            [[smile[corner, 0] * side, stretch[corner, 0] * side], [smile[corner, 1], stretch[corner, 1]]]
+        )
         mixes = np.linalg.solve(pull, np.eye(2))
         out_shape = smile * mixes[0, 0] + stretch * mixes[1, 0]
         up_shape = smile * mixes[0, 1] + stretch * mixes[1, 1]

@@ -91,7 +91,9 @@ def read_head(folder: Path) -> dict[str, Any]:
     try:
         head = tomllib.loads(path.read_text("utf-8"))
     except FileNotFoundError:
-        raise FaceError(f"{path}: wanted this file with name, source, licence and parts, found none") from None
+        raise FaceError(
+            f"{path}: wanted this file with name, source, licence and parts, found none"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FaceError(f"{path}: {error}") from None
     for key, kind in {"name": str, "source": str, "licence": str, "parts": dict}.items():

@@ -29,7 +29,9 @@ def texture(data: Path, name: str, uv: Float64) -> Float64:
     return np.asarray(pixels[rows, columns])
 
 
-def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: dict[str, Any]) -> tuple[Float64, Float64]:
+def paint_skin(
+    ground: Ground, lips: Lips, rings: list[list[list[int]]], look: dict[str, Any]
+) -> tuple[Float64, Float64]:
     """Colours (n, 3) sRGB 0..255 and gloss (n,) of the base mesh's body.
 
     Args:
@@ -59,7 +61,10 @@ def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: d
         share = ground.ellipsoid(ground.point(name), (0.018, 0.010, 0.03))[:, None] * 0.20
         out = out * (1 - share) + (skin * [0.86, 0.80, 0.82]) * share
     for name in ("3.13", "3.14"):
-        share = ground.ellipsoid(ground.point(name) + [0, -0.001, 0], (0.019, 0.008, 0.03))[:, None] * 0.30
+        share = (
+            ground.ellipsoid(ground.point(name) + np.array([0, -0.001, 0]), (0.019, 0.008, 0.03))[:, None]
+            * 0.30
+        )
         out = out * (1 - share) + (skin * [0.84, 0.74, 0.70]) * share
     # Red of the lips: whole from ring 1 to ring 6, half at its border, darker where they meet.
     amount = np.zeros(n)
@@ -79,7 +84,9 @@ def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: d
         top = at[ring[0]][:, 1] > np.median(at[ring[0]][:, 1])
         for k, (upper, lower) in enumerate(((0.55, 0.25), (0.62, 0.18), (0.22, 0.06))):
             share = np.where(top, upper, lower)[:, None]
-            out[ring[k]] = out[ring[k]] * (1 - share) + np.where(top[:, None], [92, 58, 48.0], [205, 120, 110.0]) * share
+            out[ring[k]] = (
+                out[ring[k]] * (1 - share) + np.where(top[:, None], [92, 58, 48.0], [205, 120, 110.0]) * share
+            )
         gloss[ring[0]] = 0.5
     nose = ground.ellipsoid(ground.point("9.3"), (0.014, 0.016, 0.02))
     gloss += 0.16 * nose
@@ -89,11 +96,13 @@ def paint_skin(ground: Ground, lips: Lips, rings: list[list[list[int]]], look: d
 DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth cell; metres a ray starts off
 
 
-def occlusion(vertices: Float64, normals: Float64, triangles: Int32, blockers: Int32 | None = None) -> Float64:
+def occlusion(
+    vertices: Float64, normals: Float64, triangles: Int32, blockers: Int32 | None = None
+) -> Float64:
     """How much of the sky above it each vertex sees, 0..1, weighted by the cosine.
 
-    Depth pictures of the mesh from many directions take the place of rays: a vertex that lies deeper than what
-    the picture shows at its place is in shadow from there.
+    Depth pictures of the mesh from many directions take the place of rays: a vertex that lies deeper than
+    what the picture shows at its place is in shadow from there.
 
     Args:
         vertices, normals: (n, 3).
@@ -127,7 +136,9 @@ def occlusion(vertices: Float64, normals: Float64, triangles: Int32, blockers: I
 def _cover(vertices: Float64, triangles: Int32) -> Float64:
     """Points on the triangles, closer together than a depth cell."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    longest = np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0)
+    longest = np.max(
+        [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0
+    )
     steps = np.clip(np.ceil(longest / (CELL * 0.8)).astype(int), 1, 24)
     points = [vertices]
     for n in np.unique(steps):
@@ -137,6 +148,8 @@ def _cover(vertices: Float64, triangles: Int32) -> Float64:
         u, v = i[inside] / n, j[inside] / n
         w = 1 - u - v
         points.append(
-            (a[mine, None] * w[:, None] + b[mine, None] * u[:, None] + c[mine, None] * v[:, None]).reshape(-1, 3)
+            (a[mine, None] * w[:, None] + b[mine, None] * u[:, None] + c[mine, None] * v[:, None]).reshape(
+                -1, 3
+            )
         )
     return np.concatenate(points)

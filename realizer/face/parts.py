@@ -1,4 +1,4 @@
-"""The parts that the base mesh lacks: eyeballs, teeth, brows, lashes, hair, a collar. Numbers in, triangles out."""
+"""The parts that the base mesh lacks: eyeballs, teeth, brows, lashes. Numbers in, triangles out."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def smooth(x: Any, low: float, high: float) -> Any:
 
 
 def grid(rows: int, columns: int, closed: bool = False) -> Int32:
-    """Triangles of a sheet of rows x columns vertices (row-major); closed joins the last column to the first."""
+    """Triangles of a sheet of rows x columns vertices (row-major); closed joins last column and first."""
     last = columns if closed else columns - 1
     r, c = np.meshgrid(np.arange(rows - 1), np.arange(last), indexing="ij")
     a = (r * columns + c).ravel()
     b = (r * columns + (c + 1) % columns).ravel()
-    return np.concatenate([np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)]).astype(
-        np.int32
-    )
+    return np.concatenate(
+        [np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)]
+    ).astype(np.int32)
 
 
 PUPIL, IRIS = 2.05, 6.35  # mm, radii on the ball
@@ -65,14 +65,29 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     """
     # Radii in mm on the flat of the eye, then angles: close together where the colour jumps.
     flat = [1.0, PUPIL - 0.05, PUPIL + 0.18, 3.2, 4.4, 5.4, 5.9, IRIS, IRIS + 0.45, 8.2, 10.2, 12.0]
-    names = ["pupil", "pupil", "iris_inner", "iris_inner", "iris_middle", "iris_outer", "ring", "ring", "white"]
+    names = [
+        "pupil",
+        "pupil",
+        "iris_inner",
+        "iris_inner",
+        "iris_middle",
+        "iris_outer",
+        "ring",
+        "ring",
+        "white",
+    ]
     angles = [float(np.arcsin(r / 1000 / radius)) for r in flat] + [1.15, 1.6]
     turn = np.arange(SEGMENTS) * 2 * np.pi / SEGMENTS
     points, colours = [np.array([[0, 0, 1.0]])], [np.array([look["pupil"]], float)]
     for k, angle in enumerate(angles):
         points.append(
             np.stack(
-                [np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.full(SEGMENTS, np.cos(angle))], 1
+                [
+                    np.sin(angle) * np.cos(turn),
+                    np.sin(angle) * np.sin(turn),
+                    np.full(SEGMENTS, np.cos(angle)),
+                ],
+                1,
             )
         )
         base = np.array(look[names[k]] if k < len(names) else look["white"], float)
@@ -87,10 +102,18 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
         colours.append(ring)
     ball = np.concatenate(points)
     vertices = centre + radius * ball
-    fan = np.stack([np.zeros(SEGMENTS, int), 1 + np.arange(SEGMENTS), 1 + (np.arange(SEGMENTS) + 1) % SEGMENTS], 1)
+    fan = np.stack(
+        [np.zeros(SEGMENTS, int), 1 + np.arange(SEGMENTS), 1 + (np.arange(SEGMENTS) + 1) % SEGMENTS], 1
+    )
     sheet = grid(len(angles), SEGMENTS, closed=True) + 1
-    part = Part(name, None, vertices, np.concatenate([fan, sheet]).astype(np.int32), np.concatenate(colours),
-                np.full(len(vertices), 1.0))
+    part = Part(
+        name,
+        None,
+        vertices,
+        np.concatenate([fan, sheet]).astype(np.int32),
+        np.concatenate(colours),
+        np.full(len(vertices), 1.0),
+    )
     # Dilation: the pupil's edge moves out, the iris gives way up to its rim.
     out = np.hypot(ball[:, 0], ball[:, 1]) * radius * 1000
     share = np.where(out < PUPIL + 0.2, out / PUPIL, np.clip((IRIS - out) / (IRIS - PUPIL - 0.2), 0, 1))
@@ -125,7 +148,12 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
     at = 0.0
     for k, size in enumerate(sizes):
         size /= 1000
-        stations += [(at, k, True), (at + 0.16 * size, k, False), (at + 0.5 * size, k, False), (at + 0.84 * size, k, False)]
+        stations += [
+            (at, k, True),
+            (at + 0.16 * size, k, False),
+            (at + 0.5 * size, k, False),
+            (at + 0.84 * size, k, False),
+        ]
         at += size
     stations.append((at, len(sizes) - 1, True))
     side = [(-s, k, gap) for s, k, gap in stations[:0:-1]] + stations
@@ -135,7 +163,9 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
     for s, k, gap in side:
         sign = np.sign(s) or 1.0
         px, pz = sign * np.interp(abs(s), run, x), np.interp(abs(s), run, z)
-        tangent = np.array([np.interp(abs(s) + 1e-4, run, x) - abs(px), np.interp(abs(s) + 1e-4, run, z) - pz])
+        tangent = np.array(
+            [np.interp(abs(s) + 1e-4, run, x) - abs(px), np.interp(abs(s) + 1e-4, run, z) - pz]
+        )
         tangent /= np.hypot(*tangent)
         normal = np.array([-tangent[1] * sign, tangent[0]])  # outwards, in x and z
         back = 0.0007 if gap else 0.0
@@ -152,7 +182,13 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
             (height - (0.0016 if gap else 0), 0.0004, gum),
             (height + 0.0045, 0.0002, gum * 0.85),
         ):
-            rows.append([front[0] + px + normal[0] * (dn - back), front[1] + up * dy, front[2] + pz + normal[1] * (dn - back)])
+            rows.append(
+                [
+                    front[0] + px + normal[0] * (dn - back),
+                    front[1] + up * dy,
+                    front[2] + pz + normal[1] * (dn - back),
+                ]
+            )
             tints.append(tint)
     vertices = np.array(rows)
     triangles = grid(len(side), 7)
@@ -182,7 +218,12 @@ def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, c
     vertices = patch.positions(base)
     x, y = brow_curve(points, side)
     curve = PchipInterpolator(x, y)
-    near = (vertices[:, 0] * side > 0.004) & (vertices[:, 1] > 0.004) & (vertices[:, 1] < 0.04) & (vertices[:, 2] > -0.02)
+    near = (
+        (vertices[:, 0] * side > 0.004)
+        & (vertices[:, 1] > 0.004)
+        & (vertices[:, 1] < 0.04)
+        & (vertices[:, 2] > -0.02)
+    )
     piece = patch.kept(near[patch.triangles].all(axis=1))
     piece = piece.subdivided(flat=True)[0].subdivided(flat=True)[0]
 
@@ -233,4 +274,6 @@ def lashes(base: Float64, margin: list[int], centre: Float64, colour: list[float
         triangles = triangles[:, [0, 2, 1]]
     patch = Patch(mix, offset, triangles)
     tint = np.repeat(np.array([colour], float), len(rows), 0)
-    return Part("lashes", patch, patch.positions(base), triangles, tint, np.zeros(len(rows)), np.full(len(rows), 0.9))
+    return Part(
+        "lashes", patch, patch.positions(base), triangles, tint, np.zeros(len(rows)), np.full(len(rows), 0.9)
+    )

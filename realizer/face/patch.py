@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from realizer.arrays import Bool, Float64, Int32
+from realizer.arrays import Float64, Int32
 
 __all__: list[str] = []
 
@@ -17,7 +18,7 @@ class Patch:
     """A piece of surface.
 
     Attributes:
-        mix: (n, n_base) sparse; vertex = mix @ base vertices + offset, so any field on the base mesh comes along.
+        mix: (n, n_base) sparse; vertex = mix @ base vertices + offset, so its fields come along.
         offset: (n, 3) metres.
         triangles: (m, 3) counter-clockwise seen from outside.
     """
@@ -42,11 +43,11 @@ class Patch:
         """(n, 3) metres."""
         return np.asarray(self.mix @ base) + self.offset
 
-    def mixed(self, mix: sp.csr_matrix, triangles: Int32) -> Patch:
+    def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Patch:
         """The patch whose vertices are mixes of this one's."""
         return Patch((mix @ self.mix).tocsr(), np.asarray(mix @ self.offset), triangles.astype(np.int32))
 
-    def kept(self, keep: Bool) -> Patch:
+    def kept(self, keep: Any) -> Patch:
         """The triangles that are kept (m,), with the vertices that they use."""
         used, inverse = np.unique(self.triangles[keep], return_inverse=True)
         pick = sp.eye_array(len(self), format="csr")[used]
@@ -135,7 +136,7 @@ class Patch:
                 around = []
             if flat:
                 around = []
-            put(i, {i: 1 - share * len(around)} | {j: share for j in around})
+            put(i, {i: 1 - share * len(around)} | dict.fromkeys(around, share))
 
         def mid(p: int, q: int) -> int:
             return number[(p, q) if p < q else (q, p)]
@@ -155,4 +156,4 @@ def vertex_normals(vertices: Float64, triangles: Int32) -> Float64:
     out = np.zeros_like(vertices)
     for k in range(3):
         np.add.at(out, triangles[:, k], faces)
-    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-20)
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-20))

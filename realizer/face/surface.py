@@ -16,18 +16,22 @@ ROOM = 0.15  # m around the neutral mesh for all that the head's turns and the j
 
 
 def normals(face: Face, vertices: Any) -> Float32:
-    """Unit normals of (n, n_vertices, 3) vertices, same shape, float32; zero where a vertex has no triangle."""
+    """Unit normals of (n, n_vertices, 3) vertices, float32; zero where a vertex has no triangle."""
     vertices = np.asarray(vertices, np.float32)
-    a, b, c = (vertices[:, face.triangles[:, k]] for k in range(3))
-    b -= a
-    c -= a
-    faces = np.empty((len(face.triangles), len(vertices), 3), np.float32)
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        faces[:, :, k] = (b[..., i] * c[..., j] - b[..., j] * c[..., i]).T
-    summed = _corners(face) @ faces.reshape(len(face.triangles), -1)
-    out = np.ascontiguousarray(summed.reshape(-1, len(vertices), 3).transpose(1, 0, 2))
-    out /= np.maximum(np.sqrt(np.einsum("nij,nij->ni", out, out)), 1e-20)[..., None]
+    corners, (i, j, k) = _corners(face)
+    out = np.empty_like(vertices)
+    for frame, ups in zip(vertices, out, strict=True):
+        # Coordinate by coordinate: columns of their own are what numpy is quick with.
+        at = np.ascontiguousarray(frame.T)
+        first, second, third = (np.take(at, n, axis=1) for n in (i, j, k))
+        second -= first
+        third -= first
+        (bx, by, bz), (cx, cy, cz) = second, third
+        x, y, z = corners @ (by * cz - bz * cy), corners @ (bz * cx - bx * cz), corners @ (bx * cy - by * cx)
+        length = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-20)
+        np.divide(x, length, out=ups[:, 0])
+        np.divide(y, length, out=ups[:, 1])
+        np.divide(z, length, out=ups[:, 2])
     return out
 
 
@@ -42,15 +46,19 @@ def quantise(face: Face, vertices: Any) -> Int16:
     """Vertices (n, n_vertices, 3) metres as int16 by `face_scale`; what lies outside is clipped."""
     scale, offset = face_scale(face)
     steps = (np.asarray(vertices, np.float32) - offset) * np.float32(1 / scale)
-    return np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
+    np.rint(steps, out=steps)
+    np.clip(steps, -32768, 32767, out=steps)
+    whole: Int16 = steps.astype(np.int16)
+    return whole
 
 
 @lru_cache(maxsize=16)
-def _corners(face: Face) -> Any:
-    """(n_vertices, n_triangles) sparse, 1 where the triangle has the vertex."""
+def _corners(face: Face) -> tuple[Any, Any]:
+    """(n_vertices, n_triangles) sparse, 1 where the triangle has the vertex; the triangles' three columns."""
     from scipy.sparse import csr_matrix
 
     m = len(face.triangles)
     ones = np.ones(3 * m, np.float32)
-    columns = np.repeat(np.arange(m), 3)
-    return csr_matrix((ones, (face.triangles.ravel(), columns)), (len(face.vertices), m))
+    columns = np.repeat(np.arange(m, dtype=np.int32), 3)
+    matrix = csr_matrix((ones, (face.triangles.ravel(), columns)), (len(face.vertices), m))
+    return matrix, tuple(np.ascontiguousarray(face.triangles.T))

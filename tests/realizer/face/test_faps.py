@@ -15,7 +15,15 @@ WAYS = {
     "right": (-1, 0, 0),
     "forward": (0, 0, 1),
 }
-TURNS = ("yaw_l_eyeball", "yaw_r_eyeball", "pitch_l_eyeball", "pitch_r_eyeball", "head_pitch", "head_yaw", "head_roll")
+TURNS = (
+    "yaw_l_eyeball",
+    "yaw_r_eyeball",
+    "pitch_l_eyeball",
+    "pitch_r_eyeball",
+    "head_pitch",
+    "head_yaw",
+    "head_roll",
+)
 SPECIAL = (*TURNS, "tongue_roll", "dilate_l_pupil", "dilate_r_pupil", "open_jaw")
 STRAIGHT = [row for row in LOW_LEVEL if row.name not in SPECIAL]
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
@@ -49,7 +57,7 @@ def usual(row: Fap) -> float:
 
 
 def whole(row: Fap, value: float) -> dict[int, float]:
-    """The FAP, and for a lip corner its other contour: nobody moves one contour of a corner through the other."""
+    """The FAP, and for a lip corner its other contour: nobody moves one through the other."""
     partners = {6: 53, 7: 54, 12: 59, 13: 60}
     partners |= {b: a for a, b in partners.items()}
     return {row.fap: value} | ({partners[row.fap]: value} if row.fap in partners else {})
@@ -96,7 +104,9 @@ def test_open_jaw_takes_lower_teeth_and_tongue_and_not_the_upper_teeth(face: Fac
     assert np.allclose(size(before), size(after), atol=5e-5)
 
 
-@pytest.mark.parametrize(("side", "part", "yaw", "pitch"), [(0, "left_eye", 23, 25), (1, "right_eye", 24, 26)])
+@pytest.mark.parametrize(
+    ("side", "part", "yaw", "pitch"), [(0, "left_eye", 23, 25), (1, "right_eye", 24, 26)]
+)
 def test_eyeballs_turn_by_the_angle(face: Face, side: int, part: str, yaw: int, pitch: int) -> None:
     _, centre = face.basis["eyes"][side]
     pupil = face.feature_points["3.5" if side == 0 else "3.6"]
@@ -163,7 +173,9 @@ def test_mirrored_faps_mirror(face: Face, row: Fap) -> None:
     assert np.abs(here - there)[pairs].max() <= max(0.01 * largest, 2e-6)
 
 
-@pytest.mark.parametrize("row", [r for r in LOW_LEVEL if r.feature_point in UPPER + LOWER], ids=lambda r: r.name)
+@pytest.mark.parametrize(
+    "row", [r for r in LOW_LEVEL if r.feature_point in UPPER + LOWER], ids=lambda r: r.name
+)
 def test_the_opposite_lip_stays(face: Face, row: Fap) -> None:
     opposite = LOWER if row.feature_point in UPPER else UPPER
     move = np.linalg.norm(moved(face, {row.fap: usual(row)}), axis=1)
@@ -172,7 +184,9 @@ def test_the_opposite_lip_stays(face: Face, row: Fap) -> None:
         assert move[face.feature_points[name]] < 0.05 * asked, name
 
 
-@pytest.mark.parametrize(("fap", "others"), [(19, "3.3 3.1"), (20, "3.4 3.2"), (21, "3.1 3.3"), (22, "3.2 3.4")])
+@pytest.mark.parametrize(
+    ("fap", "others"), [(19, "3.3 3.1"), (20, "3.4 3.2"), (21, "3.1 3.3"), (22, "3.2 3.4")]
+)
 def test_the_opposite_lid_stays(face: Face, fap: int, others: str) -> None:
     opposite, _ = others.split()
     move = moved(face, {fap: 300})
