@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 
 import pytest
+
 from bml_schema.feedback import WarningFeedback
 from realizer.client import ClientError, connect, connect_sync
 from realizer.server.serve import Server
@@ -93,7 +94,7 @@ def test_nobody_there_is_an_os_error() -> None:
     async def run() -> None:
         async with Server(Settings(port=0, voice="silent")) as server:
             url = server.url
-        with pytest.raises(OSError):
+        with pytest.raises(OSError, match="Connect"):
             async with connect(url):
                 pass
 

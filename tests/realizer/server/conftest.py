@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+
 from bml_schema.feedback import parse_feedback
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session import Session

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from bml_schema import parse
 from realizer.behaviours import VOCABULARY
 from realizer.server.preparation import Preparation
@@ -19,7 +20,9 @@ def block(text: str):
 def talking() -> Preparation:
     """A block "a" whose speech 1 is still to be spoken."""
     preparation = Preparation()
-    preparation.add(block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'), 0, {1: ("s", Say("Hi"))}, 0.0)
+    preparation.add(
+        block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'), 0, {1: ("s", Say("Hi"))}, 0.0
+    )
     return preparation
 
 
@@ -32,7 +35,12 @@ def talking() -> Preparation:
         ('<bml id="b" composition="APPEND"><wait id="w"/></bml>', 1, False),
         ('<bml id="b" composition="REPLACE"><wait id="w"/></bml>', 0, False),
         ('<bml id="b"><wait id="w" start="a:s:end"/></bml>', 1, True),
-        ('<bml id="b"><wait id="w"/><constraint><after ref="a:s:end"><sync ref="w:start"/></after></constraint></bml>', 0, True),
+        (
+            '<bml id="b"><wait id="w"/><constraint><after ref="a:s:end"><sync ref="w:start"/></after>'
+            "</constraint></bml>",
+            0,
+            True,
+        ),
     ],
 )
 def test_a_block_waits_only_for_what_it_depends_on(talking, later, character, waits) -> None:

@@ -1,12 +1,13 @@
-"""The laws of a session, without sockets: order, once each, nothing after close, faults that stay where they are."""
+"""The laws of a session, without sockets: order, once each, nothing after close, faults stay where they are."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from bml_schema.feedback import BlockProgress, WarningFeedback
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.errors import RenderError, VoiceError
 from realizer.server.wire import FrameKind
 
@@ -284,8 +285,8 @@ def test_a_viewer_can_switch_feedback_off(driver) -> None:
 
 
 def test_a_slow_client_loses_frames_counted_and_never_feedback(driver) -> None:
-    driver.send(FAP)
     driver.session.backlog(1, 10**6)
+    driver.send(FAP)
     driver.send(NOD.format("b"))
     client = driver.run(10)
     assert not client.frames

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+
 from realizer.server.site import NOT_BUILT, Site
 
 SITE = Site(lambda: {"sessions": 2})

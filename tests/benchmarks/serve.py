@@ -1,0 +1,63 @@
+"""Prints medians over a real socket: a document in to its first feedback, and to the first frame that shows it.
+
+Run: python tests/benchmarks/serve.py
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import statistics
+import time
+
+from websockets.asyncio.client import connect
+
+from realizer.server.serve import Server
+from realizer.server.wire import unpack
+from realizer.settings import Settings
+
+ROUNDS = 30
+FPS = 25
+BEHAVIOURS = "".join(f'<faceLexeme id="f{k}" lexeme="SMILE" amount="0.9" end="0.6"/>' for k in range(20))
+DOCUMENTS = {
+    "one nod": '<head id="n" lexeme="NOD"/>',
+    "20 behaviours": BEHAVIOURS,
+    "speech": '<speech id="s"><text>Hello, how are you today?</text></speech>',
+}
+
+
+async def measure(url: str, body: str) -> tuple[list[float], list[float], list[float]]:
+    """Milliseconds to the acknowledgement, to the plan, and to the first frame after the plan."""
+    first, planned, shown = [], [], []
+    async with connect(url, compression=None) as socket:
+        await socket.send(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS}))
+        for k in range(ROUNDS):
+            start = time.perf_counter()
+            await socket.send(f'<bml id="b{k}" composition="REPLACE">{body}</bml>')
+            told: list[float] = []
+            begins = None
+            async for message in socket:
+                now = 1000 * (time.perf_counter() - start)
+                if isinstance(message, bytes):
+                    if begins is not None and unpack(message).time >= begins:
+                        shown.append(now)
+                        break
+                elif "predictionFeedback" in message and f'"b{k}"' in message:
+                    told.append(now)
+                elif f'"b{k}:start"' in message:
+                    planned.append(now)
+                    begins = float(message.partition('globalTime="')[2].partition('"')[0])
+            first.append(told[0])
+    return first, planned, shown
+
+
+async def main() -> None:
+    async with Server(Settings(port=0)) as server:
+        print(f"ms, median of {ROUNDS}; a frame waits for its time: {1000 / FPS / 2:.0f} ms on average")
+        for name, body in DOCUMENTS.items():
+            first, planned, shown = map(statistics.median, await measure(server.url, body))
+            print(f"{name:14} first feedback {first:7.1f}   block start {planned:7.1f}   first frame {shown:7.1f}")
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
