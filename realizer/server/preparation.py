@@ -75,6 +75,11 @@ class Preparation:
         """What a speak id asked for; None where nobody waits for it."""
         return next((w.says[speak][1] for w in self.waiting if speak in w.says), None)
 
+    @property
+    def has_ready(self) -> bool:
+        """Whether `ready` would give a block."""
+        return any(not w.says and not w.after for w in self.waiting)
+
     def ready(self) -> Waiting | None:
         """The first block that waits for nothing, taken out; None where all wait."""
         for waiting in self.waiting:

@@ -207,24 +207,24 @@ class Session:
     # time ---------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """Do what is due: feedback, sound and frames first, then at most one document, then its feedback."""
+        """Do what is due: feedback, sound and frames first, then read or plan one document at most."""
         if self.closed:
             return
         t = now - self.opened
         self._publish(t)
         self._effects += self._broadcast.due(self._connections.values(), t)
-        if self._read_one(t):
-            self._publish(t)
         for speak in self._preparation.overdue(t + EPSILON - SPEAK_DEADLINE):
             self._silently(speak, f"the voice has not answered for {SPEAK_DEADLINE:g} s")
-        if self._submit_ready(t):
+        # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
+        # begins, and frames that are due come in between.
+        if self._submit_ready(t) or self._read_one(t):
             self._publish(t)
 
     def next_deadline(self) -> float | None:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
         if self.closed:
             return None
-        if self._inbox:
+        if self._inbox or self._preparation.has_ready:
             return float("-inf")
         deadlines = [
             self.player.next_deadline(),
@@ -287,9 +287,8 @@ class Session:
                 self._speaks += 1
                 voice = say.voice or self._voices.get(character) or self.settings.voice
                 says[self._speaks] = (behaviour, replace(say, voice=voice))
-            waiting = self._preparation.add(block, character, says, t)
-            if says or waiting.after:
-                self.player.announce(block, t)
+            self._preparation.add(block, character, says, t)
+            self.player.announce(block, t)
         except Exception:
             self._internal(block, t)
             return

@@ -1,4 +1,4 @@
-"""The laws of a session, without sockets: order, once each, nothing after close, faults stay where they are."""
+"""The laws of a session, without sockets: order, once each, nothing after close, faults kept small."""
 
 from __future__ import annotations
 
