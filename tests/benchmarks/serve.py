@@ -65,7 +65,7 @@ async def main() -> None:
         for name, body in DOCUMENTS.items():
             first, planned, shown = map(statistics.median, await measure(url, body))
             print(
-                f"{name:14} first feedback {first:5.1f}   block start {planned:5.1f}   first frame {shown:5.1f}"
+                f"{name:14} first feedback {first:5.1f}   block start {planned:5.1f}   frame {shown:5.1f}"
             )
     finally:
         service.terminate()

@@ -11,7 +11,8 @@ const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
 export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    // Where a processor draws (no GPU), smoothing costs more than all the rest.
+    this.renderer = new WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(12, 1, 0.1, 10);
     this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
@@ -144,6 +145,14 @@ export class Stage {
       limit();
     });
   }
+}
+
+function drawnInSoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const info = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? context.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
 }
 
 function checked(answer) {
