@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,11 +17,11 @@ from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle import idle_channels
-from realizer.animation.targets import AU_NAMES, axis
-from realizer.animation.targets import region as region_of
+from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float64
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
+from realizer.character import RELAX, Character, Shift
 from realizer.planning import plan
 from realizer.reporting import Event, acknowledgement, events, prediction, progress
 from realizer.scheduling.timing import Schedule, Warning
@@ -29,14 +29,10 @@ from realizer.speech.utterance import Say, Utterance
 
 __all__ = ["Player", "Speaking"]
 
-# How long a face takes back to its base when a block is cut off. 0.3 s is about a natural expression's
-# release; sound and lips stop faster, so that a barge-in is heard at once.
-RELAX = 0.3  # s
+# Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
 HUSH = 0.12  # s
 # Frames up to this long before `now` can still be asked for.
 KEPT = 1.0  # s
-# A directly set AU or FAP is reached this long after it was set.
-SETTLE = 0.12  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,25 +59,6 @@ class Playing:
     ended: float  # when its end feedback is due; moved to `now` when it is stopped
     started: bool = False
     done: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Shift:
-    """A change of a base state: from `begin` to `end` it replaces what was the base of its regions."""
-
-    begin: float
-    end: float
-    regions: frozenset[str]
-    channels: tuple[Channel, ...]
-
-
-@dataclass(eq=False)
-class Character:
-    """One face of a session: its base states and what a client set directly."""
-
-    id: str | None
-    shifts: list[Shift] = field(default_factory=list)
-    direct: dict[str, Channel] = field(default_factory=dict)
 
 
 class Player:
@@ -212,24 +189,7 @@ class Player:
         Raises:
             KeyError: no such AU or FAP.
         """
-        columns = axis()
-        targets = {name: columns[name] for name in values}
-        direct = self._characters[character].direct
-        for name, value in values.items():
-            held = direct.get(name)
-            if value is None:
-                if held is not None:
-                    direct[name] = held.faded(now, now + RELAX)
-                continue
-            before = 0.0 if held is None else float(np.interp(now, held.times, held.values))
-            direct[name] = Channel(
-                targets[name],
-                np.array([now, now + SETTLE]),
-                np.array([before, value]),
-                layer=Layer.DIRECT,
-                holds=True,
-                source="set",
-            )
+        self._characters[character].set_direct(values, now)
         self._changed(now)
 
     # feedback out -------------------------------------------------------------------------------
@@ -383,8 +343,7 @@ class Player:
                 moving += own
             else:
                 times = schedule.times[behaviour] + start
-                regions = frozenset({region, *(region_of(c.target) for c in own)})
-                shifts.append(Shift(float(times[0]), float(times[-1]), regions, own))
+                shifts.append(Shift.of(float(times[0]), float(times[-1]), region, own))
         speech = tuple(
             Speaking(start + float(schedule.times[b][0]), float("inf"), utterance, character)
             for b, utterance in world.utterances.items()
@@ -394,7 +353,7 @@ class Player:
             block, schedule, character, number, tuple(moving), tuple(shifts), speech, schedule.end
         )
         self._playing.append(playing)
-        self._characters[character].shifts += shifts
+        self._characters[character].shift(shifts)
         self._outbox.append(prediction(block, schedule))
         for warning in schedule.warnings:
             self.refuse(warning, now, block.character_id)
@@ -412,24 +371,14 @@ class Player:
             for c in playing.channels
             if c.times[0] < now
         )
-        unbegun = {id(s) for s in playing.shifts if s.begin >= now}
-        shifts = self._characters[playing.character].shifts
-        shifts[:] = [s for s in shifts if id(s) not in unbegun]
+        self._characters[playing.character].cancel(playing.shifts, now)
         playing.speech = tuple(replace(s, until=min(s.until, now)) for s in playing.speech if s.start < now)
         playing.ended, playing.done = now, True
         self._changed(now)
 
     def _channels(self, character: int) -> list[Channel]:
-        own = self._characters[character]
         channels = [c for p in self._playing if p.character == character for c in p.channels]
-        ordered = sorted(own.shifts, key=lambda s: (s.begin, s.end))
-        for index, shift in enumerate(ordered):
-            # The next shift of a region takes it over; until then a base state holds.
-            for channel in shift.channels:
-                region = region_of(channel.target)
-                heir = next((s for s in ordered[index + 1 :] if region in s.regions), None)
-                channels.append(channel if heir is None else channel.faded(heir.begin, heir.end))
-        return [*channels, *own.direct.values()]
+        return channels + self._characters[character].channels()
 
     def _forget(self, now: float) -> None:
         """Drop what can no longer be seen, so that a session's cost does not grow with its past."""
@@ -439,22 +388,10 @@ class Player:
             self._playing.remove(playing)
         while len(self._past) > 100:
             del self._past[next(iter(self._past))]
-        if not gone:
-            return
-        for character in self._characters:
-            ordered = sorted(character.shifts, key=lambda s: (s.begin, s.end))
-            character.shifts = [
-                shift
-                for index, shift in enumerate(ordered)
-                if not any(
-                    heir.end + KEPT < now and shift.regions <= heir.regions for heir in ordered[index + 1 :]
-                )
-            ]
-            character.direct = {
-                n: c for n, c in character.direct.items() if c.fade is None or c.fade[1] + KEPT > now
-            }
+        if gone:
+            for character in self._characters:
+                character.forget(now - KEPT)
 
     def _changed(self, since: float) -> None:
         self.revision += 1
         self.changed_from = since
-

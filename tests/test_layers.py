@@ -52,8 +52,10 @@ MAY: dict[str, set[str]] = {
     "realizer.reporting": {"bml_schema", "realizer.scheduling.timing"},
     "realizer.planning": VALUES
     | {"bml_schema", "realizer.animation", "realizer.behaviours", "realizer.scheduling"},
+    "realizer.character": VALUES | {"realizer.animation"},
     "realizer.player": VALUES
     | {
+        "realizer.character",
         "bml_schema",
         "realizer.animation",
         "realizer.behaviours",

@@ -1,0 +1,94 @@
+"""One face of a session: its base states and what a client set directly, as channels."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import axis, region
+
+__all__: list[str] = []
+
+# A face takes this long back to its base when something is let go: about an expression's own release.
+RELAX = 0.3  # s
+# A directly set AU or FAP is reached this long after it was set.
+SETTLE = 0.12  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """A change of a base state: from `begin` to `end` it replaces what was the base of its regions."""
+
+    begin: float
+    end: float
+    regions: frozenset[str]
+    channels: tuple[Channel, ...]
+
+    @classmethod
+    def of(cls, begin: float, end: float, own_region: str, channels: tuple[Channel, ...]) -> Shift:
+        """A shift of one region, and of every other that its channels move."""
+        return cls(begin, end, frozenset({own_region, *(region(c.target) for c in channels)}), channels)
+
+
+@dataclass(eq=False)
+class Character:
+    """What a face holds beyond any block."""
+
+    id: str | None
+    shifts: list[Shift] = field(default_factory=list)
+    direct: dict[str, Channel] = field(default_factory=dict)
+
+    def shift(self, shifts: Collection[Shift]) -> None:
+        """Take new base states, in order of their begin."""
+        self.shifts = sorted([*self.shifts, *shifts], key=lambda s: (s.begin, s.end))
+
+    def cancel(self, shifts: Collection[Shift], now: float) -> None:
+        """Drop those of `shifts` that have not begun; one that has begun is carried through."""
+        gone = {id(s) for s in shifts if s.begin >= now}
+        self.shifts = [s for s in self.shifts if id(s) not in gone]
+
+    def set_direct(self, values: Mapping[str, float | None], now: float) -> None:
+        """Hold AUs (0..1) and FAPs (FAPU) by name from `now` on; None lets go of one.
+
+        Raises:
+            KeyError: no such AU or FAP; nothing is changed then.
+        """
+        columns = axis()
+        targets = {name: columns[name] for name in values}
+        for name, value in values.items():
+            held = self.direct.get(name)
+            if value is None:
+                if held is not None:
+                    self.direct[name] = held.faded(now, now + RELAX)
+                continue
+            before = 0.0 if held is None else float(np.interp(now, held.times, held.values))
+            self.direct[name] = Channel(
+                targets[name],
+                np.array([now, now + SETTLE]),
+                np.array([before, value]),
+                layer=Layer.DIRECT,
+                holds=True,
+                source="set",
+            )
+
+    def channels(self) -> list[Channel]:
+        """Base states, each until the next shift of its region takes over, and what was set directly."""
+        out: list[Channel] = []
+        for index, shift in enumerate(self.shifts):
+            for channel in shift.channels:
+                own = region(channel.target)
+                heir = next((s for s in self.shifts[index + 1 :] if own in s.regions), None)
+                out.append(channel if heir is None else channel.faded(heir.begin, heir.end))
+        return [*out, *self.direct.values()]
+
+    def forget(self, before: float) -> None:
+        """Drop what can no longer be seen after `before`, so that the cost does not grow with the past."""
+        self.shifts = [
+            shift
+            for index, shift in enumerate(self.shifts)
+            if not any(s.end < before and shift.regions <= s.regions for s in self.shifts[index + 1 :])
+        ]
+        self.direct = {n: c for n, c in self.direct.items() if c.fade is None or c.fade[1] > before}
