@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Iterator, Mapping
+from itertools import count
 from typing import NamedTuple
 
 from lxml import etree
@@ -17,12 +18,13 @@ from bml_schema.parser import MOST_BEHAVIOURS, read_block
 __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
 
 MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
+_MOST_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
 MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
 # What decides where a document begins and ends, and what may hide such marks.
-_MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml(?=[\s>])")
+_MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml\s*>")
 _REST_OF_TAG = re.compile(r"""(?:[^<>"']|"[^<"]*"|'[^<']*')*+>""")
 _REST_OF_DOCTYPE = re.compile(r"""(?:[^<>"'\[]|"[^<"]*"|'[^<']*')*+[>\[]""")
 _CLOSERS = {
@@ -98,13 +100,22 @@ def read(
     except BMLError as wrong:
         yield wrong
         return
-    for n, stretch in enumerate(_stretches(text)):
+    try:
+        stretches = list(_stretches(text))
+    except BMLError as wrong:
+        yield wrong
+        return
+    line = 1
+    counted = 0
+    for n, stretch in enumerate(stretches):
+        line += text.count("\n", counted, stretch.start)
+        counted = stretch.start
         if n == most_documents:
             said = f"wanted at most {n} documents in one text; the rest is not read"
-            yield BMLError(said, line=_line(text, stretch.start))
+            yield BMLError(said, line=line)
             return
         try:
-            yield _block(text, stretch, vocabulary, most_bytes, most_behaviours)
+            yield _block(text, stretch, line, vocabulary, most_bytes, most_behaviours)
         except BMLError as wrong:
             yield wrong
 
@@ -130,11 +141,15 @@ def _marks(text: str) -> Iterator[_Mark]:
     """What decides where documents begin and end; linear in the text whatever it holds."""
     never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
     here = 0
-    while found := _MARKS.search(text, here):
+    for n in count():
+        found = _MARKS.search(text, here)
+        if found is None:
+            return
+        if n == _MOST_MARKS:
+            raise BMLError(f"wanted at most {n} tags of <bml>, comments and the like in one text")
         start, here = found.span()
         opener = found[0]
         if opener.startswith("</"):
-            here = (text.find(">", here) + 1) or here
             yield _Mark("close", start, here)
             continue
         if opener not in _CLOSERS:
@@ -212,9 +227,8 @@ def _not_bml(text: str) -> str:
 
 
 def _block(
-    text: str, stretch: _Stretch, vocabulary: Vocabulary, most_bytes: int, most_behaviours: int
+    text: str, stretch: _Stretch, line: int, vocabulary: Vocabulary, most_bytes: int, most_behaviours: int
 ) -> Block:
-    line = _line(text, stretch.start)
     named = _ID.search(stretch.tag)
     id = (named[1] or named[2]) if named else None
     if stretch.fault:
@@ -279,7 +293,3 @@ def _decoded(data: bytes) -> str:
         raise BMLSyntaxError(
             f"wanted {encoding}, got the byte 0x{data[wrong.start]:02X}", line=line
         ) from None
-
-
-def _line(text: str, position: int) -> int:
-    return text.count("\n", 0, position) + 1

@@ -12,7 +12,8 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.behaviours import Speech, Sync
-from bml_schema.errors import PARSING_FAILURE, shown
+from bml_schema.canonical import attributes, canonical
+from bml_schema.errors import Fault, shown
 from bml_schema.escape import escape
 from bml_schema.nodes import (
     CORE,
@@ -40,16 +41,6 @@ _SSML = "application/ssml+xml"
 _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
 _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
-
-
-class Fault(Exception):
-    """What is wrong with an element; it becomes the Problem of the behaviour or constraint around it."""
-
-    def __init__(self, text: str, element: etree._Element, type: str = PARSING_FAILURE) -> None:
-        super().__init__(text)
-        self.text = text
-        self.element = element
-        self.type = type
 
 
 class _BadReference(Exception):
@@ -112,8 +103,7 @@ class Elements:
         faults: list[str] = []
         known = shape.attributes
         points = cls.sync_points if timed else ()
-        items: Any = element.items()
-        for name, text in items:
+        for name, text in attributes(element):
             spec = known.get(name)
             try:
                 if spec is not None:
@@ -211,10 +201,10 @@ class Elements:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
             if len(speak) != 1:
                 raise Fault(f"wanted one <speak> for {_SSML}, got {len(speak) or 'none'}", element)
-            return Description(**values, content=_canonical(speak[0]))
+            return Description(**values, content=canonical(speak[0]))
         inside = [escape(element.text or "")]
         for child in element:
-            inside += (_canonical(child), escape(child.tail or ""))
+            inside += (canonical(child), escape(child.tail or ""))
         return Description(**values, content="".join(inside))
 
     # constraint := (synchronize | before | after)+
@@ -267,8 +257,3 @@ def loose_text(element: etree._Element) -> str:
         if text and not text.isspace():
             return text.strip()
     return ""
-
-
-def _canonical(element: etree._Element) -> str:
-    """An element as text that does not depend on what stands around it."""
-    return etree.tostring(element, method="c14n", exclusive=True, with_tail=False).decode()

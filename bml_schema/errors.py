@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
 
+from lxml.etree import _Element
+
 __all__ = ["BMLError", "BMLSyntaxError", "Place", "Problem"]
 
 # Warning types of the standard, in its (American) spelling.
@@ -89,6 +91,16 @@ class Problem:
 
     def __str__(self) -> str:
         return at(self.line, self.path, self.text)
+
+
+class Fault(Exception):
+    """What is wrong with an element; it becomes the Problem of the behaviour or constraint around it."""
+
+    def __init__(self, text: str, element: _Element, type: str = PARSING_FAILURE) -> None:
+        super().__init__(text)
+        self.text = text
+        self.element = element
+        self.type = type
 
 
 _LONGEST_SHOWN = 60  # characters of a value in a message; enough to find it, never a flood

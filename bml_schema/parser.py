@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 from lxml import etree
 
 from bml_schema.behaviours import SpeechText, Sync
-from bml_schema.elements import Elements, Fault, Vocabulary, loose_text
+from bml_schema.canonical import attributes
+from bml_schema.elements import Elements, Vocabulary, loose_text
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
     CUSTOM_BEHAVIOR_NOT_SUPPORTED,
     BMLError,
+    Fault,
     Place,
     Problem,
     shown,
@@ -56,7 +58,10 @@ def read_block(
     line = _line(root) + lines_before
     if elements.tag(root) != Block.tag:
         raise BMLError(f"wanted <bml> in namespace {CORE}, got {shown(str(root.tag))}", line=line)
-    values, faults = _block_attributes(root, line)
+    try:
+        values, faults = _block_attributes(root, line)
+    except Fault as wrong:
+        raise BMLError(wrong.text, line=line, path="/bml") from None
     names = elements.names = Names(values["id"])
     reader = _Reader(elements, names, lines_before)
     tree = reader.entries(root, "/bml", required=False)
@@ -110,8 +115,7 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
     faults: list[Fault] = []
     if "id" not in root.attrib:
         raise BMLError("id: wanted one, got none", line=line, path="/bml")
-    items: Any = root.items()
-    for name, text in items:
+    for name, text in attributes(root):
         spec = known.get(name)
         if spec is None:
             values["foreign"][name] = text

@@ -74,16 +74,16 @@ def descriptions(draw: st.DrawFn) -> Description:
         st.sampled_from(
             [
                 words,
-                f"<a>{words}</a>",
-                f'<a xmlns="urn:x"><b q="1"></b>{words}</a>{words}',
-                f'<p:a xmlns:p="urn:y">{words}</p:a>',
-                f'<a xmlns="http://www.bml-initiative.org/bml/bml-1.0">{words}</a>',
+                f"<a>{words}x</a>",
+                f'<a xmlns="urn:x"><b q="1"/>{words}<c xmlns=""/></a>{words}',
+                f'<a xmlns:p1="urn:y" p1:b="&lt;" xml:lang="de"/>{words}',
+                f'<a xmlns="http://www.bml-initiative.org/bml/bml-1.0">{words}x</a>',
             ]
         )
     )
     kind = draw(st.sampled_from(["application/ssml+xml", "text/x-own"]))
     if kind == "application/ssml+xml":
-        content = f'<speak xmlns="http://www.w3.org/2001/10/synthesis">{words}<mark name="m"></mark></speak>'
+        content = f'<speak xmlns="http://www.w3.org/2001/10/synthesis">{words}<mark name="m"/></speak>'
     return Description(priority=draw(st.integers(-5, 5)), type=kind, content=content)
 
 

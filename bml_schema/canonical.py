@@ -1,0 +1,68 @@
+"""An element of any language in, text out that does not depend on what stands around it."""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from bml_schema.errors import Fault
+from bml_schema.escape import escape, escape_value
+
+__all__: list[str] = []
+
+_XML = "http://www.w3.org/XML/1998/namespace"
+
+
+def canonical(element: etree._Element) -> str:
+    """The element without its tail: one text for one tree, whatever prefixes its author chose.
+
+    Elements use default namespaces, attributes prefixes p1, p2 ...; lxml's own canonical form is quadratic
+    in the namespaces around the element.
+    """
+    out: list[str] = []
+    _append(element, "", out)
+    return "".join(out)
+
+
+def _append(element: etree._Element, default: str, out: list[str]) -> None:
+    space, name = _split(str(element.tag))
+    out.append(f"<{name}")
+    if space != default:
+        out.append(f' xmlns="{escape_value(space)}"')
+    prefixes: dict[str, str] = {}
+    for key, value in attributes(element):
+        theirs, label = _split(key)
+        if theirs == _XML:
+            label = f"xml:{label}"
+        elif theirs:
+            prefix = prefixes.get(theirs)
+            if prefix is None:
+                prefix = prefixes[theirs] = f"p{len(prefixes) + 1}"
+                out.append(f' xmlns:{prefix}="{escape_value(theirs)}"')
+            label = f"{prefix}:{label}"
+        out.append(f' {label}="{escape_value(value)}"')
+    if not len(element) and not element.text:
+        out.append("/>")
+        return
+    out.append(">")
+    out.append(escape(element.text or ""))
+    for child in element:
+        _append(child, space, out)
+        out.append(escape(child.tail or ""))
+    out.append(f"</{name}>")
+
+
+def _split(clark: str) -> tuple[str, str]:
+    space, _, name = clark.rpartition("}")
+    return space[1:], name
+
+
+MOST_ATTRIBUTES = 100  # of one element; BML has ten, and lxml is quadratic in them
+
+
+def attributes(element: etree._Element) -> list[tuple[str, str]]:
+    """Clark names and texts, in document order; a Fault if lxml would take too long."""
+    count = len(element.attrib)
+    if count > MOST_ATTRIBUTES:
+        raise Fault(f"wanted at most {MOST_ATTRIBUTES} attributes, got {count}", element)
+    items: list[tuple[str, str]] = list(element.items())  # type: ignore[arg-type]
+    return items
