@@ -46,7 +46,7 @@ def basis_from(
 
     Returns:
         moving: (first, last + 1), the vertices that any FAP but the head's moves.
-        fields: (3 x moving, 73) sparse float32, metres per FAPU, then the five rows of the jaw and the tongue.
+        fields: (3 x moving, 73) sparse float32, metres per FAPU, then the jaw's and the tongue's five.
         head: (n, 1) float32 0..1; head_pivot: (3,).
         chin: (2,) float64, y and z of 2.1 about the jaw's axis.
         eyes: ((first, last + 1), (3,) centre) for left and right; thrust: metres per FAPU of 27 and 28.

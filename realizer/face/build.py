@@ -117,11 +117,10 @@ def _identity(mesh: hm08.BaseMesh, data: Path, recipe: dict[str, Any]) -> Float6
     """The base mesh mixed to a person; metres, origin between the eyes."""
     at = mesh.vertices.copy()
     for target, weight in recipe["targets"].items():
-        # A target that is there for both sides is named by its left half's name with l- or r- left out.
         for side in ("l-", "r-") if target.startswith(("eyes/*", "cheek/*", "ears/*")) else ("",):
             at += float(weight) * hm08.read_target(data, target.replace("*", side), len(at))
     eyes = [at[np.unique(mesh.quads[f"helper-{k}-eye"])].mean(axis=0) for k in "lr"]
-    return (at - (eyes[0] + eyes[1]) / 2) * hm08.DECIMETRE
+    return np.asarray((at - (eyes[0] + eyes[1]) / 2) * hm08.DECIMETRE)
 
 
 def _ball(shell: Float64) -> tuple[Float64, float]:
@@ -219,7 +218,7 @@ def _tongue_colours(place: Float64, colour: list[float]) -> Float64:
     """Darker in the groove along the middle and at the sides."""
     across = np.abs(place[:, 0]) / np.abs(place[:, 0]).max()
     shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
-    return np.array(colour, float) * shade[:, None]
+    return np.asarray(np.array(colour, float) * shade[:, None])
 
 
 def _bake(made: list[Part]) -> None:

@@ -132,6 +132,7 @@ def _turn_head(basis: Any, rows: Float32, out: Float32) -> None:
         return
     turns = rotations(*angles.T) - np.eye(3, dtype=np.float32)
     for vertices, turn in zip(out, turns, strict=True):
-        moves = (vertices - basis["head_pivot"]) @ turn.T
+        moves = vertices @ turn.T
+        moves -= turn @ basis["head_pivot"]
         moves *= basis["head"]
         vertices += moves

@@ -37,18 +37,12 @@ class BaseMesh:
         """(n,) each vertex's twin on the other side; itself where it has none."""
         from scipy.spatial import cKDTree
 
-        off, twin = cKDTree(self.vertices).query(self.vertices * [-1, 1, 1])
+        found = cKDTree(self.vertices).query(self.vertices * [-1, 1, 1])
+        off, twin = np.asarray(found[0]), np.asarray(found[1])
         return np.where(off < 2e-3, twin, np.arange(len(twin))).astype(np.int32)
 
-    def loop(self, first: int, second: int) -> list[int]:
-        """The edge loop of the body that starts with these two vertices, as far as vertices have four edges.
-
-        Raises:
-            ValueError: the two do not share an edge.
-        """
-        return walk(self._edges(), first, second)
-
-    def _edges(self) -> dict[frozenset[int], list[frozenset[int]]]:
+    def edges(self) -> dict[frozenset[int], list[frozenset[int]]]:
+        """Every edge of the body with the quads that share it, as sets of vertices."""
         edges: dict[frozenset[int], list[frozenset[int]]] = defaultdict(list)
         for quad in self.quads["body"].tolist():
             for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
@@ -57,7 +51,11 @@ class BaseMesh:
 
 
 def walk(edges: Mapping[frozenset[int], list[frozenset[int]]], first: int, second: int) -> list[int]:
-    """Vertices of an edge loop, each once, from `first` in the direction of `second`."""
+    """The edge loop that starts with these two vertices, each vertex once, as far as they have four edges.
+
+    Raises:
+        ValueError: the two do not share an edge.
+    """
     if frozenset((first, second)) not in edges:
         raise ValueError(f"vertices {first} and {second} share no edge")
     near: dict[int, set[int]] = defaultdict(set)

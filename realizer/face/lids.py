@@ -32,7 +32,7 @@ class Lid:
 
         self.side = side
         at = ground.at
-        edges = ground.mesh._edges()
+        edges = ground.mesh.edges()
         rings = []
         for first, _ in RINGS:
             tips = [next(iter(e - {first})) for e in edges if first in e]

@@ -34,7 +34,7 @@ ARC = 0.30  # metres forwards for each metre that the lower lip rises: it moves 
 
 def _stretch() -> tuple[Float64, Float64]:
     # Place along the lip -> place between the knots; the knots at 0, 0.5 and 1 stay where they are.
-    u = np.linspace(0, 1, 200)
+    u = np.linspace(0, 1, 201)
     mixed = 0.5 * u + 0.5 * np.arcsin(u) / (np.pi / 2)
     half = float(np.interp(0.5, u, mixed))
     return u, np.where(mixed < half, mixed / half / 2, 0.5 + (mixed - half) / (1 - half) / 2)
@@ -82,7 +82,7 @@ class Lips:
 
     def __init__(self, ground: Ground) -> None:
         at, n = ground.at, len(ground.at)
-        edges = ground.mesh._edges()
+        edges = ground.mesh.edges()
         from realizer.face.hm08 import walk
 
         rings = []

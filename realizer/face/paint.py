@@ -68,8 +68,8 @@ def paint_skin(
         out = out * (1 - share) + (skin * [0.84, 0.74, 0.70]) * share
     # Red of the lips: whole from ring 1 to ring 6, half at its border, darker where they meet.
     amount = np.zeros(n)
-    for k, share in ((0, 1), (1, 1), (2, 1), (3, 1), (4, 1), (5, 1), (6, 0.95), (7, 0.45), (8, 0.06)):
-        amount[lips.rings[k]] = share
+    for k, part in enumerate((1, 1, 1, 1, 1, 1, 0.95, 0.45, 0.06)):
+        amount[lips.rings[k]] = part
     amount *= 1 - 0.45 * smooth(np.abs(lips.u), 0.86, 1.0)
     out = out * (1 - amount[:, None]) + red * amount[:, None]
     gloss += amount * 0.30

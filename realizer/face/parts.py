@@ -233,7 +233,7 @@ def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, c
         middle = curve(np.clip(across, x[0], x[-1]))
         half = 0.0036 * smooth(t, -0.06, 0.24) ** 0.7 * (1 - 0.78 * smooth(t, 0.40, 1.02))
         outside = np.maximum(np.maximum(-t, t - 1), 0) * 0.05
-        return half - np.abs(at[:, 1] - middle) - outside
+        return np.asarray(half - np.abs(at[:, 1] - middle) - outside)
 
     piece = piece.clipped(height(piece.positions(base)))[0]
     at = piece.positions(base)

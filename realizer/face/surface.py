@@ -19,7 +19,7 @@ def normals(face: Face, vertices: Any) -> Float32:
     """Unit normals of (n, n_vertices, 3) vertices, float32; zero where a vertex has no triangle."""
     vertices = np.asarray(vertices, np.float32)
     corners, (i, j, k) = _corners(face)
-    out = np.empty_like(vertices)
+    out: Float32 = np.empty_like(vertices)
     for frame, ups in zip(vertices, out, strict=True):
         # Coordinate by coordinate: columns of their own are what numpy is quick with.
         at = np.ascontiguousarray(frame.T)
