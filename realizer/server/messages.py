@@ -59,6 +59,7 @@ class Hello(Message):
     version: int = PROTOCOL
     session: str | None = Field(None, pattern=r"^[A-Za-z0-9._~-]{1,64}$")
     seen: int | None = Field(None, ge=0, description="seq of the last feedback that arrived")
+    token: str | None = Field(None, max_length=4096, description="accepted; this service asks for none")
 
 
 class Subscribe(Message):

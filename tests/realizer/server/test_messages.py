@@ -48,7 +48,7 @@ def test_every_supported_type_is_understood() -> None:
         ('{"type":"set","aus":{"12":7}}', "invalid", "set.aus.12", "less than or equal to 1"),
         ('{"type":"scene","objects":{"a":{"x":1e99,"y":0,"z":0}}}', "invalid", "scene.objects.a.x", "10000"),
         ('{"type":"hello","session":"a b"}', "invalid", "hello.session", "pattern"),
-        ('{"type":"hello","token":"' + "x" * 300_000 + '"}', "too-large", None, "at most"),
+        ('{"type":"ping","id":"' + "x" * 300_000 + '"}', "too-large", None, "at most"),
     ],
 )
 def test_a_bad_message_is_told_what_was_wanted(text, code, where, says) -> None:
