@@ -18,7 +18,7 @@ from realizer.pipeline import warning_of
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
-from realizer.server.connection import STUCK, Connection, Subscription
+from realizer.server.connection import STUCK, Connection, FrameSubscription, SoundSubscription, Subscription
 from realizer.server.effects import Close, Effect, Move, Send, Speak
 from realizer.server.messages import (
     PROTOCOL,
@@ -457,10 +457,13 @@ class Session:
         index = self._index(message.character)
         fps = message.fps or self.settings.fps
         told: dict[str, Any] = {"stream": stream, "encoding": encoding, "index": index}
+        old = connection.subscriptions.get((stream, message.character))
         subscription: Subscription
         if stream == "audio":
             one = None if message.character is None else index
             subscription = self._broadcast.sound(one, message.rate, t)
+            if isinstance(old, SoundSubscription) and old.sound is subscription.sound:
+                subscription = old  # what was sent ahead is not sent again
             told |= {"rate": message.rate, "frame": subscription.next, "fps": 50.0}
         elif stream == "video":
             self._check_picture(message)
@@ -474,6 +477,8 @@ class Session:
                 told |= self._mesh_of(index)
             name = message.character
             subscription = self._broadcast.frames(stream, encoding, index, name, fps, t)
+            if isinstance(old, FrameSubscription) and old.timeline is subscription.timeline:
+                subscription.next = max(subscription.next, old.next)  # no frame twice
             told |= {"fps": fps, "frame": subscription.next}
             if stream == "fap":
                 told["names"] = [row.name for row in faps()]
