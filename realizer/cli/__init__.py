@@ -39,6 +39,8 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
 
     level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
     logging.basicConfig(level=level, format="realizer: %(message)s", stream=sys.stderr)
+    if not quiet:  # long films say how far they are
+        logging.getLogger("realizer.outputs").setLevel(logging.INFO)
     context.obj = {"quiet": quiet, "verbose": verbose}
 
 
