@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 
-__all__ = ["Clash", "Gap", "Link", "cycle_clash", "loop_clash"]
+__all__ = ["Clash", "Gap", "Link", "Web"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,20 +56,52 @@ class Clash:
         return _once([r.part for r in self.relations] + [g.part for g in self.gaps])
 
 
-def loop_clash(problem: Problem, closing: int) -> Clash:
-    """The loop that equality number `closing` closes with the ones before it."""
-    last = problem.equalities[closing]
-    return _clash(problem, [*_chain(problem, last.u, last.v, closing), last], [])
+class Web:
+    """The equalities of a problem, to look for the shortest chains in, less those that do not fit.
 
+    Args:
+        unfit: numbers of equalities.
+    """
 
-def cycle_clash(problem: Problem, links: Sequence[Link]) -> Clash:
-    """A cycle of inequalities: each link's end is tied, by equalities, to the next one's beginning."""
-    relations: list[Relation] = []
-    for link, after in zip(links, (*links[1:], links[0]), strict=True):
-        if link.order is not None:
-            relations.append(link.order)
-        relations += _chain(problem, link.v, after.u, len(problem.equalities))
-    return _clash(problem, relations, links)
+    def __init__(self, problem: Problem, unfit: Iterable[int] = ()) -> None:
+        self.problem = problem
+        self._beside: dict[int, list[tuple[int, Relation]]] = {}
+        left_out = set(unfit)
+        for k, relation in enumerate(problem.equalities):
+            if k not in left_out:
+                self._beside.setdefault(relation.u, []).append((relation.v, relation))
+                self._beside.setdefault(relation.v, []).append((relation.u, relation))
+
+    def loop(self, unfit: int) -> Clash:
+        """The loop that an equality, by its number, cannot close."""
+        last = self.problem.equalities[unfit]
+        return _clash(self.problem, [*self._chain(last.u, last.v), last], [])
+
+    def cycle(self, links: Sequence[Link]) -> Clash:
+        """A cycle of inequalities: each link's end is tied, by equalities, to the next one's beginning."""
+        relations: list[Relation] = []
+        for link, after in zip(links, (*links[1:], links[0]), strict=True):
+            if link.order is not None:
+                relations.append(link.order)
+            relations += self._chain(link.v, after.u)
+        return _clash(self.problem, relations, links)
+
+    def _chain(self, begin: int, end: int) -> list[Relation]:
+        """The fewest equalities that tie one point to another."""
+        came: dict[int, tuple[int, Relation] | None] = {begin: None}
+        queue = deque([begin])
+        while queue and end not in came:
+            at = queue.popleft()
+            for to, relation in self._beside.get(at, ()):
+                if to not in came:
+                    came[to] = (at, relation)
+                    queue.append(to)
+        found: list[Relation] = []
+        step = came.get(end)
+        while step is not None:
+            found.append(step[1])
+            step = came[step[0]]
+        return found[::-1]
 
 
 def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Clash:
@@ -95,32 +127,6 @@ def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link
     owners = [problem.behaviours[problem.owner[p]] for p in sorted(points) if p != ORIGIN]
     unique = {id(r): r for r in relations}
     return Clash(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
-
-
-def _chain(problem: Problem, begin: int, end: int, before: int) -> list[Relation]:
-    """The fewest equalities among the first `before` that tie one point to another."""
-    if begin == end:
-        return []
-    beside: dict[int, list[tuple[int, Relation]]] = {}
-    for relation in problem.equalities[:before]:
-        beside.setdefault(relation.u, []).append((relation.v, relation))
-        beside.setdefault(relation.v, []).append((relation.u, relation))
-    came: dict[int, tuple[int, Relation] | None] = {begin: None}
-    queue = deque([begin])
-    while queue:
-        at = queue.popleft()
-        if at == end:
-            break
-        for to, relation in beside.get(at, ()):
-            if to not in came:
-                came[to] = (at, relation)
-                queue.append(to)
-    found: list[Relation] = []
-    step = came.get(end)
-    while step is not None:
-        found.append(step[1])
-        step = came[step[0]]
-    return found[::-1]
 
 
 def _once(parts: Iterable[Part]) -> list[Part]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.arrays import Bool, Float64
-from realizer.scheduling.clash import Clash, loop_clash
+from realizer.scheduling.clash import Clash, Web
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.ties import Ties
 
@@ -63,13 +63,14 @@ def model_of(problem: Problem) -> Model | list[Clash]:
     """The problem as arrays, or the loops of equalities that do not close."""
     n = len(problem.owner)
     ties = Ties(n)
-    clashes = [
-        loop_clash(problem, k)
+    unfit = [
+        k
         for k, (u, v, seconds, _, _) in enumerate(problem.equalities)
         if abs(ties.tie(u, v, seconds)) > LOOSE
     ]
-    if clashes:
-        return clashes
+    if unfit:
+        web = Web(problem, unfit)
+        return [web.loop(k) for k in unfit]
     named = {p for relation in problem.equalities for p in relation[:2]}
     named.discard(ORIGIN)
     tied = sorted(named)

@@ -18,8 +18,9 @@ __all__ = ["Shapes", "settle", "shapes_of"]
 
 # Lengths that meet as closely as this count as fitting exactly.
 FITS = 1e-9  # s
-# From this many unknowns on a sparse factorisation is faster; the time of a dense one grows with the cube.
-SPARSE_FROM = 150
+# From this many unknowns on a sparse factorisation is as fast; and OpenBLAS starts threads for a dense one of
+# 90, which costs hundreds of milliseconds where other work keeps the cores busy.
+SPARSE_FROM = 64
 
 
 @dataclass(slots=True, eq=False)
@@ -60,9 +61,12 @@ def shapes_of(model: Model) -> Shapes:
         moved[names] = list(fixed.values())
         base += moved[label]
     at = base[model.owner] + model.chain
-    for shape in {ties.find(b) for b in strained}:
-        _relax(model, label == shape, at)
-    return Shapes(label, held, at)
+    shapes = Shapes(label, held, at)
+    if strained:
+        bent = np.zeros(size + 1, np.bool_)
+        bent[[ties.find(b) for b in strained]] = True
+        _relax(model, shapes, bent[label])
+    return shapes
 
 
 def _hang(model: Model) -> tuple[Ties, list[int], list[tuple[int, float]]]:
@@ -89,8 +93,8 @@ def _hang(model: Model) -> tuple[Ties, list[int], list[tuple[int, float]]]:
     return ties, strained, held
 
 
-def _relax(model: Model, chosen: Bool, at: Float64) -> None:
-    """Put the points of one shape, in place, where the sum of a (gap - preferred)^2 is least.
+def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
+    """Put the points of whole shapes, in place, where the sum of a (gap - preferred)^2 is least.
 
     A stretch between two tied points is one spring, whatever lies between; so only tied points are unknowns.
     """
@@ -102,9 +106,10 @@ def _relax(model: Model, chosen: Bool, at: Float64) -> None:
     nodes, number = np.unique(model.root[knots], return_inverse=True)
     i, j = number[:-1][same], number[1:][same]
     loose = i != j
-    # Either the block's start, which is at 0, or any point: the shape is slid into its place later.
-    fixed = np.zeros(len(nodes), np.bool_)
-    fixed[0] = True
+    # The block's start is at 0. In a shape that is not held any point can be: it is slid to its place later.
+    fixed = nodes == ORIGIN
+    names, firsts = np.unique(shapes.label[owner[knots]], return_index=True)
+    fixed[number[firsts[~shapes.held[names]]]] = True
     wanted = length - model.shift[q] + model.shift[p]
     x = settle(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
     time = x[number] + model.shift[knots]
@@ -117,7 +122,7 @@ def _relax(model: Model, chosen: Bool, at: Float64) -> None:
     place = np.where(before, place, np.minimum(place + 1, len(knots) - 1))
     knot = knots[place]
     pull = np.where(before, strain[place], 0.0)
-    at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
+    shapes.at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
 
 
 def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64) -> Float64:

@@ -7,16 +7,16 @@ shapes whose least squares break an inequality go to the convex solver.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from realizer.arrays import Float64
-from realizer.scheduling.clash import Clash, Link, cycle_clash
+from realizer.scheduling.clash import Clash, Link, Web
+from realizer.scheduling.groups import Group, groups_of, slides
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.paths import components, raise_levels
-from realizer.scheduling.problem import ORIGIN, Problem, Relation
+from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.shapes import Shapes, shapes_of
 from realizer.scheduling.squeeze import squeeze
 
@@ -53,68 +53,38 @@ def solve(problem: Problem) -> Solution | list[Clash]:
     return Solution(time, float(np.sum(model.stiffness * strain * strain)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
-    """Shapes that cannot slide apart, with the orders that hold them together."""
-
-    shapes: list[int]
-    orders: list[Relation]
-    held: bool
-
-
 def _keep_inequalities(model: Model, shapes: Shapes) -> list[Clash]:
     """Squeeze, in place, the groups of shapes that break a gap or an order which sliding cannot mend."""
     at, label = shapes.at, shapes.label
     short = at[model.gap + 1] - at[model.gap] < model.least - TIGHT
-    bad = {int(s) for s in np.unique(label[model.owner[model.gap[short]]])}
     soon = shapes.held[label[:-1]] & (at[model.first] < model.earliest - TIGHT)
-    bad |= {int(s) for s in np.unique(label[:-1][soon])}
-    clashes = []
-    in_order: set[int] = set()
-    for group in _groups(model, shapes):
-        in_order.update(group.shapes)
-        if bad.isdisjoint(group.shapes) and _slides(model, shapes, group):
-            continue
-        if clash := _squeeze(model, shapes, group):
-            clashes.append(clash)
-    for shape in sorted(bad - in_order):
-        if clash := _squeeze(model, shapes, _Group([shape], [], bool(shapes.held[shape]))):
-            clashes.append(clash)
+    bad = {*label[model.owner[model.gap[short]]].tolist(), *label[:-1][soon].tolist()}
+    groups = groups_of(model, shapes)
+    alone = bad.difference(*(group.shapes for group in groups))
+    begin = _earliest(model, shapes)
+    groups = [g for g in groups if not bad.isdisjoint(g.shapes) or not _fits(model, shapes, g, begin)]
+    groups += [Group([shape], [], bool(shapes.held[shape])) for shape in sorted(alone)]
+    cycles = squeeze(model, shapes, groups) if groups else []
     for order in model.problem.orders:
         if order.u == order.v == ORIGIN and order.seconds > LOOSE:
-            clashes.append(cycle_clash(model.problem, [Link(ORIGIN, ORIGIN, order.seconds, order)]))
-    return clashes
+            cycles.append([Link(ORIGIN, ORIGIN, order.seconds, order)])
+    if not cycles:
+        return []
+    web = Web(model.problem)
+    return [web.cycle(cycle) for cycle in cycles]
 
 
-def _squeeze(model: Model, shapes: Shapes, group: _Group) -> Clash | None:
-    chosen = np.zeros(len(shapes.label), np.bool_)
-    chosen[group.shapes] = True
-    chosen = chosen[shapes.label]
-    return squeeze(model, chosen, group.orders, shapes.at, held=group.held)
-
-
-def _slides(model: Model, shapes: Shapes, group: _Group) -> bool:
+def _fits(model: Model, shapes: Shapes, group: Group, begin: Float64) -> bool:
     """Whether the group's shapes, as they are, can slide so that the orders among them hold."""
+    if not group.orders:
+        return True
     number = {shape: k for k, shape in enumerate(group.shapes, 1) if not shapes.held[shape]}
     levels = [0.0] * (len(group.shapes) + 1)
     if group.held:
-        begin = _earliest(model, shapes)
         for shape, k in number.items():
             levels[k] = float(begin[shape])
-    edges = [(number.get(s, 0), number.get(t, 0), gain) for s, t, gain in _edges(model, shapes, group.orders)]
+    edges = [(number.get(s, 0), number.get(t, 0), gain) for s, t, gain in slides(model, shapes, group.orders)]
     return raise_levels(levels, edges, TIGHT) is None and levels[0] == 0.0
-
-
-def _edges(model: Model, shapes: Shapes, orders: list[Relation]) -> Iterator[tuple[int, int, float]]:
-    """Each order as (shape, shape, by how much more than the first the second has to slide)."""
-    u, v = [r.u for r in orders], [r.v for r in orders]
-    gain = shapes.at[u] + [r.seconds for r in orders] - shapes.at[v] if orders else np.zeros(0)
-    return zip(
-        shapes.label[model.owner[u]].tolist() if orders else [],
-        shapes.label[model.owner[v]].tolist() if orders else [],
-        gain.tolist(),
-        strict=True,
-    )
 
 
 def _earliest(model: Model, shapes: Shapes) -> Float64:
@@ -122,49 +92,6 @@ def _earliest(model: Model, shapes: Shapes) -> Float64:
     level = np.full(len(shapes.label), -np.inf)
     np.maximum.at(level, shapes.label[:-1], model.earliest - shapes.at[model.first])
     return level
-
-
-def _groups(model: Model, shapes: Shapes) -> list[_Group]:
-    """The groups among the shapes that orders name.
-
-    A shape from which orders lead, over however many others, to a held one cannot slide for ever: those hang
-    together as far as orders connect them. Of the rest, only shapes in a circle of orders bind each other;
-    any other order is kept by sliding what comes later, at no cost.
-    """
-    orders = model.problem.orders
-    if not orders:
-        return []
-    ground = len(model.first)
-    pairs = [(s, t) for s, t, _ in _edges(model, shapes, orders)]
-    before: dict[int, list[int]] = {}
-    for s, t in pairs:
-        before.setdefault(t, []).append(s)
-    named = sorted({s for pair in pairs for s in pair} - {ground})
-    number = {shape: k for k, shape in enumerate(named)}
-    bound = {ground, *(s for s in named if shapes.held[s])}
-    work = list(bound)
-    while work:
-        for s in before.get(work.pop(), ()):
-            if s not in bound:
-                bound.add(s)
-                work.append(s)
-    joined = []
-    for s, t in pairs:
-        if s == ground or t == ground:
-            continue
-        if s in bound and t in bound:
-            joined += [(number[s], number[t], 0.0), (number[t], number[s], 0.0)]
-        elif s not in bound and t not in bound:
-            joined.append((number[s], number[t], 0.0))
-    groups: dict[int, _Group] = {}
-    component = components(len(named), joined)
-    for shape, c in zip(named, component, strict=True):
-        groups.setdefault(c, _Group([], [], shape in bound)).shapes.append(shape)
-    for (s, t), order in zip(pairs, orders, strict=True):
-        ends = {component[number[shape]] for shape in (s, t) if shape != ground}
-        if len(ends) == 1 and (ground not in (s, t) or (t if s == ground else s) in bound):
-            groups[ends.pop()].orders.append(order)
-    return list(groups.values())
 
 
 def _slide(model: Model, shapes: Shapes) -> Float64:
@@ -177,7 +104,7 @@ def _slide(model: Model, shapes: Shapes) -> Float64:
     if orders:
         edges = [
             (s if free[s] else ground, t if free[t] else ground, gain)
-            for s, t, gain in _edges(model, shapes, orders)
+            for s, t, gain in slides(model, shapes, orders)
         ]
         # What leads to a held shape has been squeezed or found to fit; only rounding could move it.
         edges = [edge for edge in edges if edge[1] != ground]

@@ -1,4 +1,4 @@
-"""Documents and timings in, times and warnings out: the cases of Paul 2010 (figures 3.5 to 3.7) and others."""
+"""Documents and timings in, sync times out: Paul 2010 (figures 3.5 to 3.7) and what else can be asked."""
 
 from __future__ import annotations
 

@@ -1,0 +1,78 @@
+"""Shapes and the orders between them in, the groups out that can only be solved together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from realizer.scheduling.model import Model
+from realizer.scheduling.paths import components
+from realizer.scheduling.problem import Relation
+from realizer.scheduling.shapes import Shapes
+
+__all__ = ["Group", "groups_of", "slides"]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Shapes that cannot slide apart, with the orders that hold them together.
+
+    `held`: they cannot slide for ever either, because some of them are tied to fixed times.
+    """
+
+    shapes: list[int]
+    orders: list[Relation]
+    held: bool
+
+
+def groups_of(model: Model, shapes: Shapes) -> list[Group]:
+    """The groups among the shapes that orders name.
+
+    A shape from which orders lead, over however many others, to a held one cannot slide for ever: those hang
+    together as far as orders connect them. Of the rest, only shapes in a circle of orders bind each other;
+    any other order is kept by sliding what comes later, at no cost.
+    """
+    orders = model.problem.orders
+    if not orders:
+        return []
+    ground = len(model.first)
+    pairs = [(s, t) for s, t, _ in slides(model, shapes, orders)]
+    before: dict[int, list[int]] = {}
+    for s, t in pairs:
+        before.setdefault(t, []).append(s)
+    named = sorted({s for pair in pairs for s in pair} - {ground})
+    number = {shape: k for k, shape in enumerate(named)}
+    bound = {ground, *(s for s in named if shapes.held[s])}
+    work = list(bound)
+    while work:
+        for s in before.get(work.pop(), ()):
+            if s not in bound:
+                bound.add(s)
+                work.append(s)
+    joined = []
+    for s, t in pairs:
+        if s == ground or t == ground:
+            continue
+        if s in bound and t in bound:
+            joined += [(number[s], number[t], 0.0), (number[t], number[s], 0.0)]
+        elif s not in bound and t not in bound:
+            joined.append((number[s], number[t], 0.0))
+    groups: dict[int, Group] = {}
+    component = components(len(named), joined)
+    for shape, c in zip(named, component, strict=True):
+        groups.setdefault(c, Group([], [], shape in bound)).shapes.append(shape)
+    for (s, t), order in zip(pairs, orders, strict=True):
+        ends = {component[number[shape]] for shape in (s, t) if shape != ground}
+        if len(ends) == 1 and (ground not in (s, t) or (t if s == ground else s) in bound):
+            groups[ends.pop()].orders.append(order)
+    return list(groups.values())
+
+
+def slides(model: Model, shapes: Shapes, orders: Sequence[Relation]) -> Iterator[tuple[int, int, float]]:
+    """Each order as (shape, shape, by how much more than the first the second has to slide)."""
+    if not orders:
+        return iter(())
+    u, v = [r.u for r in orders], [r.v for r in orders]
+    gain = shapes.at[u] + [r.seconds for r in orders] - shapes.at[v]
+    owner, label = model.owner, shapes.label
+    return zip(label[owner[u]].tolist(), label[owner[v]].tolist(), gain.tolist(), strict=True)
