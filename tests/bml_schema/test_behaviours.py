@@ -1,0 +1,189 @@
+"""Every behaviour of the core, by looping over the vocabulary."""
+
+from __future__ import annotations
+
+import pytest
+
+from bml_schema import (
+    CORE,
+    EXTENSIONS,
+    VOCABULARY,
+    Behaviour,
+    Block,
+    Face,
+    FaceFacs,
+    FaceLexeme,
+    Posture,
+    Speech,
+    SpeechText,
+    Sync,
+    parse,
+    write,
+)
+from bml_schema.shape import shape_of
+
+LEAST = {"face": "<faceLexeme lexeme='SMILE'/>", "faceShift": "<faceLexeme lexeme='SMILE'/>"}
+SAMPLES = {"word": "X", "integer": "1", "decimal": "0.25", "text": "x"}
+
+
+def sample(cls: type[Behaviour], *, leave_out: str = "", extra: str = "") -> str:
+    """A document with one behaviour that has exactly its required attributes."""
+    space, name = cls.tag[1:].split("}")
+    values = {
+        a.name: a.value.words[0] if a.value.words else SAMPLES.get(a.value.type, "1")
+        for a in shape_of(cls).required
+    }
+    attributes = "".join(f" {k}='{v}'" for k, v in values.items() if k not in (leave_out, "id"))
+    inside = LEAST.get(name, "")
+    start = f"<n:{name} xmlns:n='{space}' id='x'{attributes} {extra}>"
+    return f"<bml id='b' xmlns='{CORE}'>{start}{inside}</n:{name}></bml>"
+
+
+EACH = pytest.mark.parametrize(
+    "cls", VOCABULARY.values(), ids=[c.tag.partition("}")[2] for c in VOCABULARY.values()]
+)
+
+
+def test_the_vocabulary_is_the_core_and_facefacs() -> None:
+    core = "gaze gazeShift head headDirectionShift faceLexeme face faceShift speech wait"
+    core += " gesture pointing posture postureShift locomotion"
+    assert set(VOCABULARY) == {f"{{{CORE}}}{n}" for n in core.split()} | {f"{{{EXTENSIONS}}}faceFacs"}
+
+
+@EACH
+def test_its_required_attributes_are_enough(cls: type[Behaviour]) -> None:
+    block = parse(sample(cls))
+    assert not block.problems
+    assert type(block["x"]) is cls
+    assert parse(write(block)) == block
+
+
+@EACH
+def test_each_required_attribute_is_missed_when_it_is_not_there(cls: type[Behaviour]) -> None:
+    for spec in shape_of(cls).required:
+        if spec.name == "id":
+            continue
+        problems = parse(sample(cls, leave_out=spec.name)).problems
+        assert [(p.id, p.type) for p in problems] == [("b:x", "PARSING_FAILURE")]
+        assert problems[0].text == f"{spec.name}: wanted {spec.value.wanted}, got none"
+
+
+@EACH
+def test_each_of_its_sync_points_can_be_given_and_referred_to(cls: type[Behaviour]) -> None:
+    for n, point in enumerate(cls.sync_points):
+        block = parse(sample(cls, extra=f"{point}='{n}'"))
+        assert block["x"].syncs[point].offset == n
+        text = sample(cls).replace("</bml>", f"<wait id='w' start='x:{point}'/></bml>")
+        assert not parse(text).problems
+
+
+@EACH
+def test_each_closed_set_refuses_another_word(cls: type[Behaviour]) -> None:
+    for spec in shape_of(cls).attributes.values():
+        if spec.value.words and not spec.required:
+            problems = parse(sample(cls, extra=f"{spec.name}='SIDEWAYS'")).problems
+            assert [p.text for p in problems] == [f'{spec.name}: wanted {spec.value.wanted}, got "SIDEWAYS"']
+
+
+@EACH
+def test_each_number_refuses_what_is_none(cls: type[Behaviour]) -> None:
+    for spec in shape_of(cls).attributes.values():
+        if spec.value.low is not None and not spec.required:
+            for bad in ("nan", "inf", "1e308", "x", "", "99999999"):
+                assert len(parse(sample(cls, extra=f"{spec.name}='{bad}'")).problems) == 1, (spec.name, bad)
+
+
+@EACH
+def test_unknown_attributes_are_kept(cls: type[Behaviour]) -> None:
+    block = parse(sample(cls, extra="xmlns:q='urn:q' q:a='1' unheardOf='2'"))
+    assert block["x"].foreign == {"{urn:q}a": "1", "unheardOf": "2"}
+    assert parse(write(block)) == block
+
+
+def only(inside: str) -> Block:
+    return parse(f"<bml id='b'>{inside}</bml>")
+
+
+def test_the_parts_of_a_face_share_its_timing_and_need_no_id() -> None:
+    block = only(
+        "<face id='f' start='1'><faceLexeme lexeme='SMILE' end='9'/><faceFacs au='4' side='LEFT'/></face>"
+    )
+    face = block["f"]
+    assert isinstance(face, Face)
+    assert face.parts == (
+        FaceLexeme(id="", lexeme="SMILE", foreign={"end": "9"}),
+        FaceFacs(id="", au=4, side="LEFT"),
+    )
+    assert not face.parts[0].syncs
+
+
+def test_a_face_without_parts_says_what_it_wants() -> None:
+    assert only("<face id='f'/>").problems[0].text == "wanted <faceLexeme> or <faceFacs>, got none"
+
+
+def test_a_bad_part_takes_the_whole_face() -> None:
+    block = only("<face id='f'><faceFacs au='4'/>\n<faceFacs au='x'/></face>")
+    assert [str(p) for p in block.problems] == [
+        'line 2, /bml/face[1]/faceFacs[2]: au: wanted a whole number 1..999, got "x"'
+    ]
+
+
+def test_facefacs_is_found_in_the_core_namespace_and_in_none() -> None:
+    for space in ("", f"xmlns='{CORE}'", "xmlns='http://www.mindmakers.org/projects/BML'"):
+        block = parse(f"<bml id='b' {space}><faceFacs id='f' au='1'/></bml>")
+        assert type(block["f"]) is FaceFacs
+        assert f'xmlns:ext="{EXTENSIONS}"' in write(block)
+
+
+def test_speech_keeps_every_blank_and_every_sync() -> None:
+    block = only(
+        "<speech id='s'>"
+        "<text>\n  Hi <sync id='a'/>\n<sync id='b' ref='2'/> <![CDATA[<you> &]]> </text>"
+        "</speech>"
+    )
+    speech = block["s"]
+    assert isinstance(speech, Speech)
+    assert speech.text is not None
+    assert speech.text.parts[0] == "\n  Hi "
+    assert speech.text.parts[1] == Sync(id="a")
+    assert speech.text.parts[2] == "\n"
+    assert speech.text.parts[4] == " <you> & "
+    assert str(speech.text) == "\n  Hi \n <you> & "
+    assert speech.marked == ("a", "b")
+    assert parse(write(block)) == block
+
+
+def test_an_empty_text_is_not_no_text() -> None:
+    block = only("<speech id='s'><text/></speech>")
+    assert block["s"] == Speech(id="s", text=SpeechText())
+    assert parse(write(block)) == block
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ("<text>a</text><text>b</text>", "wanted one <text>, got 2"),
+        ("<text><sync id='a'/><sync id='a'/></text>", 'sync: wanted an id of its own, got "a" again'),
+        ("<text><sync id='end'/></text>", 'sync: wanted an id of its own, got "end" again'),
+        ("<text><sync/></text>", "id: wanted a name"),
+        ("<text>a <b>c</b></text>", "wanted text and <sync>, got <b>"),
+        ("Hello", 'wanted elements, got the text "Hello", put it into <text>'),
+        ("<txt>Hello</txt>", "wanted <text>, got <txt>"),
+    ],
+)
+def test_what_speech_does_not_take(inside: str, said: str) -> None:
+    block = only(f"<speech id='s'>{inside}</speech>")
+    assert not block.behaviours
+    assert block.problems[0].text.startswith(said)
+
+
+def test_a_posture_has_one_stance_and_any_poses() -> None:
+    block = only("<posture id='p'><pose part='HEAD' lexeme='X'/><stance type='LYING'/></posture>")
+    posture = block["p"]
+    assert isinstance(posture, Posture)
+    assert posture.stance is not None
+    assert (posture.stance.type, len(posture.poses)) == ("LYING", 1)
+    assert (
+        "wanted one <stance>"
+        in only("<posture id='p'><stance type='LYING'/><stance type='LYING'/></posture>").problems[0].text
+    )

@@ -1,0 +1,299 @@
+"""Texts with any number of documents, sound and broken; nothing but Blocks and BMLErrors comes out."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from bml_schema import CORE, Block, BMLError, BMLSyntaxError, Speech, parse, read, write
+from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS
+from tests.strategies import blocks
+
+A, B, C = '<bml id="a"/>', '<bml id="b"></bml>', '<bml id="c">\n</bml>'
+
+
+def told(text: str | bytes) -> list[str]:
+    """The id of each block, the message of each error."""
+    return [found.id if isinstance(found, Block) else str(found) for found in read(text)]
+
+
+def test_several_documents_are_read_in_order() -> None:
+    assert told(A + B + C) == ["a", "b", "c"]
+
+
+def test_declarations_comments_and_blanks_may_stand_before_each() -> None:
+    text = f'\ufeff \n<?xml version="1.0" encoding="UTF-8"?><!-- <bml id="no"/> -->\n{A}\n<?xml version="1.0"?>\ufeff{B}<!---->'
+    assert told(text) == ["a", "b"]
+
+
+def test_an_empty_text_holds_nothing() -> None:
+    assert told("") == told(" \n\ufeff<!-- nothing -->") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (
+            f"{A}\n<bml id='x'>\n<head</bml>\n{B}",
+            ["a", "line 3: not well-formed: error parsing attribute name", "b"],
+        ),
+        (
+            f"<bml id='x'><head>\n{B}",
+            ["line 2: not well-formed: Premature end of data in tag head line 1", "b"],
+        ),
+        (f"<bml id='x'><head></bml>{B}", ["line 1: not well-formed: Opening and ending tag mismatch", "b"]),
+        (f"<bml id='x><head id='h'/></bml>{B}", ["line 1: not well-formed", "b"]),
+        (f"{A}<bml id='x'>{B}", ["a", "line 1: not well-formed: Premature end", "b"]),
+        (f"{A}\noops\n{B}", ["a", 'line 2: wanted <bml>, got "oops"', "b"]),
+        (f"{A}\n</bml>\n{B}", ["a", 'line 2: wanted <bml>, got "</bml>"', "b"]),
+        (f"{A}</x>", ["a", 'line 1: wanted <bml>, got "</x>"']),
+        (f"<bml/>{B}", ["line 1, /bml: id: wanted one, got none", "b"]),
+        (f"<!-- {A}", ['line 1: wanted <bml>, got "<!--"', "a"]),
+        (f"hello, {A}", ['line 1: wanted <bml>, got "hello,"', "a"]),
+        ("<foo/>", ['line 1: wanted <bml>, got "<foo/>"']),
+        ("<bml", ["line 1: wanted <bml>"]),
+        ("<bml ", ["line 1: not well-formed"]),
+    ],
+)
+def test_after_a_broken_stretch_reading_goes_on_at_the_next_bml(text: str, wanted: list[str]) -> None:
+    found = told(text)
+    assert len(found) == len(wanted)
+    assert all(f.startswith(w) for f, w in zip(found, wanted, strict=True)), found
+
+
+def test_an_error_knows_the_id_that_could_be_read() -> None:
+    (error,) = read("<bml xmlns='urn:q' \n id = 'x' ><head</bml>")
+    assert isinstance(error, BMLSyntaxError)
+    assert error.block == "x"
+    assert error.line == 2
+
+
+@pytest.mark.parametrize(
+    "dtd",
+    [
+        '<!DOCTYPE bml [<!ENTITY a "x"><!ENTITY b "&a;&a;&a;">]>',
+        '<!DOCTYPE bml SYSTEM "http://example.org/bml.dtd">',
+        '<!DOCTYPE bml [<!ENTITY a SYSTEM "file:///etc/passwd">]  >',
+        "<!DOCTYPE bml>",
+    ],
+)
+def test_a_document_with_a_dtd_is_refused_and_only_that(dtd: str) -> None:
+    found = list(read(f'{A}\n<?xml version="1.0"?>{dtd}<bml id="x"><wait id="w"/></bml>{B}'))
+    error = found[1]
+    assert [f.id for f in found if isinstance(f, Block)] == ["a", "b"]
+    assert isinstance(error, BMLSyntaxError)
+    assert error.text == "wanted a document without DTD and entities, got <!DOCTYPE"
+    assert (error.line, error.block) == (2, "x")
+
+
+def test_an_entity_bomb_costs_nothing() -> None:
+    entities = '<!ENTITY e0 "lol">' + "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 10))
+    text = f'<!DOCTYPE bml [{entities}]><bml id="b"><speech id="s"><text>&e9;</text></speech></bml>'
+    with pytest.raises(BMLSyntaxError, match="without DTD"):
+        parse(text)
+
+
+@pytest.mark.parametrize("reference", ["&nobody;", "&#0;", "&#xD800;", "&"])
+def test_entities_without_a_dtd_are_not_well_formed(reference: str) -> None:
+    with pytest.raises(BMLSyntaxError, match="not well-formed"):
+        parse(f'<bml id="b"><speech id="s"><text>{reference}</text></speech></bml>')
+
+
+@pytest.mark.parametrize("depth", [300, 10_000])
+@pytest.mark.parametrize("tag", ["head", "bml", "required"])
+def test_deep_nesting_is_one_clear_error(tag: str, depth: int) -> None:
+    (error,) = read(f'<bml id="b">{f"<{tag}>" * depth}{f"</{tag}>" * depth}</bml>')
+    assert isinstance(error, BMLSyntaxError)
+    assert "elements nested too deep, wanted at most 256" in str(error)
+
+
+def test_a_text_of_two_megabytes_is_refused() -> None:
+    text = f'<bml id="b"><speech id="s"><text>{"x" * 2_000_000}</text></speech></bml>'
+    with pytest.raises(
+        BMLError, match=f"wanted at most {MOST_BYTES} bytes in a document, got 20000"
+    ) as caught:
+        parse(text)
+    assert caught.value.block == "b"
+    assert isinstance(parse(text, most_bytes=1 << 22)["s"], Speech)
+
+
+def test_the_limit_counts_bytes_and_counts_each_document() -> None:
+    text = '<bml id="b"><speech id="s"><text>ééé</text></speech></bml>'
+    assert parse(text, most_bytes=len(text.encode()))
+    with pytest.raises(BMLError, match="bytes"):
+        parse(text, most_bytes=len(text))
+    assert len(list(read(text * 5, most_bytes=len(text.encode())))) == 5
+
+
+def test_too_many_documents_in_one_text_are_not_read() -> None:
+    found = list(read(A * (MOST_DOCUMENTS + 5)))
+    assert len(found) == MOST_DOCUMENTS + 1
+    assert "wanted at most 1000 documents in one text" in str(found[-1])
+    assert len(list(read(A * 3, most_documents=2))) == 3
+
+
+HOSTILE = {
+    "<": "<" * 300_000,
+    "open comments": "<!--" * 60_000,
+    "open instructions": "<?" * 90_000,
+    "open cdata": "<![CDATA[" * 60_000,
+    "open doctypes": "<!DOCTYPE[" * 60_000,
+    "brackets": "<!DOCTYPE [" + "] " * 200_000,
+    "open tags": "<bml " * 90_000,
+    "open quotes": '<bml a="' * 60_000,
+    "blocks that never end": '<bml id="a">' * 40_000,
+    "ends that never began": "</bml>" * 90_000,
+    "half ends": "</bml " * 90_000,
+    "blanks": "<bml" + " " * 500_000,
+    "a long name": "<" + "a" * 500_000 + ":bml",
+    "attributes": f'<bml id="a"><wait id="w" {" ".join(f"a{i}=''" for i in range(60_000))}/></bml>',
+    "namespaces": f'<bml id="a" {" ".join(f"xmlns:a{i}='u{i}'" for i in range(9_000))}>'
+    + f'<wait id="w"><description priority="1" type="x">{"<q/>" * 50_000}</description></wait></bml>',
+    "more than enough": "<!-- -->" * 100_001,
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
+def test_hostile_texts_end_in_few_answers(text: str) -> None:
+    # Each of them once took minutes or a flood of warnings: this test ends, or somebody notices.
+    assert 1 <= len(list(read(text))) <= MOST_DOCUMENTS + 1
+
+
+def test_bytes_are_decoded_by_mark_declaration_or_as_utf8() -> None:
+    text = '<bml id="ä"/>'
+    assert told(text.encode()) == ["ä"]
+    assert told(text.encode("utf-8-sig")) == ["ä"]
+    assert told(text.encode("utf-16")) == ["ä"]
+    declared = f'<?xml version="1.0" encoding="ISO-8859-1"?>{text}'
+    assert told(declared.encode("latin-1")) == ["ä"]
+    assert told(declared) == ["ä"]
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b'<bml id="a">\n\xff</bml>', "line 2: wanted utf-8, got the byte 0xFF"),
+        (
+            b'<?xml version="1.0" encoding="punycode"?><bml id="a"/>',
+            'encoding: wanted UTF-8, UTF-16 or Latin, got "punycode"',
+        ),
+        (
+            b'<?xml version="1.0" encoding="nonsense"?><bml id="a"/>',
+            'encoding: wanted UTF-8, UTF-16 or Latin, got "nonsense"',
+        ),
+    ],
+)
+def test_bytes_that_are_no_text_are_one_error(data: bytes, said: str) -> None:
+    assert told(data) == [said]
+
+
+@pytest.mark.parametrize("bad", ["\0", "\x1b", "\ud800", "\uffff"])
+def test_characters_xml_cannot_hold_are_an_error_with_a_line(bad: str) -> None:
+    (error,) = read(f'<bml id="b">\n{bad}</bml>')
+    assert isinstance(error, BMLSyntaxError)
+    assert error.line == 2
+
+
+def test_marks_inside_cdata_and_comments_are_text() -> None:
+    text = (
+        '<bml id="a"><speech id="s"><text><![CDATA[</bml><bml id="x">]]></text></speech><!-- </bml> --></bml>'
+    )
+    assert told(text + B) == ["a", "b"]
+    speech = parse(text)["s"]
+    assert isinstance(speech, Speech)
+    assert str(speech.text) == '</bml><bml id="x">'
+
+
+@pytest.mark.parametrize("text", ["", A + B, A + "oops"])
+def test_parse_wants_exactly_one_document(text: str) -> None:
+    with pytest.raises(BMLError, match=r"wanted"):
+        parse(text)
+
+
+def test_strict_makes_the_first_problem_an_error() -> None:
+    text = '<bml id="b">\n<head id="h"/><wait id="w"/></bml>'
+    assert len(parse(text).behaviours) == 1
+    with pytest.raises(
+        BMLError, match=r"^line 2, /bml/head\[1\]: lexeme: wanted a word, got none$"
+    ) as caught:
+        parse(text, strict=True)
+    assert caught.value.block == "b"
+    assert parse(A, strict=True).id == "a"
+
+
+def test_lines_are_counted_over_the_whole_text() -> None:
+    found = list(read(f'\n{C}\n\n<bml id="x">\n<head id="h"/>\n</bml>'))
+    assert isinstance(found[1], Block)
+    assert found[1].problems[0].line == 6
+
+
+WORDS = [
+    "<bml ",
+    "</bml>",
+    "/>",
+    ">",
+    "<",
+    'id="a"',
+    "<!--",
+    "-->",
+    "<![CDATA[",
+    "]]>",
+    "<?x",
+    "?>",
+    "&",
+    "&lt;",
+    "\0",
+]
+WORDS += [
+    "<head ",
+    "</head>",
+    "<required>",
+    "<constraint>",
+    '"',
+    "<!DOCTYPE x [",
+    "]>",
+    "\ufeff",
+    "é",
+    "=",
+    "'",
+    " x ",
+]
+SEEDS = [
+    f'<bml xmlns="{CORE}" id="b"><speech id="s"><text>a<sync id="m"/>b</text></speech><head id="h" lexeme="NOD" '
+    'stroke="s:m - 0.5" amount="0.5"/><required><face id="f"><faceLexeme lexeme="SMILE"/></face></required>'
+    '<constraint><before ref="h:end"><sync ref="f:start+1"/></before></constraint></bml>',
+    A + C,
+]
+
+
+@given(st.lists(st.sampled_from(WORDS), max_size=25).map("".join) | st.text(max_size=40))
+@example("<bml id='a'/>" * 3)
+def test_any_text_gives_blocks_and_errors_and_nothing_else(text: str) -> None:
+    for found in read(text):
+        assert isinstance(found, Block | BMLError)
+        if isinstance(found, Block):
+            assert parse(write(found)) == found
+
+
+@given(st.data())
+def test_a_mutated_document_gives_blocks_and_errors_and_nothing_else(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from(SEEDS) | blocks().map(write))
+    for _ in range(data.draw(st.integers(1, 4))):
+        start = data.draw(st.integers(0, len(text)))
+        end = data.draw(st.integers(start, min(len(text), start + 12)))
+        middle = data.draw(
+            st.sampled_from(["", *WORDS, "nan", "1e308", ":", "-", "+ 1", "h", text[start:end] * 2])
+        )
+        text = text[:start] + middle + text[end:]
+    for found in read(text):
+        assert isinstance(found, Block | BMLError)
+        if isinstance(found, Block):
+            assert parse(write(found)) == found
+            ids = [b.id for b in found.behaviours]
+            assert len(ids) == len(set(ids))
+
+
+@given(st.binary(max_size=60) | st.lists(st.sampled_from(WORDS)).map(lambda w: "".join(w).encode("utf-16")))
+def test_any_bytes_give_blocks_and_errors_and_nothing_else(data: bytes) -> None:
+    assert all(isinstance(found, Block | BMLError) for found in read(data))

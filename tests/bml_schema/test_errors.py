@@ -1,0 +1,47 @@
+"""Messages say what was wanted, what came, and where."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from bml_schema import BMLError, BMLSyntaxError, Problem
+from bml_schema.errors import at, did_you_mean, shown
+
+
+def test_an_error_reads_like_line_path_wanted_got() -> None:
+    error = BMLError("amount: wanted 0..1, got 7", line=3, path="/bml/head[1]")
+    assert str(error) == "line 3, /bml/head[1]: amount: wanted 0..1, got 7"
+
+
+def test_an_error_without_place_is_its_text() -> None:
+    assert str(BMLError("nothing")) == "nothing"
+    assert at(2, "", "odd") == "line 2: odd"
+
+
+def test_an_error_survives_a_process_border() -> None:
+    error = BMLSyntaxError("odd", line=3, path="/bml", block="b")
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is BMLSyntaxError
+    assert (back.text, back.line, back.path, back.block) == ("odd", 3, "/bml", "b")
+
+
+def test_a_problem_reads_like_an_error() -> None:
+    problem = Problem(id="b:h", type="PARSING_FAILURE", text="odd", line=3, path="/bml/head[1]")
+    assert str(problem) == "line 3, /bml/head[1]: odd"
+
+
+@pytest.mark.parametrize(("value", "said"), [("7", "7"), ("-0.5", "-0.5"), ("left", '"left"'), ("", '""')])
+def test_numbers_are_shown_bare_and_words_quoted(value: str, said: str) -> None:
+    assert shown(value) == said
+
+
+def test_a_long_value_is_cut() -> None:
+    assert len(shown("x" * 1000)) < 80
+
+
+def test_a_near_name_is_suggested() -> None:
+    assert did_you_mean("nod2", ["speech1", "nod1"]) == ', did you mean "nod1"?'
+    assert did_you_mean("nod2", ["speech1"]) == ""
+    assert did_you_mean("n" * 1000, ["n" * 999]) == ""

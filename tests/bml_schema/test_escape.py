@@ -1,0 +1,30 @@
+"""Escaped text reads back as it was."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lxml import etree
+
+from bml_schema.escape import escape, escape_value, legal
+from tests.strategies import xml_text
+
+
+@given(xml_text())
+def test_escaped_text_reads_back(text: str) -> None:
+    element = etree.fromstring(f'<a b="{escape_value(text)}">{escape(text)}</a>'.encode())
+    assert element.get("b") == text
+    assert (element.text or "") == text
+
+
+@pytest.mark.parametrize("bad", ["\0", "\x0b", "\ud800", "\uffff"])
+def test_what_xml_cannot_hold_is_refused_or_replaced(bad: str) -> None:
+    with pytest.raises(ValueError, match=r"characters XML can hold, got U\+.* at 1"):
+        escape("a" + bad)
+    assert legal("a" + bad) == "a\ufffd"
+
+
+@given(st.text())
+def test_legal_text_can_always_be_written(text: str) -> None:
+    assert etree.fromstring(f"<a>{escape(legal(text))}</a>".encode()) is not None

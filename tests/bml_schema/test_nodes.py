@@ -1,0 +1,43 @@
+"""Blocks know their behaviours and constraints, and what is required."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+from hypothesis import given
+
+from bml_schema import Behaviour, Block, Constraint, Head, Required, Synchronize, SyncRef, Wait
+from tests.strategies import blocks
+
+
+def test_behaviours_and_constraints_are_listed_in_document_order() -> None:
+    a, b, c = Wait(id="a"), Head(id="b", lexeme="NOD"), Wait(id="c")
+    refs = (SyncRef(behaviour="a", sync="end"), SyncRef(behaviour="b", sync="start"))
+    one = Constraint(id="one", parts=(Synchronize(refs=refs),))
+    two = Constraint(parts=(Synchronize(refs=refs),), required=True)
+    block = Block(id="x", children=(a, one, Required(children=(b, two)), c))
+    assert block.behaviours == (a, b, c)
+    assert block.constraints == (one, two)
+    assert block.required == {"b"}
+    assert block["b"] is b
+    with pytest.raises(KeyError):
+        block["nobody"]
+
+
+def test_nodes_can_be_keys_of_a_dict() -> None:
+    assert len({Wait(id="a"), Wait(id="a"), Wait(id="b")}) == 2
+    assert len({Block(id="a"), Block(id="a", foreign={})}) == 1
+
+
+@given(blocks())
+def test_a_block_survives_a_process_border(block: Block) -> None:
+    back = pickle.loads(pickle.dumps(block))
+    assert back == block
+    assert back.behaviours == block.behaviours
+
+
+@given(blocks())
+def test_a_block_is_hashable(block: Block) -> None:
+    assert isinstance(hash(block), int)
+    assert all(isinstance(b, Behaviour) for b in block.behaviours)

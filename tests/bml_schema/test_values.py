@@ -1,0 +1,111 @@
+"""Attribute values: what is read, what is refused, what is written."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bml_schema import flag, integer, number, one_of, seconds, string, word
+from bml_schema.values import block_name, decimal, name, unwanted
+from tests.strategies import attribute_values
+
+AMOUNT = number(0, 1)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_number_is_written_without_exponent_and_reads_back(value: float) -> None:
+    text = decimal(value)
+    assert "e" not in text.lower()
+    assert float(text) == value
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_nan_and_infinity_cannot_be_written(value: float) -> None:
+    with pytest.raises(ValueError, match="finite"):
+        decimal(value)
+
+
+@pytest.mark.parametrize(("text", "value"), [("0", 0), (" 1 ", 1), ("+.5", 0.5), ("0.", 0), ("00.25", 0.25)])
+def test_ordinary_decimals_are_read(text: str, value: float) -> None:
+    assert AMOUNT.read(text) == value
+
+
+BAD_NUMBERS = [
+    "",
+    " ",
+    "x",
+    "7",
+    "-0.1",
+    "nan",
+    "NaN",
+    "inf",
+    "1e0",
+    "1E-1",
+    "1e308",
+    "0x1",
+    "1,5",
+    "1_0",
+    "١",
+    "1 0",
+]
+
+
+@pytest.mark.parametrize("text", [*BAD_NUMBERS, "0." + "0" * 500, "1" * 5000])
+def test_other_spellings_and_values_out_of_range_are_refused(text: str) -> None:
+    with pytest.raises(ValueError):  # noqa: PT011 - the sentence is made by who knows the attribute
+        AMOUNT.read(text)
+
+
+@pytest.mark.parametrize("text", ["nan", "-inf", "1e308", "1.5E+3"])
+def test_the_message_for_an_exponent_says_what_is_wrong_with_it(text: str) -> None:
+    assert (
+        unwanted("0..1", text, text)
+        == f"wanted 0..1 (a plain decimal number, no exponent, NaN or infinity), got {text}"
+    )
+
+
+@pytest.mark.parametrize("text", ["1.0", "", "1e2", "101", "²", "9" * 5000])
+def test_an_integer_is_digits_in_range(text: str) -> None:
+    with pytest.raises(ValueError):  # noqa: PT011
+        integer(1, 100).read(text)
+
+
+def test_a_closed_set_is_case_sensitive_unless_it_says_otherwise() -> None:
+    with pytest.raises(ValueError, match="left"):
+        one_of("LEFT", "RIGHT").read("left")
+    assert one_of("LEFT", "RIGHT", any_case=True).read("left") == "LEFT"
+    assert one_of("LEFT", "RIGHT", "BOTH").wanted == "LEFT, RIGHT or BOTH"
+    assert one_of("ONLY").wanted == "ONLY"
+
+
+@pytest.mark.parametrize("text", ["", " ", "bml", "a:b", "a b", "a\tb", "x" * 257])
+def test_a_name_has_no_blank_and_no_colon(text: str) -> None:
+    with pytest.raises(ValueError):  # noqa: PT011
+        name.read(text)
+
+
+@pytest.mark.parametrize("text", ["nod-1", "a.b", "1", "-", "Ünïcode", "x" * 256])
+def test_a_name_may_hold_anything_else(text: str) -> None:
+    assert name.read(f" {text} ") == text
+
+
+def test_a_block_may_have_a_blank_in_its_id() -> None:
+    assert block_name.read("my block") == "my block"
+
+
+@pytest.mark.parametrize(("text", "value"), [("true", True), ("1", True), ("false", False), (" 0 ", False)])
+def test_a_flag_is_true_or_false(text: str, value: bool) -> None:
+    assert flag.read(text) is value
+    with pytest.raises(ValueError):  # noqa: PT011
+        flag.read("yes")
+
+
+@given(st.data())
+def test_each_value_reads_back_what_it_writes(data: st.DataObject) -> None:
+    kinds = [AMOUNT, integer(-3, 3), one_of("A", "B"), flag, word, seconds, string]
+    kind = data.draw(st.sampled_from(kinds))
+    value = data.draw(attribute_values(kind))
+    assert kind.read(kind.write(value)) == value
