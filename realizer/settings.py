@@ -31,8 +31,6 @@ class Settings(BaseModel):
     language: str = Field("en-US", description="BCP-47, of speech that names none")
     fps: float = Field(25.0, gt=0, le=240)
     scene: Path | None = Field(None, description="a file of targets every session starts with")
-    faces: Path | None = Field(None, description="a folder of face folders, looked in first")
-    record: Path | None = Field(None, description="a folder that keeps what every session was sent")
     seed: int = 0
     idle: bool = True
     keep: float = Field(60.0, ge=0, description="seconds a named session outlives its last connection")

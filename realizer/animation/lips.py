@@ -66,6 +66,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
     taken = _presence(track, times, facts["pauses"])
     mouth = _dominance(track, times, facts) * taken[:, None]
     _constrain(mouth, track, times, taken, facts)
+    mouth[[0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
     return _channels(times + start, mouth, taken, facts["contour"])
 
 

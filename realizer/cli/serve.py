@@ -32,9 +32,7 @@ def serve(config: Path | None, **flags: Any) -> None:
     Prints one line for each open door when it is ready. SIGINT or SIGTERM: takes no more work, gives what
     plays 5 s, ends.
     """
-    import asyncio
-
-    from realizer.server.serve import serve as run
+    from realizer.server.serve import run
     from realizer.settings import Settings, SettingsError
 
     try:
@@ -42,4 +40,4 @@ def serve(config: Path | None, **flags: Any) -> None:
     except SettingsError as error:
         raise click.UsageError(str(error)) from None
     options.find_voice(settings.voice).close()  # says on stderr when speech will be silent
-    asyncio.run(run(settings))
+    run(settings)

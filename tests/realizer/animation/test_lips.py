@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from realizer.animation.blend import blend
@@ -160,6 +160,7 @@ def test_a_later_start_moves_every_key() -> None:
 
 
 @given(phonemes_of_speech)
+@example((Phoneme(0, 0.021484375, "f", 0),))
 def test_any_speech_begins_and_ends_at_rest_and_never_jumps(phonemes: tuple[Phoneme, ...]) -> None:
     speed = coarticulation()["speed"]
     for channel in lip_channels(phonemes, 0.0):
