@@ -1,0 +1,44 @@
+"""One block, planned: what is dropped, what it is told of, what is left to play."""
+
+from __future__ import annotations
+
+from bml_schema import parse
+from realizer.behaviours import KINDS, VOCABULARY
+from realizer.behaviours.kind import World
+from realizer.planning import Plan, plan
+
+
+def planned(content: str, world: World = World()) -> Plan:  # noqa: B008 - a frozen value
+    return plan(parse(f'<bml id="b">{content}</bml>', VOCABULARY), KINDS, world)
+
+
+def test_every_behaviour_that_is_scheduled_is_expanded() -> None:
+    made = planned('<head id="h" lexeme="NOD"/><gesture id="g" lexeme="BEAT"/>')
+    assert set(made.schedule.times) == set(made.channels) == {"h", "g"}
+    assert made.channels["h"]
+    assert made.channels["g"] == (), "a face shows no gesture"
+
+
+def test_a_problem_of_the_parser_is_one_warning_with_its_place() -> None:
+    (warning,) = planned('<head id="h" lexeme="NOD" amount="7"/>').schedule.warnings
+    assert (warning.id, warning.type) == ("b:h", "PARSING_FAILURE")
+    assert warning.text.count("line 1") == 1
+
+
+def test_a_fault_of_a_kind_drops_the_behaviour_with_one_warning() -> None:
+    made = planned('<faceLexeme id="f" lexeme="SMIRKLE"/><head id="h" lexeme="NOD"/>')
+    assert [w.id for w in made.schedule.warnings] == ["b:f"]
+    assert set(made.channels) == {"h"}
+
+
+def test_a_target_that_is_not_in_the_scene_warns_and_plays() -> None:
+    made = planned('<gaze id="g" target="cupp"/>', World(scene={"cup": (0.1, 0.0, 0.5)}))
+    assert [w.type for w in made.schedule.warnings] == ["NO_SUCH_TARGET"]
+    assert made.channels["g"]
+
+
+def test_a_required_fault_fails_the_block_with_one_warning_of_its_own() -> None:
+    made = planned('<required><faceLexeme id="f" lexeme="SMIRKLE"/></required><head id="h" lexeme="NOD"/>')
+    assert made.schedule.failed
+    assert [w.id for w in made.schedule.warnings] == ["b"]
+    assert made.channels == {}

@@ -1,0 +1,44 @@
+"""The tests stand in the same tree as the packages: nothing is without, nothing is left over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import bml_schema
+import realizer
+
+TESTS = Path(__file__).parent
+PACKAGES = {
+    "bml_schema": Path(bml_schema.__path__[0]),
+    "realizer": Path(realizer.__path__[0]),
+}
+# Tested from outside, by documents, commands and a browser: tests/realizer/test_cli.py, tests/browser,
+# tests/realizer/test_pipeline.py.
+ELSEWHERE = {"realizer/cli", "realizer/examples"}
+
+
+def packages() -> list[str]:
+    found = []
+    for name, root in PACKAGES.items():
+        inside = sorted(p.parent for p in root.rglob("__init__.py"))
+        found += ["/".join([name, *p.relative_to(root).parts]) for p in inside]
+    return sorted(set(found) - ELSEWHERE)
+
+
+@pytest.mark.parametrize("package", packages())
+def test_each_package_has_its_folder_of_tests(package: str) -> None:
+    assert list((TESTS / package).glob("test_*.py")), f"tests/{package} has no test"
+
+
+def test_no_folder_of_tests_is_without_its_package() -> None:
+    folders = {p.parent.relative_to(TESTS).as_posix() for p in TESTS.rglob("test_*.py")}
+    assert folders - set(packages()) <= {".", "browser", "benchmarks"}
+
+
+@pytest.mark.parametrize("path", sorted((TESTS / "realizer").glob("test_*.py")), ids=lambda p: p.stem)
+def test_tests_beside_the_packages_are_named_after_a_module(path: Path) -> None:
+    module = path.stem.removeprefix("test_")
+    root = PACKAGES["realizer"]
+    assert (root / f"{module}.py").is_file() or (root / module).is_dir()
