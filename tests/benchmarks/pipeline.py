@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+
 from bml_schema import parse
 from realizer.animation.fap import to_fap
 from realizer.behaviours import VOCABULARY
