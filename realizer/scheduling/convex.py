@@ -8,7 +8,7 @@ import numpy as np
 
 from realizer.arrays import Bool, Float64
 from realizer.scheduling.model import LOOSE, TIGHT, Index
-from realizer.scheduling.paths import raise_levels
+from realizer.scheduling.paths import components, raise_levels
 from realizer.scheduling.shapes import settle
 from realizer.scheduling.ties import Ties
 
@@ -52,7 +52,37 @@ def kept(quadratic: Quadratic, start: Float64, slack: float = LOOSE) -> tuple[Fl
 
 
 def optimum(quadratic: Quadratic, level: Float64) -> Float64:
-    """The optimum: exact where the inequalities that bind are found, else moved until all are kept."""
+    """(size,) the x of the least cost; level is any x that keeps every inequality, such as `kept` finds.
+
+    What a closed circle of inequalities leaves no room is tied first: interior points need an interior.
+    """
+    u, v = quadratic.u, quadratic.v
+    tight = np.flatnonzero(level[v] - level[u] - quadratic.w <= 2 * LOOSE)
+    circle = np.array(components(quadratic.size, [(int(u[k]), int(v[k]), 0.0) for k in tight]))
+    _, first, number = np.unique(circle, return_index=True, return_inverse=True)
+    # Numbered by their first nodes, so that node 0 stays node 0.
+    first, number = np.sort(first), np.argsort(np.argsort(first))[number]
+    if len(first) == quadratic.size:
+        return _optimum(quadratic, level)
+    shift = level - level[first][number]
+    smaller = Quadratic(
+        len(first),
+        number[quadratic.i],
+        number[quadratic.j],
+        quadratic.wanted + shift[quadratic.i] - shift[quadratic.j],
+        quadratic.stiffness,
+        number[u],
+        number[v],
+        quadratic.w + shift[u] - shift[v],
+    )
+    if smaller.size == 1:
+        return level
+    x: Float64 = _optimum(smaller, level[first])[number] + shift
+    return x
+
+
+def _optimum(quadratic: Quadratic, level: Float64) -> Float64:
+    """Exact where the inequalities that bind are found, else moved until all are kept."""
     u, v, w = quadratic.u, quadratic.v, quadratic.w
     found = _interior_point(quadratic)
     if found is None:
@@ -139,7 +169,8 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
         upper, linear, matrix, -w, [clarabel.NonnegativeConeT(len(rows))], settings
     )
     solution = solver.solve()
-    if str(solution.status) not in ("Solved", "AlmostSolved"):
+    # Having come as far as rounding lets it is good enough: what binds is solved again exactly.
+    if str(solution.status) not in ("Solved", "AlmostSolved", "InsufficientProgress"):
         return None
     x = np.concatenate([[0.0], solution.x])
     force, room = np.zeros(len(quadratic.u)), np.ones(len(quadratic.u))

@@ -71,7 +71,7 @@ def components(n: int, edges: Sequence[Edge]) -> list[int]:
         work = [(root, 0)]
         while work:
             at, k = work.pop()
-            if k == 0:
+            if index[at] < 0:
                 index[at] = low[at] = counter
                 counter += 1
                 stack.append(at)

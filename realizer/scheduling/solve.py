@@ -46,9 +46,10 @@ def solve(problem: Problem) -> Solution | list[Clash]:
     time = _slide(model, shapes)
     # Exactly equal where the document says so, exactly in order, exactly not too soon, whatever rounding did.
     time = time[model.root] + model.shift
-    for p in model.gap[time[model.gap + 1] < time[model.gap]].tolist():
-        time[p + 1] = max(time[p], time[p + 1])
     time[model.first] = np.maximum(time[model.first], model.earliest)
+    for b in np.unique(model.owner[model.gap[time[model.gap + 1] < time[model.gap]]]).tolist():
+        points = slice(model.first[b], model.last[b] + 1)
+        time[points] = np.maximum.accumulate(time[points])
     strain = time[model.gap + 1] - time[model.gap] - model.wanted
     return Solution(time, float(np.sum(model.stiffness * strain * strain)))
 
