@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from bml_schema import Block, Problem, SyncRef
+from bml_schema import Block, Place, Problem, SyncRef
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import Kind, World
 from realizer.scheduling import schedule_block
@@ -51,7 +51,8 @@ def plan(
             faults, dropped = [warning], True
         else:
             found = kind.check(node, world)
-            faults = [Warning(name, fault.type, fault.text) for fault in found]
+            where = block.places.get(node.id)
+            faults = [Warning(name, fault.type, _at(where, fault.text)) for fault in found]
             dropped = any(fault.fatal for fault in found)
         if dropped and node.id in block.required:
             return _failed(block, Warning(block.id, faults[0].type, f"required {node.id}: {faults[0].text}"))
@@ -71,8 +72,12 @@ def plan(
 
 
 def _of_problem(problem: Problem) -> Warning:
-    where = f"line {problem.line}, {problem.path}: " if problem.line else ""
-    return Warning(problem.id, problem.type, where + problem.text)
+    place = Place(problem.line, problem.path) if problem.line else None
+    return Warning(problem.id, problem.type, _at(place, problem.text))
+
+
+def _at(place: Place | None, text: str) -> str:
+    return text if place is None else f"line {place.line}, {place.path}: {text}"
 
 
 def _failed(block: Block, warning: Warning) -> Plan:

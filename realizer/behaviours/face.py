@@ -138,8 +138,9 @@ def _faults(parts: Iterable[Part]) -> tuple[Fault, ...]:
 def unknown_lexeme(lexeme: str, known: Iterable[str]) -> Fault:
     """The fault that names the nearest lexemes there are."""
     names = sorted(known)
-    near = difflib.get_close_matches(lexeme.upper(), names, n=3, cutoff=0.5) or names
-    return Fault("CANNOT_CREATE_BEHAVIOR", f"lexeme: wanted one of {', '.join(near)}, got {lexeme!r}")
+    near = difflib.get_close_matches(lexeme.upper(), names, n=1, cutoff=0.7)
+    hint = f", did you mean {near[0]}?" if near else ""
+    return Fault("CANNOT_CREATE_BEHAVIOR", f"lexeme: wanted one of {', '.join(names)}; got {lexeme!r}{hint}")
 
 
 KINDS = (
