@@ -14,7 +14,7 @@ BAD = "<wait id='bad' duration='x'/>"
 
 
 def test_references_to_a_dropped_behaviour_vanish_and_are_listed() -> None:
-    block = only(f"<wait id='a' start='bad:end+1' end='9'/>{BAD}<wait id='c' end='bad:nonsense'/>")
+    block = only(f"<wait id='a' start='bad:end+1' end='9'/>{BAD}<wait id='c' end='bad:start'/>")
     assert block["a"] == Wait(id="a", syncs={"end": SyncRef(offset=9.0)})
     assert block["c"] == Wait(id="c")
     (problem,) = block.problems

@@ -139,7 +139,7 @@ def test_unknown_elements_are_dropped_by_name(inside: str, type: str, said: str)
 @pytest.mark.parametrize(
     ("point", "said"),
     [
-        ("nobody:end", 'no behaviour "nobody" in this block'),
+        ("qqq:end", 'no behaviour "qqq" in this block'),
         ("hod:end", 'no behaviour "hod" in this block, did you mean "nod"?'),
         ("nod:attackPeak", 'no sync point "attackPeak" on "nod"'),
         ("nod:stroke:3", 'wanted stroke:1..2 of "nod", got stroke:3'),

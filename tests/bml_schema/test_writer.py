@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import re
+
+import pytest
 from hypothesis import given
 
-from bml_schema import Block, parse, write
+from bml_schema import Behaviour, Block, Description, Head, Speech, SpeechText, SyncRef, Wait, parse, write
 from tests.strategies import blocks
 
 
@@ -20,3 +24,66 @@ def test_a_written_block_reads_back_as_the_same(block: Block) -> None:
 @given(blocks())
 def test_a_written_block_reads_back_from_bytes_too(block: Block) -> None:
     assert parse(write(block).encode()) == block
+
+
+def test_a_document_is_written_for_people_to_read() -> None:
+    text = (
+        "<bml id='b' characterId='A' composition='append'><required><head id='h' end='2' lexeme='NOD' start='1'/>"
+        "</required><speech id='s'><text>a <sync id='m'/> b</text></speech><faceFacs id='f' au='1'/>"
+        "<constraint id='c'><before ref='s:m+1'><sync ref='h:end'/></before></constraint></bml>"
+    )
+    assert write(parse(text)) == (
+        '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0"'
+        ' xmlns:ext="http://www.bml-initiative.org/bml/coreextensions-1.0"'
+        ' id="b" characterId="A" composition="APPEND">\n'
+        "  <required>\n"
+        '    <head id="h" lexeme="NOD" start="1" end="2"/>\n'
+        "  </required>\n"
+        '  <speech id="s">\n'
+        '    <text>a <sync id="m"/> b</text>\n'
+        "  </speech>\n"
+        '  <ext:faceFacs id="f" au="1"/>\n'
+        '  <constraint id="c">\n'
+        '    <before ref="s:m + 1">\n'
+        '      <sync ref="h:end"/>\n'
+        "    </before>\n"
+        "  </constraint>\n"
+        "</bml>\n"
+    )
+
+
+def test_foreign_namespaces_get_the_prefixes_people_know() -> None:
+    known = "{http://www.asap-project.org/bmla}appendAfter"
+    text = write(Block(id="b", foreign={known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}))
+    assert 'bmla:appendAfter="x" ns2:k="1" ns3:k="2"' in text
+    assert parse(text).foreign == {known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}
+
+
+@pytest.mark.parametrize(
+    ("node", "said"),
+    [
+        (Wait(id="w", duration=math.nan), "wanted a finite number, got nan"),
+        (Wait(id="w", syncs={"start": SyncRef(offset=math.inf)}), "wanted a finite number, got inf"),
+        (Head(id="h", lexeme="\0"), "wanted characters XML can hold, got U+0000"),
+        (
+            Speech(id="s", text=SpeechText(parts=("a\ud800",))),
+            "wanted characters XML can hold, got U+D800 at 1",
+        ),
+        (
+            Wait(id="w", descriptions=(Description(priority=1, type="x", content="<a>"),)),
+            "description: wanted well-formed content",
+        ),
+    ],
+)
+def test_what_cannot_be_written_is_a_value_error(node: Behaviour, said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        write(Block(id="b", children=(node,)))
+
+
+@pytest.mark.parametrize(
+    "content", ["<!DOCTYPE a><a/>", '<?xml version="1.0"?>', "&nobody;", "</x><x>", "</x>"]
+)
+def test_a_description_cannot_break_out_of_its_element(content: str) -> None:
+    node = Wait(id="w", descriptions=(Description(priority=1, type="x", content=content),))
+    with pytest.raises(ValueError, match="wanted well-formed content"):
+        write(Block(id="b", children=(node,)))

@@ -1,0 +1,192 @@
+"""Feedback: all in the core namespace, plain for the clients there are, and read back as it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lxml import etree
+
+from bml_schema import (
+    BMLA,
+    CORE,
+    OWN,
+    BlockPrediction,
+    BlockProgress,
+    BMLError,
+    Feedback,
+    PredictionFeedback,
+    Speech,
+    Sync,
+    SyncPointProgress,
+    SyncRef,
+    WarningFeedback,
+    parse,
+    parse_feedback,
+    predicted,
+)
+from tests.strategies import blocks, names, xml_text
+
+# Times go out to the microsecond.
+times = st.integers(0, 10**11).map(lambda n: n / 1e6)
+inside = st.integers(0, 86400 * 10**6).map(lambda n: n / 1e6)
+who = st.none() | names
+
+
+@st.composite
+def predictions(draw: st.DrawFn) -> PredictionFeedback:
+    block = draw(blocks())
+    behaviours = tuple(
+        predicted(
+            b,
+            block.id,
+            {p: draw(inside) for p in (*b.sync_points, *(b.marked if isinstance(b, Speech) else ()))},
+        )
+        for b in block.behaviours
+    )
+    told = st.builds(
+        BlockPrediction,
+        id=names,
+        global_start=st.none() | times,
+        global_end=st.none() | times,
+        status=st.none() | st.just("IN_PREP"),
+    )
+    return PredictionFeedback(
+        character_id=draw(who), blocks=tuple(draw(st.lists(told, max_size=3))), behaviours=behaviours
+    )
+
+
+feedback = st.one_of(
+    st.builds(
+        BlockProgress,
+        id=names.map(lambda n: f"{n}:start"),
+        global_time=times,
+        character_id=who,
+        status=st.none() | st.just("DONE"),
+    ),
+    st.builds(SyncPointProgress, id=names, time=times, global_time=times, character_id=who),
+    st.builds(WarningFeedback, id=xml_text(1), type=names, text=xml_text(), character_id=who),
+    predictions(),
+)
+
+
+@given(feedback)
+def test_feedback_reads_back_as_it_was(told: Feedback) -> None:
+    assert parse_feedback(told.to_xml()) == told
+
+
+@given(feedback, st.integers(1, 10**9))
+def test_the_number_of_a_message_is_in_our_own_namespace(told: Feedback, seq: int) -> None:
+    text = told.to_xml(seq)
+    root = etree.fromstring(text.encode())
+    assert root.get(f"{{{OWN}}}seq") == str(seq)
+    back = parse_feedback(text)
+    assert back == told
+    assert back.seq == seq
+    assert replace(told, seq=seq).to_xml() == text
+
+
+@given(feedback)
+def test_every_element_is_in_a_known_namespace_and_names_are_plain(told: Feedback) -> None:
+    root = etree.fromstring(told.to_xml(7).encode())
+    assert str(root.tag).startswith(f"{{{CORE}}}")
+    for name in root.attrib:
+        assert not name.startswith("{") or name in (f"{{{OWN}}}seq", f"{{{BMLA}}}status")
+
+
+def test_block_progress_looks_like_the_standards() -> None:
+    text = BlockProgress(id="b1:start", global_time=1.5, character_id="A").to_xml()
+    assert text == f'<blockProgress xmlns="{CORE}" id="b1:start" globalTime="1.5" characterId="A"/>'
+
+
+def test_sync_point_progress_looks_like_the_standards() -> None:
+    text = SyncPointProgress(id="b1:nod1:stroke:2", time=0.1 + 0.2, global_time=100000.123).to_xml(3)
+    assert text == (
+        f'<syncPointProgress xmlns="{CORE}" id="b1:nod1:stroke:2" time="0.3" globalTime="100000.123"'
+        f' xmlns:realizer="{OWN}" realizer:seq="3"/>'
+    )
+
+
+def test_the_status_of_a_block_is_in_bmlas_namespace() -> None:
+    text = BlockProgress(id="b1:end", global_time=0.0, status="INTERRUPTED").to_xml()
+    assert etree.fromstring(text.encode()).get(f"{{{BMLA}}}status") == "INTERRUPTED"
+
+
+def test_a_warning_has_plain_text_only() -> None:
+    text = WarningFeedback(id="b1:h", type="PARSING_FAILURE", text='a < b & "c" \0').to_xml()
+    assert "CDATA" not in text
+    root = etree.fromstring(text.encode())
+    assert len(root) == 0
+    assert root.text == 'a < b & "c" \ufffd'
+
+
+@pytest.mark.parametrize("time", [1e-7, 1e300, -0.0])
+def test_no_time_has_an_exponent(time: float) -> None:
+    text = BlockProgress(id="b:end", global_time=time).to_xml()
+    assert "e" not in text.partition('globalTime="')[2].partition('"')[0]
+
+
+def test_no_time_is_nan() -> None:
+    with pytest.raises(ValueError, match="finite"):
+        BlockProgress(id="b:end", global_time=float("nan")).to_xml()
+
+
+SPEECH = """<bml id="b"><speech id="s" start="h:end"><text>Hi <sync id="m" ref="h:start"/> you</text>
+<description priority="1" type="x"/></speech>
+<head id="h" lexeme="NOD" repetition="2" amount="1" odd="1"/></bml>"""
+
+
+def test_a_predicted_behaviour_has_its_required_attributes_and_its_times() -> None:
+    block = parse(SPEECH)
+    head = predicted(block["h"], "b", {"start": 0.0, "stroke:1": 0.25, "stroke": 0.5, "end": 1.0000000004})
+    assert head.id == "b:h"
+    assert head.syncs == {"start": SyncRef(), "stroke": SyncRef(offset=0.5), "end": SyncRef(offset=1.0)}
+    text = PredictionFeedback(behaviours=(head,)).to_xml()
+    assert '<head id="b:h" lexeme="NOD" repetition="2" amount="1" start="0" stroke="0.5" end="1"/>' in text
+
+
+def test_predicted_speech_tells_its_syncs_in_the_text() -> None:
+    speech = predicted(parse(SPEECH)["s"], "b", {"start": 0.0, "m": 2.0, "end": 3.0})
+    assert isinstance(speech, Speech)
+    assert speech.text is not None
+    assert speech.text.parts == ("Hi ", Sync(id="m", ref=SyncRef(offset=2.0)), " you")
+    assert not speech.descriptions
+    assert '<sync id="m" ref="2"/>' in PredictionFeedback(behaviours=(speech,)).to_xml()
+
+
+def test_unknown_children_of_a_prediction_are_skipped() -> None:
+    text = (
+        f'<predictionFeedback xmlns="{CORE}"><blink id="b:x" start="1"/><head id="b:h"/></predictionFeedback>'
+    )
+    assert parse_feedback(text) == PredictionFeedback()
+
+
+def test_times_of_others_may_have_exponents() -> None:
+    text = f'<blockProgress xmlns="{CORE}" id="b:start" globalTime="1.0E-4"/>'
+    assert parse_feedback(text) == BlockProgress(id="b:start", global_time=0.0001)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "not well-formed"),
+        ("<blockProgress", "not well-formed"),
+        ('<blockProgress id="b:start" globalTime="1"/>', "wanted BML 1.0 feedback, got <blockProgress>"),
+        (f'<blockProgress xmlns="{CORE}" globalTime="1"/>', "id: wanted one, got none"),
+        (
+            f'<blockProgress xmlns="{CORE}" id="b:start" globalTime="soon"/>',
+            'globalTime: wanted seconds, got "soon"',
+        ),
+        (
+            f'<syncPointProgress xmlns="{CORE}" id="b" globalTime="1" time="nan"/>',
+            'time: wanted seconds, got "nan"',
+        ),
+        (f'<warningFeedback xmlns="{CORE}" id="b"/>', "type: wanted one, got none"),
+        ("<a>\ud800</a>", "characters XML can hold"),
+    ],
+)
+def test_what_is_no_feedback_is_an_error(text: str, said: str) -> None:
+    with pytest.raises(BMLError, match=said):
+        parse_feedback(text)

@@ -1,0 +1,201 @@
+"""The XML Schemas and the node classes say the same, and what is written is valid."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from lxml import etree
+
+from bml_schema import (
+    CORE,
+    EXTENSIONS,
+    VOCABULARY,
+    After,
+    Before,
+    Behaviour,
+    Block,
+    Constraint,
+    Description,
+    Pose,
+    Required,
+    SpeechText,
+    Stance,
+    Sync,
+    Synchronize,
+    write,
+)
+from bml_schema.shape import Attribute, shape_of
+from tests.strategies import blocks
+
+XSD = Path(str(files("bml_schema") / "xsd"))
+XS = "{http://www.w3.org/2001/XMLSchema}"
+SCHEMAS = {
+    CORE: etree.parse(XSD / "bml-1.0.xsd").getroot(),
+    EXTENSIONS: etree.parse(XSD / "coreextensions-1.0.xsd").getroot(),
+}
+SCHEMA = etree.XMLSchema(etree.parse(XSD / "bml-1.0.xsd"))
+PREFIXES = {"bml": CORE, "ext": EXTENSIONS}
+
+Element = etree._Element
+
+
+def named(kind: str, space: str, name: str) -> Element:
+    (found,) = [e for e in SCHEMAS[space] if e.tag == XS + kind and e.get("name") == name]
+    return found
+
+
+def referred(kind: str, qname: str) -> Element:
+    prefix, _, name = qname.partition(":")
+    return named(kind, PREFIXES[prefix], name)
+
+
+def type_of(element: Element) -> Element:
+    """The complex type of an element declaration."""
+    inner = element.find(XS + "complexType")
+    return inner if inner is not None else referred("complexType", element.get("type", ""))
+
+
+def attributes(declaration: Element) -> dict[str, Element]:
+    """The attributes a complex type or an attribute group allows, by name."""
+    found: dict[str, Element] = {}
+    for part in declaration:
+        if part.tag == XS + "attribute":
+            found[part.get("name", "")] = part
+        elif part.tag == XS + "attributeGroup":
+            found |= attributes(referred("attributeGroup", part.get("ref", "")))
+    return found
+
+
+def children(declaration: Element) -> set[str]:
+    """Names of the elements a complex type or a group allows."""
+    found: set[str] = set()
+    for part in declaration:
+        if part.tag == XS + "element":
+            found.add((part.get("ref") or part.get("name") or "").rpartition(":")[2])
+        elif part.tag == XS + "group":
+            found |= children(referred("group", part.get("ref", "")))
+        elif part.tag in (XS + "choice", XS + "sequence"):
+            found |= children(part)
+    return found
+
+
+def facets(attribute: Element) -> dict[str, Any]:
+    """What the type of an attribute says: base, words, range."""
+    restriction = referred("simpleType", attribute.get("type", "")).find(XS + "restriction")
+    assert restriction is not None
+    told: dict[str, list[str]] = {}
+    for facet in restriction:
+        told.setdefault(str(facet.tag).removeprefix(XS), []).append(facet.get("value", ""))
+    return {"base": restriction.get("base"), **told}
+
+
+NODES: list[type[Any]] = [
+    *VOCABULARY.values(),
+    Block,
+    Constraint,
+    Description,
+    Pose,
+    Stance,
+    Synchronize,
+    Before,
+    After,
+]
+EACH = pytest.mark.parametrize("cls", NODES, ids=[c.__name__ for c in NODES])
+
+
+def declaration_of(cls: type[Any]) -> Element:
+    space, name = cls.tag[1:].split("}")
+    return type_of(named("element", space, name))
+
+
+def assert_agrees(spec: Attribute, declared: Element) -> None:
+    assert spec.required == (declared.get("use") == "required"), spec.name
+    default = None if spec.required or spec.default is None else spec.value.write(spec.default)
+    assert declared.get("default") == default, spec.name
+    told = facets(declared)
+    assert tuple(told.get("enumeration", ())) == spec.value.words, spec.name
+    if spec.value.low is not None:
+        assert float(told["minInclusive"][0]) == spec.value.low, spec.name
+        assert told["maxInclusive"] == [f"{spec.value.high:.15g}"], spec.name
+        assert told["base"] == f"xs:{spec.value.type}", spec.name
+
+
+@EACH
+def test_a_node_and_its_schema_have_the_same_attributes(cls: type[Any]) -> None:
+    declared = attributes(declaration_of(cls))
+    specs = shape_of(cls).attributes
+    points = cls.sync_points if issubclass(cls, Behaviour) else ()
+    assert set(declared) == set(specs) | set(points)
+    for name, spec in specs.items():
+        assert_agrees(spec, declared[name])
+    for point in points:
+        assert declared[point].get("type") == "bml:syncReference"
+        assert declared[point].get("use") is None
+
+
+@EACH
+def test_a_node_and_its_schema_have_the_same_children(cls: type[Any]) -> None:
+    kinds = {c.tag.partition("}")[2] for kind in shape_of(cls).children for c in kind.classes}
+    declared = children(declaration_of(cls))
+    if issubclass(cls, Behaviour):
+        assert declared == kinds | {"description"}
+    elif cls is Block:
+        core = {tag.partition("}")[2] for tag in VOCABULARY if CORE in tag}
+        assert declared == core | {"required", "constraint"}
+    elif cls is Constraint:
+        assert declared == {"synchronize", "before", "after"}
+    elif cls in (Synchronize, Before, After):
+        assert declared == {"sync"}
+    else:
+        assert declared == kinds
+
+
+def test_required_takes_what_a_block_takes_but_itself() -> None:
+    assert children(declaration_of(Required)) == children(declaration_of(Block)) - {"required"}
+
+
+def test_the_sync_of_speech_is_that_of_the_schema() -> None:
+    text = declaration_of(SpeechText)
+    assert text.get("mixed") == "true"
+    sync = text.find(f"{XS}sequence/{XS}element")
+    assert sync is not None
+    declared = attributes(type_of(sync))
+    assert set(declared) == set(shape_of(Sync).attributes)
+
+
+@pytest.mark.parametrize(("part", "space"), [("faceLexeme", CORE), ("faceFacs", EXTENSIONS)])
+def test_the_parts_of_a_face_are_behaviours_without_timing(part: str, space: str) -> None:
+    declared = attributes(named("complexType", space, f"{part}Part"))
+    cls = VOCABULARY[f"{{{space}}}{part}"]
+    specs = shape_of(cls).attributes
+    assert set(declared) == set(specs)
+    for name, spec in specs.items():
+        if name == "id":
+            assert declared[name].get("use") is None
+        else:
+            assert_agrees(spec, declared[name])
+
+
+def test_the_schema_declares_no_element_the_vocabulary_does_not_know() -> None:
+    declared = {e.get("name") for root in SCHEMAS.values() for e in root if e.tag == XS + "element"}
+    known = {tag.partition("}")[2] for tag in VOCABULARY}
+    others = {c.tag.partition("}")[2] for c in (*NODES, Required, SpeechText)}
+    assert declared == known | others
+
+
+@given(blocks(foreign=False))
+def test_what_is_written_is_valid(block: Block) -> None:
+    text = write(block)
+    assert SCHEMA.validate(etree.fromstring(text.encode())), (SCHEMA.error_log, text)
+
+
+@pytest.mark.parametrize("change", ['amount="7"', 'lexeme=""', 'start="nod"', 'odd="1"', 'repetition="0"'])
+def test_the_schema_refuses_what_the_parser_refuses(change: str) -> None:
+    name = change.partition("=")[0]
+    given_ = {"lexeme": 'lexeme="NOD"', name: change}
+    text = f'<bml xmlns="{CORE}" id="b"><head id="h" {" ".join(given_.values())}/></bml>'
+    assert not SCHEMA.validate(etree.fromstring(text))
