@@ -261,7 +261,8 @@ def resample(pcm: Int16, rate: int, wanted: int) -> Float32:
         samples = np.convolve(samples, np.full(width, 1 / width, np.float32), "same")
     count = round(len(pcm) * wanted / rate)
     at = np.arange(count) * (rate / wanted)
-    return np.interp(at, np.arange(len(samples)), samples).astype(np.float32)
+    out: Float32 = np.interp(at, np.arange(len(samples)), samples).astype(np.float32)
+    return out
 
 
 def parse_scene(text: str) -> dict[str, Position]:
