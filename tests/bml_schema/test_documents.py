@@ -263,8 +263,9 @@ WORDS += [
 ]
 SEEDS = [
     f'<bml xmlns="{CORE}" id="b"><speech id="s"><text>a<sync id="m"/>b</text></speech><head id="h" '
-    'lexeme="NOD" stroke="s:m - 0.5" amount="0.5"/><required><face id="f"><faceLexeme lexeme="SMILE"/></face></required>'
-    '<constraint><before ref="h:end"><sync ref="f:start+1"/></before></constraint></bml>',
+    'lexeme="NOD" stroke="s:m - 0.5" amount="0.5"/>'
+    '<required><face id="f"><faceLexeme lexeme="SMILE"/></face></required><constraint>'
+    '<before ref="h:end"><sync ref="f:start+1"/></before></constraint></bml>',
     A + C,
 ]
 
