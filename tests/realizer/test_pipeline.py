@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from bml_schema import BMLError
 from realizer import realize, schedule
 from realizer.examples import examples
-from realizer.pipeline import Speaking, parse_scene
+from realizer.pipeline import Realization, Speaking, parse_scene
 from realizer.speech import SilentVoice
 from realizer.speech.utterance import Utterance
 from realizer.tables import faps
@@ -130,3 +131,49 @@ def test_frames_are_the_golden_ones(name: str, request: pytest.FixtureRequest) -
     assert ours.shape == theirs.shape
     # One unit for the last bit of another machine's arithmetic.
     assert np.abs(ours - theirs).max() <= 1
+
+
+@pytest.fixture
+def spoken() -> Realization:
+    """The nod on a word, really spoken, without idle motion."""
+    if find_spec("espeakng_loader") is None:
+        pytest.skip("no speech extra: pip install 'bml-realizer[speech]'")
+    return realize(examples()["nod-on-a-word"], voice="espeak", idle=False)
+
+
+@pytest.mark.espeak
+def test_the_nods_deepest_frame_falls_on_its_word(spoken: Realization) -> None:
+    planned = spoken.schedules[0]
+    (start, utterance), word = spoken.speech[0], planned.at("yes", "really")
+    heard = next(w for w in utterance.words if w.text.strip(".,").lower() == "really")
+    assert start + heard.start == pytest.approx(word, abs=0.005)
+    pitch = spoken.faps.values[:, 47]  # FAP 48, down is positive
+    assert abs(spoken.faps.times[np.argmax(pitch)] - word) <= 1 / spoken.fps
+
+
+@pytest.mark.espeak
+def test_the_sound_lasts_as_long_as_the_words_and_starts_with_them(spoken: Realization) -> None:
+    (start, utterance), sound = spoken.speech[0], spoken.sound(22050)
+    assert utterance.pcm is not None
+    assert len(sound) == round(spoken.duration * 22050)
+    loud = np.flatnonzero(np.abs(sound) > 300) / 22050
+    voiced = [p for p in utterance.phonemes if p.ipa]
+    assert loud[0] == pytest.approx(start + voiced[0].start, abs=0.08)
+    assert loud[-1] <= start + utterance.duration
+
+
+@pytest.mark.espeak
+def test_the_lips_meet_in_every_p_b_m_as_streamed() -> None:
+    document = '<bml id="b"><speech id="s"><text>My baby came up to me, maybe.</text></speech></bml>'
+    played = realize(document, voice="espeak", idle=False)
+    ((start, utterance),) = played.speech
+    faps = played.faps.values
+    gap = -faps[:, 3] - faps[:, 4]  # FAP 4 moves the upper lip down, FAP 5 the lower lip up; MNS / 1024
+    bilabial = [p for p in utterance.phonemes if p.ipa and p.ipa.strip("ˈˌ")[:1] in "pbm"]
+    assert len(bilabial) >= 6
+    for phoneme in bilabial:
+        inside = (played.faps.times >= start + phoneme.start - 0.04) & (
+            played.faps.times <= start + phoneme.end + 0.04
+        )
+        assert gap[inside].min() < 0.03 * 1024, phoneme
+    assert gap.max() > 150, "between them the mouth opens"
