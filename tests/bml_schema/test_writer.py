@@ -29,7 +29,8 @@ def test_a_written_block_reads_back_from_bytes_too(block: Block) -> None:
 def test_a_document_is_written_for_people_to_read() -> None:
     text = (
         "<bml id='b' characterId='A' composition='append'>"
-        "<required><head id='h' end='2' lexeme='NOD' start='1'/></required><speech id='s'><text>a <sync id='m'/> b</text></speech><faceFacs id='f' au='1'/>"
+        "<required><head id='h' end='2' lexeme='NOD' start='1'/></required>"
+        "<speech id='s'><text>a <sync id='m'/> b</text></speech><faceFacs id='f' au='1'/>"
         "<constraint id='c'><before ref='s:m+1'><sync ref='h:end'/></before></constraint></bml>"
     )
     assert write(parse(text)) == (
