@@ -136,6 +136,7 @@ class _Entry(NamedTuple):
 
     element: etree._Element
     tag: str
+    id: str
     path: str
     required: bool
 
@@ -171,7 +172,7 @@ class _Reader:
             counts[step] = n = counts.get(step, 0) + 1
             here = f"{path}/{step}[{n}]"
             if tag != Required.tag:
-                tree.append(_Entry(element, tag, here, required))
+                tree.append(_Entry(element, tag, element.get("id", "").strip(), here, required))
                 continue
             inside = self.entries(element, here, required=True)
             tree.append([e for item in inside for e in (item if isinstance(item, list) else (item,))])
@@ -179,7 +180,7 @@ class _Reader:
 
     def name(self, entry: _Entry) -> None:
         """Note what references may say of an entry, before any reference is read."""
-        id = entry.element.get("id", "").strip()
+        id = entry.id
         if id and entry.tag != Constraint.tag and id not in self.owners:
             self.owners[id] = entry
             self.names.points[id] = self.points(entry)
@@ -210,16 +211,14 @@ class _Reader:
             cls = self.elements.vocabulary.get(entry.tag)
             if cls is None:
                 raise self.unknown(entry)
-            id = element.get("id", "").strip()
-            owner = self.owners.get(id, entry)
+            owner = self.owners.get(entry.id, entry)
             if owner is not entry:
                 line = self.line(owner.element)
-                raise Fault(f"id: wanted one of its own, got {shown(id)}, which line {line} has", element)
+                said = f"id: wanted one of its own, got {shown(entry.id)}, which line {line} has"
+                raise Fault(said, element)
             node: Behaviour = self.elements.node(cls, element, timed=True)
         except Fault as fault:
-            id = element.get("id", "").strip()
-            if not 0 < len(id) <= _MOST_ID:
-                id = entry.path
+            id = entry.id if 0 < len(entry.id) <= _MOST_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
         self.places[node.id] = Place(self.line(element), entry.path)
@@ -238,9 +237,7 @@ class _Reader:
         try:
             values = self.elements.constraint(element)
         except Fault as fault:
-            id = element.get("id", "").strip()
-            if not 0 < len(id) <= _MOST_ID:
-                id = self.names.block
+            id = entry.id if 0 < len(entry.id) <= _MOST_ID else self.names.block
             self.problem(id, fault, entry.path, element, entry.required)
             return None
         place = Place(self.line(element), entry.path)
