@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -206,7 +207,8 @@ def schedule(
 
     player = Player(scene=scene, idle=False)
     block = parse(document, VOCABULARY)
-    return player.submit(block, 0.0, speak(player.wants(block), voice))
+    with _opened(voice) as speaker:
+        return player.submit(block, 0.0, speak(player.wants(block), speaker))
 
 
 def play(
@@ -215,10 +217,10 @@ def play(
     """Submit every document of every text at t = 0; returns the schedules, and what was refused."""
     schedules: list[Schedule] = []
     refused: list[Warning] = []
-    for text in texts:
-        for item in read(text, VOCABULARY):
+    with _opened(voice) as speaker:
+        for item in (item for text in texts for item in read(text, VOCABULARY)):
             if isinstance(item, Block):
-                planned = player.submit(item, 0.0, speak(player.wants(item), voice))
+                planned = player.submit(item, 0.0, speak(player.wants(item), speaker))
                 schedules.append(planned)
                 if planned.failed:
                     refused += planned.warnings
@@ -229,23 +231,35 @@ def play(
     return schedules, refused
 
 
+@contextmanager
+def _opened(voice: Voice | str | None) -> Iterator[Voice]:
+    """A voice by its name, closed afterwards; a voice that was handed in stays open."""
+    if voice is None or isinstance(voice, str):
+        from realizer.speech import find_voice
+
+        found = find_voice(voice)
+        try:
+            yield found
+        finally:
+            found.close()
+    else:
+        yield voice
+
+
 def warning_of(error: BMLError) -> Warning:
     """The BML warning of a document that gave no block."""
     return Warning(error.block or "<no id>", "PARSING_FAILURE", str(error))
 
 
-def speak(says: Mapping[str, Say], voice: Voice | str | None = None) -> dict[str, Utterance]:
+def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
     """Let a voice say what a block wants; where it fails the silent voice takes over, said on stderr."""
-    if not says:
-        return {}
-    from realizer.speech import SilentVoice, find_voice
-
-    chosen = find_voice(voice) if isinstance(voice, str) or voice is None else voice
     utterances: dict[str, Utterance] = {}
     for behaviour, say in says.items():
         try:
-            utterances[behaviour] = chosen.say(say)
+            utterances[behaviour] = voice.say(say)
         except VoiceError as error:
+            from realizer.speech import SilentVoice
+
             print(f"realizer: {behaviour}: {error}; going on without sound", file=sys.stderr)
             utterances[behaviour] = SilentVoice().say(say)
     return utterances

@@ -34,14 +34,15 @@ def demo(once: bool, port: int, voice: str | None, face: str) -> None:
 
 def _film(documents: list[str], voice: str | None, face: str) -> None:
     """All examples one after the other into demo.fap and demo.mp4."""
-    from realizer.cli.options import find_voice
+    from realizer.cli.options import tell_silence
     from realizer.errors import RealizerError
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
     from realizer.pipeline import realize
 
     appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
-    realization = realize(appended, face=face, voice=find_voice(voice))
+    realization = realize(appended, face=face, voice=voice)
+    tell_silence(voice)
     for path in (FRAMES, FILM):
         click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
         try:

@@ -62,17 +62,13 @@ def read_scene(path: str | None) -> dict[str, Position] | None:
         raise click.UsageError(f"{path}: {error}") from None
 
 
-def find_voice(name: str | None) -> Any:
-    """The voice, with a word on standard error where there is no sound."""
-    from realizer.speech import find_voice as find
+def tell_silence(voice: str | None) -> None:
+    """A word on standard error where nobody asked for silence and there is no voice."""
+    from realizer.speech import find_voice, voices
 
-    voice = find(name)
-    if name is None and voice.name == "silent":
-        from realizer.speech import voices
-
+    if voice is None and find_voice(None).name == "silent":
         missing = next((v.says for v in voices() if not v.available), "")
         click.echo(f"realizer: no voice is installed, speech is silent; {missing}", err=True)
-    return voice
 
 
 def tell(warnings: Iterable[Warning]) -> None:

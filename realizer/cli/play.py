@@ -64,11 +64,13 @@ def realize(
         texts,
         face=face,
         fps=fps,
-        voice=options.find_voice(voice),
+        voice=voice,
         scene=options.read_scene(scene),
         seed=seed,
         idle=not no_idle,
     )
+    if realization.speaking:
+        options.tell_silence(voice)
     options.tell(realization.warnings)
     if writer is None:
         json.dump(realization.to_json(), sys.stdout)
@@ -96,7 +98,9 @@ def schedule(
     from realizer.player import Player
 
     player = Player(scene=options.read_scene(scene), idle=False)
-    schedules, refused = play(options.read_documents(documents), player, options.find_voice(voice))
+    schedules, refused = play(options.read_documents(documents), player, voice)
+    if player.speech():
+        options.tell_silence(voice)
     options.tell(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
         options.tell(planned.warnings)

@@ -34,10 +34,12 @@ def serve(config: Path | None, **flags: Any) -> None:
     """
     from realizer.server.serve import run
     from realizer.settings import Settings, SettingsError
+    from realizer.speech import find_voice
 
     try:
         settings = Settings.read(flags, file=config)
     except SettingsError as error:
         raise click.UsageError(str(error)) from None
-    options.find_voice(settings.voice).close()  # says on stderr when speech will be silent
+    find_voice(settings.voice).close()  # a voice that is not installed is said before a door opens
+    options.tell_silence(settings.voice)
     run(settings)
