@@ -190,6 +190,8 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
     Raises:
         BMLError: not well-formed, not feedback, or without an attribute it must have.
     """
+    if "<!DOCTYPE" in text:
+        raise BMLSyntaxError("wanted feedback without DTD and entities, got <!DOCTYPE")
     try:
         root = element(text.strip("\ufeff \t\r\n").encode())
     except UnicodeEncodeError:

@@ -26,6 +26,7 @@ OWN = "urn:bml-realizer:1"  # what we add to BML ourselves
 _XML = "http://www.w3.org/XML/1998/namespace"
 # Prefixes people know; any other namespace becomes ns1, ns2, ...
 _PREFIXES: Mapping[str, str] = {
+    CORE: "bml",
     EXTENSIONS: "ext",
     OWN: "realizer",
     "http://www.asap-project.org/bmla": "bmla",
@@ -123,7 +124,7 @@ class Writer:
         for point in _ordered(node):
             out += _value(point, str(node.syncs[point]))
         for name, text in getattr(node, "foreign", {}).items():
-            out += _value(self.name(name), text)
+            out += _value(self.name(name, attribute=True), text)
         return out
 
     def _attribute(self, spec: Attribute, value: Any) -> str:
@@ -131,11 +132,11 @@ class Writer:
             return ""
         return _value(spec.name, str(value) if spec.value is sync_ref else spec.value.write(value))
 
-    def name(self, clark: str) -> str:
-        """Clark name -> name with a prefix, which is declared on the root."""
+    def name(self, clark: str, *, attribute: bool = False) -> str:
+        """Clark name -> name with a prefix, which is declared on the root; elements of the core need none."""
         space, _, local = clark.rpartition("}")
         space = space.removeprefix("{")
-        if not space or space == CORE:
+        if not space or (space == CORE and not attribute):
             return local
         if space == _XML:
             return f"xml:{local}"

@@ -9,6 +9,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from bml_schema import (
+    CORE,
     VOCABULARY,
     After,
     Before,
@@ -152,7 +153,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
             points[id] += [("stroke", n) for n in range(1, min(times, 4) + 1)]
     refs = _references(points) if points else numbers.map(lambda t: SyncRef(offset=t))
     others = st.dictionaries(
-        st.sampled_from(["zz", "{urn:a}b", "{http://www.asap-project.org/bmla}priority"]),
+        st.sampled_from(["zz", "{urn:a}b", "{http://www.asap-project.org/bmla}priority", f"{{{CORE}}}id"]),
         xml_text(),
         max_size=2,
     )

@@ -184,6 +184,7 @@ def test_times_of_others_may_have_exponents() -> None:
             'time: wanted seconds, got "nan"',
         ),
         (f'<warningFeedback xmlns="{CORE}" id="b"/>', "type: wanted one, got none"),
+        ('<!DOCTYPE a [<!ENTITY e "x">]><a>&e;</a>', "without DTD"),
         ("<a>\ud800</a>", "characters XML can hold"),
     ],
 )
