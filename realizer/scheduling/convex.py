@@ -14,8 +14,10 @@ from realizer.scheduling.ties import Ties
 
 __all__ = ["Quadratic", "kept", "optimum"]
 
-# Rounds of taking in what exact arithmetic shows to be broken after the interior point; one is the rule.
-ROUNDS = 8
+# Rounds of mending, after the interior point, which inequalities bind; one is the rule.
+ROUNDS = 20
+# A force counts as none below this part of the greatest stiffness.
+RESTS = 1e-11
 
 
 @dataclass(slots=True, eq=False)
@@ -82,23 +84,33 @@ def optimum(quadratic: Quadratic, level: Float64) -> Float64:
 
 
 def _optimum(quadratic: Quadratic, level: Float64) -> Float64:
-    """Exact where the inequalities that bind are found, else moved until all are kept."""
+    """The interior point's answer, then the inequalities that bind it as equalities, until none is wrong."""
     u, v, w = quadratic.u, quadratic.v, quadratic.w
     found = _interior_point(quadratic)
     if found is None:
         return level
     x, force, room = found
     binding = (force > room) & (u != v)
+    best, least = None, np.inf
     for _ in range(ROUNDS):
-        exact = _pinned(quadratic, binding, x)
+        exact, force = _bound(quadratic, binding, x)
         broken = (exact[v] - exact[u] < w - TIGHT) & (u != v)
-        if not (broken & ~binding).any():
-            break
-        binding |= broken
-    if not broken.any() and _cost(quadratic, exact) <= _cost(quadratic, x) + LOOSE:
-        return exact
+        if broken.any():
+            if (binding | broken).sum() == binding.sum():
+                break
+            binding |= broken
+            continue
+        cost = _cost(quadratic, exact)
+        if cost < least:
+            best, least = exact, cost
+        pulling = force < -RESTS * quadratic.stiffness.max()
+        if not pulling.any():
+            return exact
+        binding &= ~pulling
     raised, cycle = kept(quadratic, x, TIGHT)
-    return level if cycle else raised
+    if not cycle and _cost(quadratic, raised) < least:
+        return raised
+    return level if best is None else best
 
 
 def _cost(quadratic: Quadratic, x: Float64) -> float:
@@ -106,17 +118,23 @@ def _cost(quadratic: Quadratic, x: Float64) -> float:
     return float(np.sum(quadratic.stiffness * strain * strain))
 
 
-def _pinned(quadratic: Quadratic, binding: Bool, x: Float64) -> Float64:
-    """The least squares with some inequalities held as equalities; what these leave free stays near x."""
-    m = len(x)
+def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Float64]:
+    """The least squares with some inequalities held as equalities; what these leave free stays near x.
+
+    Returns:
+        x, and the force of each inequality: positive where it pushes, negative where it holds back wrongly.
+    """
+    m = quadratic.size
     ties = Ties(m)
-    for u, v, w in zip(
-        quadratic.u[binding].tolist(),
-        quadratic.v[binding].tolist(),
-        quadratic.w[binding].tolist(),
-        strict=True,
+    beside: dict[int, list[tuple[int, int]]] = {}
+    held = np.flatnonzero(binding)
+    for k, u, v, w in zip(
+        held.tolist(), *(end[held].tolist() for end in (quadratic.u, quadratic.v, quadratic.w)), strict=True
     ):
-        ties.tie(v, u, w)
+        if ties.find(u) != ties.find(v):
+            ties.tie(v, u, w)
+            beside.setdefault(u, []).append((v, k))
+            beside.setdefault(v, []).append((u, k))
     root = np.array([ties.find(k) for k in range(m)])
     shift = np.array(ties.shift)
     i, j = root[quadratic.i], root[quadratic.j]
@@ -128,8 +146,30 @@ def _pinned(quadratic: Quadratic, binding: Bool, x: Float64) -> Float64:
         pieces.tie(a, b, 0.0)
     # The smallest node of each connected piece stands still, and so does what is no root of a class.
     fixed = np.array([pieces.find(k) == k for k in range(m)])
-    y: Float64 = settle(i, j, wanted, quadratic.stiffness[loose], fixed, x)[root] + shift
-    return y
+    exact = settle(i, j, wanted, quadratic.stiffness[loose], fixed, x)[root] + shift
+    strain = 2.0 * quadratic.stiffness * (exact[quadratic.j] - exact[quadratic.i] - quadratic.wanted)
+    pull = np.bincount(quadratic.j, strain, m) - np.bincount(quadratic.i, strain, m)
+    return exact, _forces(pull.tolist(), beside, quadratic)
+
+
+def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadratic: Quadratic) -> Float64:
+    """(inequalities,) what holds trees of tied nodes against the pull of springs, leaves first."""
+    force = np.zeros(len(quadratic.u))
+    seen: set[int] = set()
+    for root in sorted(beside):
+        if root in seen:
+            continue
+        seen.add(root)
+        order = [(root, root, -1)]
+        for node, _, _ in order:
+            for to, k in beside[node]:
+                if to not in seen:
+                    seen.add(to)
+                    order.append((to, node, k))
+        for node, towards, k in reversed(order[1:]):
+            force[k] = pull[node] if quadratic.v[k] == node else -pull[node]
+            pull[towards] += pull[node]
+    return force
 
 
 def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | None:
@@ -141,6 +181,7 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     elastic = quadratic.i != quadratic.j
     gi, gj = quadratic.i[elastic], quadratic.j[elastic]
     a, d = quadratic.stiffness[elastic], quadratic.wanted[elastic]
+    a = a / a.max(initial=1e-9)
     rows = np.flatnonzero(quadratic.u != quadratic.v)
     u, v, w = quadratic.u[rows], quadratic.v[rows], quadratic.w[rows]
     # Node 0 stands at 0 and is no unknown, so every column is one lower; the upper triangle is wanted.
@@ -161,21 +202,22 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
         len(rows),
         m - 1,
     )
+    cones = [clarabel.NonnegativeConeT(len(rows))]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     # Close enough to tell what binds from what merely comes near.
     settings.tol_gap_abs = settings.tol_gap_rel = 1e-11
-    solver = clarabel.DefaultSolver(
-        upper, linear, matrix, -w, [clarabel.NonnegativeConeT(len(rows))], settings
-    )
-    solution = solver.solve()
-    # Having come as far as rounding lets it is good enough: what binds is solved again exactly.
-    if str(solution.status) not in ("Solved", "AlmostSolved", "InsufficientProgress"):
-        return None
-    x = np.concatenate([[0.0], solution.x])
-    force, room = np.zeros(len(quadratic.u)), np.ones(len(quadratic.u))
-    force[rows], room[rows] = solution.z, solution.s
-    return x, force, room
+    # Now and then Clarabel's own scaling, which matrices of -1, 0 and 1 do not need, leads it astray; less often
+    # it is the only way.
+    for scaled in (False, True):
+        settings.equilibrate_enable = scaled
+        solution = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings).solve()
+        # Having come as far as rounding lets it is good enough: what binds is solved again exactly.
+        if str(solution.status) in ("Solved", "AlmostSolved", "InsufficientProgress"):
+            force, room = np.zeros(len(quadratic.u)), np.ones(len(quadratic.u))
+            force[rows], room[rows] = solution.z, solution.s
+            return np.concatenate([[0.0], solution.x]), force, room
+    return None
 
 
 class _Sparse:

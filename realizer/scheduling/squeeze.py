@@ -11,7 +11,7 @@ from realizer.arrays import Float64
 from realizer.scheduling.clash import Link
 from realizer.scheduling.convex import Quadratic, kept, optimum
 from realizer.scheduling.groups import Group
-from realizer.scheduling.model import TIGHT, Index, Model
+from realizer.scheduling.model import LOOSE, TIGHT, Index, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 from realizer.scheduling.shapes import Shapes
 
@@ -140,7 +140,8 @@ def _yield_to_stated(model: Model, gaps: Index) -> bool:
             begin = seen.get(int(model.root[p]))
             if begin is not None:
                 stretch = slice(k + begin - first, k + p - first)
-                if 0 <= model.shift[p] - model.shift[begin] < model.least[stretch].sum() - TIGHT:
+                stated = model.shift[p] - model.shift[begin]
+                if -LOOSE <= stated < model.least[stretch].sum() - TIGHT:
                     model.least[stretch] = 0.0
                     changed = True
             seen[int(model.root[p])] = p

@@ -221,6 +221,13 @@ CLOSED: Recipe = (
     [((0, 0), (1, 2), 0.1), ((2, 2), (2, 0), 0.0)],
     [],
 )
+# A length of nothing that is stated, by way of sums that rounding makes a little less than nothing.
+ROUNDED: Recipe = (
+    [([0.1], 0.0, 1.0, False), ([0.2], 0.0, 1.0, True), ([0.1], 0.05, 1.0, False)],
+    [((1, 1), (2, 0), 1.0), ((1, 0), (0, 0), 0.1), ((2, 1), (1, 0), -0.8)],
+    [],
+    [],
+)
 JOINED: Recipe = (
     [([0.1, 1.0, 0.3], 0.0, 100.0, False), ([0.1, 1.0, 2.0], 0.0, 1.0, False), ([1.0], 0.0, 4.0, False)],
     [((2, 1), (0, 1), -1.0)],
@@ -233,6 +240,7 @@ JOINED: Recipe = (
 @given(recipes, st.permutations(range(6)))
 @example(CLOSED, [2, 0, 1, 3, 4, 5])
 @example(JOINED, [2, 1, 0, 3, 4, 5])
+@example(ROUNDED, [0, 1, 2, 3, 4, 5])
 def test_document_order_does_not_matter(recipe: Recipe, everyone: list[int]) -> None:
     order = [b for b in everyone if b < len(recipe[0])]
     one, other = built(recipe), built(recipe, order)
