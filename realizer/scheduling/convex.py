@@ -207,8 +207,8 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     settings.verbose = False
     # Close enough to tell what binds from what merely comes near.
     settings.tol_gap_abs = settings.tol_gap_rel = 1e-11
-    # Now and then Clarabel's own scaling, which matrices of -1, 0 and 1 do not need, leads it astray; less often
-    # it is the only way.
+    # Now and then Clarabel's own scaling, which matrices of -1, 0 and 1 do not need, leads it astray; less
+    # often it is the only way.
     for scaled in (False, True):
         settings.equilibrate_enable = scaled
         solution = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings).solve()
