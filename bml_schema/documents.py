@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import count
 from typing import NamedTuple
@@ -19,12 +20,14 @@ __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
 
 MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
 _MOST_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
+_MOST_RETRIES = 20  # times that a broken document is searched for a good one inside it
 MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
 # What decides where a document begins and ends, and what may hide such marks.
 _MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml\s*>")
+_NEXT = re.compile(r"<(?:[\w.-]+:)?bml(?=[\s/>])")
 _REST_OF_TAG = re.compile(r"""(?:[^<>"']|"[^<"]*"|'[^<']*')*+>""")
 _REST_OF_DOCTYPE = re.compile(r"""(?:[^<>"'\[]|"[^<"]*"|'[^<']*')*+[>\[]""")
 _CLOSERS = {
@@ -107,17 +110,38 @@ def read(
         return
     line = 1
     counted = 0
-    for n, stretch in enumerate(stretches):
+    broken = False  # the stretch before was broken XML: what follows it up to the next document is part of it
+    todo = deque(stretches)
+    retries = _MOST_RETRIES
+    told = 0  # up to here broken XML has been told of
+    for n in count():
+        if not todo:
+            return
+        stretch = todo.popleft()
         line += text.count("\n", counted, stretch.start)
         counted = stretch.start
         if n == most_documents:
             said = f"wanted at most {n} documents in one text; the rest is not read"
             yield BMLError(said, line=line)
             return
+        if broken and stretch.fault and not stretch.tag:
+            continue
         try:
-            yield _block(text, stretch, line, vocabulary, most_bytes, most_behaviours)
+            block = _block(text, stretch, line, vocabulary, most_bytes, most_behaviours)
         except BMLError as wrong:
-            yield wrong
+            broken = isinstance(wrong, BMLSyntaxError)
+            if not (broken and stretch.start < told):
+                yield wrong
+            if broken and not stretch.fault and retries:
+                # A good document may stand inside the broken one, where their end tags happen to match.
+                inner = _NEXT.search(text, stretch.start + len(stretch.tag), stretch.end)
+                if inner is not None:
+                    retries -= 1
+                    told = max(told, stretch.end)
+                    todo.extendleft(reversed(list(_stretches(text, inner.start(), stretch.end))))
+        else:
+            broken = False
+            yield block
 
 
 class _Stretch(NamedTuple):
@@ -137,12 +161,12 @@ class _Mark(NamedTuple):
     end: int
 
 
-def _marks(text: str) -> Iterator[_Mark]:
+def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
     """What decides where documents begin and end; linear in the text whatever it holds."""
     never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
-    here = 0
+    here = first
     for n in count():
-        found = _MARKS.search(text, here)
+        found = _MARKS.search(text, here, last)
         if found is None:
             return
         if n == _MOST_MARKS:
@@ -153,18 +177,18 @@ def _marks(text: str) -> Iterator[_Mark]:
             yield _Mark("close", start, here)
             continue
         if opener not in _CLOSERS:
-            rest = _REST_OF_TAG.match(text, here)
+            rest = _REST_OF_TAG.match(text, here, last)
             here = rest.end() if rest else here
             yield _Mark("whole" if rest and text[here - 2] == "/" else "open", start, here)
             continue
         doctype = opener == "<!DOCTYPE"
         if doctype:
-            rest = _REST_OF_DOCTYPE.match(text, here)
+            rest = _REST_OF_DOCTYPE.match(text, here, last)
             here = rest.end() if rest else here
             if rest is None or text[here - 1] == ">":
                 yield _Mark("doctype", start, here)
                 continue
-        closer = None if opener in never else _CLOSERS[opener].search(text, here)
+        closer = None if opener in never else _CLOSERS[opener].search(text, here, last)
         if closer is None:
             never.add(opener)
         else:
@@ -175,9 +199,10 @@ def _marks(text: str) -> Iterator[_Mark]:
             yield _Mark("skip", start, here)
 
 
-def _stretches(text: str) -> Iterator[_Stretch]:
-    """Documents, and what stands between them that should not, in order."""
-    marks = list(_marks(text))
+def _stretches(text: str, first: int = 0, last: int | None = None) -> Iterator[_Stretch]:
+    """Documents in text[first:last], and what stands between them that should not, in order."""
+    last = len(text) if last is None else last
+    marks = list(_marks(text, first, last))
     ends: dict[int, int] = {}
     opened: list[int] = []
     for n, mark in enumerate(marks):
@@ -189,9 +214,9 @@ def _stretches(text: str) -> Iterator[_Stretch]:
             ends[opened.pop()] = mark.end
     roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
     after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
-    here = 0
+    here = first
     junk = doctype = -1  # where the stretch began that is not told of yet; -1 while there is none
-    for n, mark in enumerate([*marks, _Mark("end", len(text), len(text))]):
+    for n, mark in enumerate([*marks, _Mark("end", last, last)]):
         if mark.start < here:
             continue  # inside a document
         if junk < 0 and (gap := text[here : mark.start].lstrip(_BLANKS)):
@@ -203,7 +228,7 @@ def _stretches(text: str) -> Iterator[_Stretch]:
         here = mark.end
         if mark.kind not in ("open", "whole", "end"):
             continue
-        end = ends.get(n) or after.get(n, len(text))
+        end = ends.get(n) or after.get(n, last)
         if mark.kind == "end":
             if doctype >= 0:
                 yield _Stretch(doctype, here, fault=_NO_DTD)

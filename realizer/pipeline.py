@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,7 +20,7 @@ from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float32, Int16
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
-from realizer.errors import VoiceError
+from realizer.errors import RealizerError, VoiceError
 from realizer.player import Player, Speaking
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Say, Utterance, Voice
@@ -33,6 +34,8 @@ __all__ = ["Realization", "realize", "schedule", "speak"]
 
 # Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
 WINDOW = 10.0  # s
+# More is a mistake (four hours at 25 fps) and would not fit into memory as JSON or film.
+MOST_FRAMES = 360_000
 # Cut-off speech fades this long, so that it does not click.
 CUT = 0.05  # s
 
@@ -163,11 +166,21 @@ def realize(
     Raises:
         VoiceError: the named voice is not installed.
     """
+    from realizer.face import face_name
+
     texts = [documents] if isinstance(documents, str | bytes) else list(documents)
+    if not (math.isfinite(fps) and fps > 0):
+        raise ValueError(f"fps: wanted a number above 0, got {fps}")
     player = Player(scene=scene, seed=seed, idle=idle, language=language)
     schedules, refused = play(texts, player, voice)
     end = player.end
-    times = np.arange(frame_count(end, fps)) / fps
+    count = frame_count(end, fps)
+    if count > MOST_FRAMES:
+        raise RealizerError(
+            f"wanted at most {MOST_FRAMES} frames, got {count} of {end:g} s at {fps:g} fps: "
+            "play less of it, or at a lower rate"
+        )
+    times = np.arange(count) / fps
     characters: dict[str | None, Performance] = {}
     for index, name in enumerate(player.characters):
         step = max(1, int(WINDOW * fps))
@@ -181,7 +194,7 @@ def realize(
     return Realization(
         fps=fps,
         duration=end,
-        face_name=face,
+        face_name=face_name(face),
         characters=characters,
         schedules=tuple(schedules),
         feedback=feedback,
@@ -262,6 +275,8 @@ def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
 
             print(f"realizer: {behaviour}: {error}; going on without sound", file=sys.stderr)
             utterances[behaviour] = SilentVoice().say(say)
+        for warning in utterances[behaviour].warnings:
+            print(f"realizer: {behaviour}: {warning}", file=sys.stderr)
     return utterances
 
 
@@ -299,6 +314,8 @@ def parse_scene(text: str) -> dict[str, Position]:
             x, y, z = (float(v) for v in numbers)
         except (TypeError, ValueError):
             raise ValueError(f"{name}: wanted three numbers x y z in metres, got {list(numbers)}") from None
+        if not all(abs(v) <= 1e4 for v in (x, y, z)):
+            raise ValueError(f"{name}: wanted metres within 10 km, got {x:g} {y:g} {z:g}")
         scene[name] = (x, y, z)
     return scene
 

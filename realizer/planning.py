@@ -54,13 +54,17 @@ def plan(
             where = block.places.get(node.id)
             faults = [Warning(name, fault.type, _at(where, fault.text)) for fault in found]
             dropped = any(fault.fatal for fault in found)
+            if not dropped and kind.say is not None and node.id not in world.utterances:
+                words = _at(where, "speech: no voice could say it")
+                faults, dropped = [Warning(name, "CANNOT_CREATE_BEHAVIOR", words)], True
         if dropped and node.id in block.required:
-            return _failed(block, Warning(block.id, faults[0].type, f"required {node.id}: {faults[0].text}"))
+            return _failed(block, Warning(block.id, faults[0].type, f"{faults[0].text} (required {node.id})"))
         warnings += faults[:1] if dropped else faults
         if not dropped and kind is not None:
             timings[node.id] = kind.timing(node, world)
     schedule = schedule_block(block, timings, outside=outside)
-    schedule = replace(schedule, warnings=(*warnings, *schedule.warnings))
+    warnings += [_placed(block, warning) for warning in schedule.warnings]
+    schedule = replace(schedule, warnings=tuple(warnings))
     if schedule.failed:
         return Plan(schedule, {})
     channels = {
@@ -69,6 +73,12 @@ def plan(
         if node.id in schedule.times
     }
     return Plan(schedule, channels)
+
+
+def _placed(block: Block, warning: Warning) -> Warning:
+    """A warning of the scheduler with the place of the behaviour that it dropped."""
+    place = block.places.get(warning.id.removeprefix(f"{block.id}:"))
+    return replace(warning, text=_at(place, warning.text))
 
 
 def _of_problem(problem: Problem) -> Warning:

@@ -110,7 +110,7 @@ class Player:
 
     def announce(self, block: Block, now: float) -> None:
         """Acknowledge a block: planning has begun. `submit` does it where it was not done before."""
-        if block.id not in self._announced:
+        if block.id not in self._announced and not self._in_use(block):
             self._announced.add(block.id)
             self._outbox.append(acknowledgement(block, self._start_of(block, now)))
 
@@ -129,7 +129,7 @@ class Player:
         self.announce(block, now)
         self._announced.discard(block.id)
         character = self._character(block.character_id)
-        if block.composition != "REPLACE" and any(p.block.id == block.id for p in self._alive()):
+        if self._in_use(block):
             text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
             return self._refused(block, Warning(block.id, "PARSING_FAILURE", text), now)
         start = self._start_of(block, now)
@@ -317,6 +317,10 @@ class Player:
             except KeyError:
                 time = None
         return None if time is None else schedule.start + time + ref.offset - start
+
+    def _in_use(self, block: Block) -> bool:
+        """Its id belongs to a block that plays or waits, and it is not there to replace that."""
+        return block.composition != "REPLACE" and any(p.block.id == block.id for p in self._alive())
 
     def _refused(self, block: Block, warning: Warning, now: float) -> Schedule:
         self.refuse(warning, now, block.character_id)

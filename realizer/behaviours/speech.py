@@ -13,7 +13,7 @@ from realizer.animation.channel import Channel
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import MOST_TEXT, Say
 
 __all__ = ["KINDS"]
 
@@ -33,7 +33,7 @@ class Spoken:
 def say(node: Speech, world: World) -> Say | None:
     """The description of highest priority that is SSML, or else the text with its syncs as marks."""
     spoken = _spoken(node)
-    if spoken is None:
+    if spoken is None or len(spoken.ssml) > MOST_TEXT:
         return None
     return Say(spoken.ssml, spoken.marks, language=spoken.language or world.language)
 
@@ -71,12 +71,18 @@ def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
 
 
 def check(node: Speech, world: World) -> tuple[Fault, ...]:
-    """Nothing to say is fatal."""
-    if _spoken(node) is not None:
+    """Nothing to say is fatal, and more than a voice takes."""
+    spoken = _spoken(node)
+    if spoken is None:
+        words = f"speech: wanted <text> or a description of type {SSML}, got none"
+    elif len(spoken.ssml) > MOST_TEXT:
+        words = (
+            f"speech: wanted a text of at most {MOST_TEXT} characters, got {len(spoken.ssml)}; "
+            "say it in several behaviours"
+        )
+    else:
         return ()
-    return (
-        Fault("CANNOT_CREATE_BEHAVIOR", f"speech: wanted <text> or a description of type {SSML}, got none"),
-    )
+    return (Fault("CANNOT_CREATE_BEHAVIOR", words),)
 
 
 def _spoken(node: Speech) -> Spoken | None:

@@ -67,3 +67,8 @@ def main() -> None:
         # The reader of our output went away (`realizer ... | head`): that is not our fault.
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        click.echo(
+            f"realizer: {error.filename or ''}: {error.strerror or error}".replace(" : ", " "), err=True
+        )
+        sys.exit(3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable
@@ -13,6 +14,7 @@ import click
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from realizer.behaviours.kind import Position
     from realizer.scheduling.timing import Warning
+    from realizer.settings import Settings
 
 __all__: list[str] = []
 
@@ -21,6 +23,30 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 documents = click.argument(
     "documents", nargs=-1, required=True, metavar="DOC...", type=click.Path(allow_dash=True)
 )
+
+
+class Number(click.FloatRange):
+    """A finite number in a range; click lets NaN through."""
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> float:
+        number: float = super().convert(value, parameter, context)
+        if not math.isfinite(number):
+            self.fail(f"wanted a finite number, got {value}", parameter, context)
+        return number
+
+
+def settings(**flags: Any) -> Settings:
+    """What flags, REALIZER_* variables and defaults say together.
+
+    Raises:
+        click.UsageError: a wrong value, and where it came from.
+    """
+    from realizer.settings import Settings, SettingsError
+
+    try:
+        return Settings.read(flags)
+    except SettingsError as error:
+        raise click.UsageError(str(error)) from None
 
 
 def playing(command: Command) -> Command:
@@ -51,7 +77,7 @@ def read_documents(names: Iterable[str]) -> list[bytes]:
     return texts
 
 
-def read_scene(path: str | None) -> dict[str, Position] | None:
+def read_scene(path: str | Path | None) -> dict[str, Position] | None:
     from realizer.pipeline import parse_scene
 
     if path is None:

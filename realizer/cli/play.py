@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from realizer.cli import options
+
+if TYPE_CHECKING:
+    from realizer.scheduling.timing import Schedule
 
 __all__: list[str] = []
 
@@ -19,14 +22,14 @@ __all__: list[str] = []
 @click.option(
     "-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding. Default: JSON here."
 )
-@click.option("--fps", default=25.0, show_default=True, type=click.FloatRange(0, 240, min_open=True))
+@click.option("--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.  [default: 25]")
 @click.option(
-    "--at", type=click.FloatRange(0), metavar="SECONDS", help="With .png: the picture of that instant."
+    "--at", type=options.Number(0), metavar="SECONDS", help="With .png: the picture of that instant."
 )
-@click.option("--face", default="default", show_default=True, help="A face of `realizer faces list`.")
+@click.option("--face", metavar="NAME", help="A face of `realizer faces list`.")
 @click.option("--size", default="512x512", show_default=True, callback=options.size, help="Of pictures.")
 @click.option("--camera", default="front", show_default=True, help="front, three-quarter, profile or close.")
-@click.option("--seed", default=0, show_default=True, help="Of idle motion: the same seed, the same bytes.")
+@click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]")
 @click.option("--no-idle", is_flag=True, help="No blinks, no small head motion.")
 @options.playing
 @click.pass_context
@@ -34,12 +37,12 @@ def realize(
     context: click.Context,
     documents: tuple[str, ...],
     output: str | None,
-    fps: float,
+    fps: float | None,
     at: float | None,
-    face: str,
+    face: str | None,
     size: tuple[int, int],
     camera: str,
-    seed: int,
+    seed: int | None,
     no_idle: bool,
     voice: str | None,
     scene: str | None,
@@ -59,31 +62,47 @@ def realize(
             writer = output_for(Path(output))
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="-o") from None
-    texts = options.read_documents(documents)
+    chosen = options.settings(
+        face=face, fps=fps, voice=voice, scene=scene, seed=seed, idle=False if no_idle else None
+    )
     realization = run(
-        texts,
-        face=face,
-        fps=fps,
-        voice=voice,
-        scene=options.read_scene(scene),
-        seed=seed,
-        idle=not no_idle,
+        options.read_documents(documents),
+        face=chosen.face,
+        fps=chosen.fps,
+        voice=chosen.voice,
+        scene=options.read_scene(chosen.scene),
+        seed=chosen.seed,
+        idle=chosen.idle,
+        language=chosen.language,
     )
     if realization.speaking:
-        options.tell_silence(voice)
+        options.tell_silence(chosen.voice)
     options.tell(realization.warnings)
     if writer is None:
         json.dump(realization.to_json(), sys.stdout)
         sys.stdout.write("\n")
+        sys.stdout.flush()
     elif output is not None:
         try:
             writer.write(realization, Path(output), Drawing(size=size, camera=camera, at=at))
         except OSError as error:
             raise click.UsageError(f"{output}: {error.strerror or error}") from None
         if not context.obj["quiet"]:
-            words = f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {fps:g} fps"
+            words = (
+                f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {chosen.fps:g} fps"
+            )
             click.echo(words, err=True)
-    return 1 if realization.refused or (strict and realization.warnings) else 0
+    return 1 if realization.refused or (strict and any(map(dropped, realization.schedules))) else 0
+
+
+def dropped(planned: Schedule) -> bool:
+    """Whether a behaviour is missing; a warning about one that plays, or a constraint, does not count."""
+    prefix = f"{planned.block}:"
+    return any(
+        w.id.startswith(prefix)
+        and (w.type == "PARSING_FAILURE" or w.id.removeprefix(prefix) not in planned.times)
+        for w in planned.warnings
+    )
 
 
 @click.command()
@@ -97,10 +116,11 @@ def schedule(
     from realizer.pipeline import play
     from realizer.player import Player
 
-    player = Player(scene=options.read_scene(scene), idle=False)
-    schedules, refused = play(options.read_documents(documents), player, voice)
+    chosen = options.settings(voice=voice, scene=scene)
+    player = Player(scene=options.read_scene(chosen.scene), idle=False, language=chosen.language)
+    schedules, refused = play(options.read_documents(documents), player, chosen.voice)
     if player.speech():
-        options.tell_silence(voice)
+        options.tell_silence(chosen.voice)
     options.tell(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
         options.tell(planned.warnings)
@@ -114,8 +134,7 @@ def schedule(
             for behaviour, times in planned.behaviours.items():
                 points = "  ".join(f"{name} {time:.3f}" for name, time in times.items())
                 click.echo(f"  {behaviour:<{width}}  {points}")
-    dropped = any(s.warnings for s in schedules)
-    return 1 if refused or (strict and dropped) else 0
+    return 1 if refused or (strict and any(map(dropped, schedules))) else 0
 
 
 @click.command()

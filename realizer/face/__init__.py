@@ -3,7 +3,7 @@
 from realizer.face.check import check_face
 from realizer.face.deform import deform
 from realizer.face.glb import to_glb
-from realizer.face.load import FaceInfo, list_faces, load_face
+from realizer.face.load import FaceInfo, face_name, list_faces, load_face
 from realizer.face.model import Face, Fapu
 from realizer.face.surface import face_scale, normals, quantise
 
@@ -13,6 +13,7 @@ __all__ = [
     "Fapu",
     "check_face",
     "deform",
+    "face_name",
     "face_scale",
     "list_faces",
     "load_face",

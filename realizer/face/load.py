@@ -18,11 +18,16 @@ from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.model import Face
 
-__all__ = ["FaceInfo", "list_faces", "load_face"]
+__all__ = ["FaceInfo", "face_name", "list_faces", "load_face"]
 
 DEFAULT = "ada"  # what the name "default" means
 VARIABLE = "REALIZER_FACES"
 MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}  # array -> dimensions
+
+
+def face_name(name: str) -> str:
+    """The name of the folder that a name stands for: "default" is one of them."""
+    return DEFAULT if name == "default" else name
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +74,7 @@ def folder_of(name: str, directory: Path | str | None = None) -> Path:
     Raises:
         FaceError: none of that name.
     """
-    if name == "default":
-        name = DEFAULT
+    name = face_name(name)
     if not name or Path(name).name != name:
         raise FaceError(f"face: wanted a face's name, got {name!r}")
     places = list(_places(directory))

@@ -71,6 +71,11 @@ class Preparation:
                 behaviour, _ = waiting.says.pop(speak)
                 waiting.utterances[behaviour] = utterance
 
+    def unspoken(self, speak: int) -> None:
+        """No voice can say it: the block goes on without, its speech is dropped when it is planned."""
+        for waiting in self.waiting:
+            waiting.says.pop(speak, None)
+
     def said(self, speak: int) -> Say | None:
         """What a speak id asked for; None where nobody waits for it."""
         return next((w.says[speak][1] for w in self.waiting if speak in w.says), None)

@@ -52,7 +52,7 @@ async def serve(settings: Settings | None = None) -> None:
     for number in signals:
         loop.add_signal_handler(number, asked.set)
     try:
-        print(f"listening on {server.url}, page {server.page}", flush=True)
+        print(f"listening on {server.url}", f"page at {server.page}", sep="\n", flush=True)
         await asked.wait()
         for number in signals:  # a second one ends at once
             loop.remove_signal_handler(number)
@@ -107,6 +107,7 @@ class Server:
         Raises:
             OSError: the address cannot be had.
             ValueError: the scene file is not a scene.
+            FaceError: no such face.
         """
         settings = self.settings
         self._loop = asyncio.get_running_loop()
@@ -114,6 +115,10 @@ class Server:
             from realizer.pipeline import parse_scene
 
             self._scene = parse_scene(settings.scene.read_text("utf-8"))
+        # A face that is not there is said before the door opens.
+        from realizer.face import load_face
+
+        await self._loop.run_in_executor(None, load_face, settings.face)
         self._capabilities = await self._loop.run_in_executor(None, _capabilities)
         self._socket = await listen(
             self._handle,

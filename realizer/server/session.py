@@ -13,7 +13,7 @@ from bml_schema import Block, BMLError, read
 from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Position
-from realizer.errors import FaceError, RealizerError
+from realizer.errors import FaceError, RealizerError, VoiceError
 from realizer.pipeline import warning_of
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
@@ -344,7 +344,10 @@ class Session:
         say = self._preparation.said(speak)
         if say is not None:
             self._voice_fault = fault
-            self._preparation.spoken(speak, SilentVoice().say(say))
+            try:
+                self._preparation.spoken(speak, SilentVoice().say(say))
+            except VoiceError:
+                self._preparation.unspoken(speak)
 
     # feedback -----------------------------------------------------------------------------------
 
@@ -558,7 +561,9 @@ class Session:
         return self.player.character_index(character)
 
     def _face_name(self, index: int) -> str:
-        return self._faces.get(index, self.settings.face)
+        from realizer.face import face_name
+
+        return face_name(self._faces.get(index, self.settings.face))
 
     def _face(self, index: int) -> Face:
         return self._load_face(self._face_name(index))

@@ -46,7 +46,11 @@ class Studio:
     def draw(self, order: Draw) -> bytes | RealizerError:
         """A JPEG; or why there is none."""
         try:
-            return self._renderer(order).jpeg(order.faps, order.quality)
+            try:
+                return self._renderer(order).jpeg(order.faps, order.quality)
+            except RenderError:
+                # A drawing process that died is started anew by the next call; one that cannot fails again.
+                return self._renderer(order).jpeg(order.faps, order.quality)
         except RealizerError as error:
             return error
         except Exception as error:

@@ -10,11 +10,10 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
 from realizer.errors import VoiceError
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import MOST_TEXT, Say
 
-__all__ = ["MOST_TEXT", "Break", "Mark", "Script", "Tag", "read_script"]
+__all__ = ["Break", "Mark", "Script", "Tag", "read_script"]
 
-MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
 LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice's
 LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
 

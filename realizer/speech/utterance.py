@@ -8,7 +8,9 @@ from typing import Protocol
 
 from realizer.arrays import Int16
 
-__all__ = ["Phoneme", "Say", "Utterance", "Voice", "Word"]
+__all__ = ["MOST_TEXT", "Phoneme", "Say", "Utterance", "Voice", "Word"]
+
+MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
 
 
 @dataclass(frozen=True, slots=True)

@@ -300,3 +300,17 @@ def test_a_mutated_document_gives_blocks_and_errors_and_nothing_else(data: st.Da
 @given(st.binary(max_size=60) | st.lists(st.sampled_from(WORDS)).map(lambda w: "".join(w).encode("utf-16")))
 def test_any_bytes_give_blocks_and_errors_and_nothing_else(data: bytes) -> None:
     assert all(isinstance(found, Block | BMLError) for found in read(data))
+
+
+@pytest.mark.parametrize(
+    ("text", "read_as"),
+    [
+        ('<bml id="a"/><bml id="x"><head lexeme=</bml> junk <bml id="b"/>', ["a", None, "b"]),
+        ('<bml id="a"/><bml id="x"><head <<< &<bml id="b"><wait id="w"/></bml></bml> rest', ["a", None, "b"]),
+        ('<bml id="x"><bml id="y"><broken</bml></bml><bml id="z"/>', [None, "z"]),
+    ],
+)
+def test_a_broken_stretch_is_told_of_once_and_hides_no_good_document(
+    text: str, read_as: list[object]
+) -> None:
+    assert [x.id if isinstance(x, Block) else None for x in read(text)] == read_as

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -121,3 +122,57 @@ def test_lists_and_doctor_answer() -> None:
     assert doctor.returncode == 0
     for what in ("GL", "FFmpeg", "silent", "face", "page"):
         assert what in doctor.stdout
+
+
+@pytest.mark.parametrize("flags", [["--fps", "nan"], ["--at", "nan", "-o", "x.png"], ["--size", "0x9"]])
+def test_numbers_that_are_none_are_wrong_usage(flags: list[str]) -> None:
+    done = run("realize", "-", *flags, stdin=GOOD)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_settings_come_from_the_environment_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("REALIZER_FPS", "10")
+    assert json.loads(run("realize", "-", stdin=GOOD).stdout)["fps"] == 10
+    assert json.loads(run("realize", "-", "--fps", "50", stdin=GOOD).stdout)["fps"] == 50
+
+
+def test_a_text_too_long_for_a_voice_is_dropped_and_the_rest_plays() -> None:
+    long = f'<bml id="b"><speech id="s"><text>{"la " * 8000}</text></speech><head id="n" lexeme="NOD"/></bml>'
+    done = run("realize", "-", "--voice", "silent", stdin=long)
+    assert done.returncode == 0
+    played = json.loads(done.stdout)
+    assert [w["id"] for w in played["warnings"]] == ["b:s"]
+    assert list(played["schedule"][0]["behaviours"]) == ["n"]
+
+
+def test_a_document_of_a_day_says_what_is_too_much() -> None:
+    done = run("realize", "-", stdin='<bml id="b"><wait id="w" duration="86400"/></bml>')
+    assert done.returncode == 3
+    assert "at most" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_port_in_use_is_said_in_a_sentence() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        done = run("serve", "--port", str(taken.getsockname()[1]))
+    assert done.returncode == 3
+    assert "in use" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_serve_refuses_a_face_that_is_not_there() -> None:
+    done = run("serve", "--port", "0", "--face", "nobody")
+    assert done.returncode == 3
+    assert "nobody" in done.stderr
+
+
+def test_a_target_that_is_not_there_is_no_dropped_behaviour(tmp_path: Path) -> None:
+    scene = tmp_path / "scene"
+    scene.write_text("cup 0.2 0 0.5\n")
+    gaze = '<bml id="b"><gaze id="g" target="cap"/></bml>'
+    done = run("schedule", "-", "--strict", "--scene", str(scene), stdin=gaze)
+    assert done.returncode == 0
+    assert "NO_SUCH_TARGET" in done.stderr
