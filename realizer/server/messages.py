@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
 __all__ = [
     "STREAMS",
@@ -93,10 +93,30 @@ class Point(Message):
 
 
 class SceneMessage(Message):
-    """Declares where targets are; None forgets the scene."""
+    """Declares where targets are; None forgets the scene.
+
+    Objects come as {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
+    """
 
     type: Literal["scene"]
     objects: dict[str, Point] | None = Field(max_length=10_000)
+
+    @field_validator("objects", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        if isinstance(value, list) and all(isinstance(o, dict) and ("id" in o or "name" in o) for o in value):
+            value = {
+                str(o.get("id", o.get("name"))): {k: v for k, v in o.items() if k not in ("id", "name")}
+                for o in value
+            }
+        if isinstance(value, dict):
+            return {
+                name: dict(zip("xyz", point, strict=True))
+                if isinstance(point, list) and len(point) == 3
+                else point
+                for name, point in value.items()
+            }
+        return value
 
 
 class CharacterMessage(Message):
@@ -112,8 +132,12 @@ class SetMessage(Message):
     """Holds AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go of one."""
 
     type: Literal["set"]
-    aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] = Field({}, description='"12" or "12L"')
-    faps: dict[str, Annotated[float, Field(ge=-1e5, le=1e5)] | None] = Field({}, description="name or number")
+    aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] = Field(
+        {}, validation_alias=AliasChoices("aus", "au"), description='"12" or "12L"'
+    )
+    faps: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)] | None] = Field(
+        {}, validation_alias=AliasChoices("faps", "fap"), description="name or number"
+    )
     character: str | None = Field(None, max_length=256)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,6 +12,7 @@ from realizer.server.messages import (
     STREAMS,
     SUPPORTED,
     ErrorMessage,
+    SceneMessage,
     Subscribe,
     Welcome,
     parse_control,
@@ -75,3 +78,18 @@ def test_replies_leave_out_what_they_do_not_say() -> None:
     assert text == '{"type":"error","code":"x","message":"y"}'
     welcome = Welcome(session="s", time=0.5, seq=0, capabilities={}, limits={}).text()
     assert '"version":1' in welcome
+
+
+@pytest.mark.parametrize(
+    "objects",
+    [
+        {"cup": {"x": 0.1, "y": 0, "z": 0.5}},
+        {"cup": [0.1, 0, 0.5]},
+        [{"id": "cup", "x": 0.1, "y": 0, "z": 0.5}],
+    ],
+)
+def test_a_scene_may_be_written_in_any_of_three_ways(objects: object) -> None:
+    message = parse_control(json.dumps({"type": "scene", "objects": objects}))
+    assert isinstance(message, SceneMessage)
+    assert message.objects is not None
+    assert (message.objects["cup"].x, message.objects["cup"].z) == (0.1, 0.5)
