@@ -64,9 +64,7 @@ async def main() -> None:
         print(f"ms, median of {ROUNDS}; a frame waits for its time: {1000 / FPS / 2:.0f} ms on average")
         for name, body in DOCUMENTS.items():
             first, planned, shown = map(statistics.median, await measure(url, body))
-            print(
-                f"{name:14} first feedback {first:5.1f}   block start {planned:5.1f}   frame {shown:5.1f}"
-            )
+            print(f"{name:14} first feedback {first:5.1f}   block start {planned:5.1f}   frame {shown:5.1f}")
     finally:
         service.terminate()
         service.wait(10)
