@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.errors import RenderError, VoiceError
+from realizer.server.feedback_log import FeedbackLog
 from realizer.server.wire import FrameKind
 
 from .conftest import NOD, RATE, TALK, Driver, spoken
@@ -422,7 +423,7 @@ def test_a_client_that_comes_back_gets_what_it_missed() -> None:
     driver.run(0.2)
     driver.leave(1)
     driver.run(10)
-    whole = driver.session._seq
+    whole = driver.session.log.newest
     again = driver.join(2, seen=2)
     assert [f.seq for f in again.feedback] == list(range(3, whole + 1))
     assert again.ids[-1] == "b:end"
@@ -439,7 +440,7 @@ def test_hello_with_seen_sends_what_followed(driver) -> None:
 
 
 def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
-    monkeypatch.setattr(driver.session, "_log", type(driver.session._log)(maxlen=5))
+    monkeypatch.setattr(driver.session, "log", FeedbackLog(5))
     driver.send(NOD.format("b"))
     driver.run(10)
     viewer = driver.join(2, seen=2)

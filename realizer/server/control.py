@@ -1,0 +1,217 @@
+"""Control messages: what each of them does to a session, and what it is answered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from realizer.animation.targets import AU_NAMES
+from realizer.errors import FaceError
+from realizer.server.connection import Connection, FrameSubscription, SoundSubscription, Subscription
+from realizer.server.messages import (
+    PROTOCOL,
+    STREAMS,
+    CharacterMessage,
+    Control,
+    ErrorMessage,
+    Hello,
+    Ping,
+    Pong,
+    SceneMessage,
+    SetMessage,
+    StateMessage,
+    StateQuery,
+    Stop,
+    Subscribe,
+    Subscribed,
+    Unsubscribe,
+)
+from realizer.tables import faps
+
+if TYPE_CHECKING:
+    from realizer.server.session import Session
+
+__all__: list[str] = []
+
+# The index of a character is one byte on the wire; sixteen faces in one session are a crowd.
+MAX_CHARACTERS = 16
+
+
+def follow(session: Session, connection: Connection, message: Control, t: float) -> None:
+    """Do what a control message asks; one that cannot be followed is answered by an error alone.
+
+    Args:
+        t: seconds on the session clock.
+    """
+    try:
+        match message:
+            case Hello():
+                _hello(session, connection, message, t)
+            case Subscribe():
+                _subscribe(session, connection, message, t)
+            case Unsubscribe():
+                if message.stream == "feedback":
+                    connection.feedback = False
+                connection.subscriptions.pop((message.stream, message.character), None)
+            case SceneMessage():
+                session.player.set_scene(
+                    None
+                    if message.objects is None
+                    else {name: (p.x, p.y, p.z) for name, p in message.objects.items()}
+                )
+            case CharacterMessage():
+                _character(session, message)
+            case SetMessage():
+                _set(session, message, t)
+            case Stop():
+                wanted = None if message.blocks is None else set(message.blocks)
+                waiting = session.preparation.waiting
+                session.withdraw([w for w in waiting if wanted is None or w.block.id in wanted], t)
+                session.player.stop(t, wanted)
+            case StateQuery():
+                session.reply(connection.id, _state(session, connection, t))
+            case Ping():
+                session.reply(connection.id, Pong(id=message.id, time=t))
+    except Wrong as error:
+        where = f"{message.type}.{error.where}"
+        session.reply(connection.id, ErrorMessage(code="invalid", message=str(error), where=where))
+    except FaceError as error:
+        where = f"{message.type}.face"
+        session.reply(connection.id, ErrorMessage(code="face", message=str(error), where=where))
+
+
+def _hello(session: Session, connection: Connection, message: Hello, t: float) -> None:
+    if message.version != PROTOCOL:
+        raise Wrong("version", f"wanted protocol version {PROTOCOL}, got {message.version}")
+    if message.session not in (None, session.id):
+        assert message.session is not None
+        session.move(connection.id, message.session, message.seen)
+        return
+    session.welcome(connection.id, t + session.opened)
+    if message.seen is not None:
+        session.resume(connection.id, message.seen)
+
+
+def _subscribe(session: Session, connection: Connection, message: Subscribe, t: float) -> None:
+    stream = message.stream
+    encoding = message.encoding or STREAMS[stream][0]
+    if encoding not in STREAMS[stream]:
+        raise Wrong("encoding", f"wanted {' or '.join(STREAMS[stream])} for {stream}, got {encoding}")
+    if stream == "feedback":
+        connection.feedback = True
+        session.reply(connection.id, Subscribed(stream=stream, encoding=encoding))
+        return
+    index = index_of(session, message.character)
+    fps = message.fps or session.settings.fps
+    told: dict[str, Any] = {"stream": stream, "encoding": encoding, "index": index}
+    old = connection.subscriptions.get((stream, message.character))
+    subscription: Subscription
+    if stream == "audio":
+        one = None if message.character is None else index
+        subscription = session.broadcast.sound(one, message.rate, t)
+        if isinstance(old, SoundSubscription) and old.sound is subscription.sound:
+            subscription = old  # what was sent ahead is not sent again
+        told |= {"rate": message.rate, "frame": subscription.next, "fps": 50.0}
+    elif stream == "video":
+        _check_picture(session, message)
+        subscription = session.broadcast.pictures(
+            index, fps, message.size, message.camera, message.quality, t
+        )
+        told |= {"fps": fps, "frame": subscription.next, "size": message.size}
+        told |= {"face": session.face_name(index), "media_type": "image/jpeg"}
+    else:
+        if stream == "mesh":
+            told |= _mesh_of(session, index)
+        name = message.character
+        subscription = session.broadcast.frames(stream, encoding, index, name, fps, t)
+        if isinstance(old, FrameSubscription) and old.timeline is subscription.timeline:
+            subscription.next = max(subscription.next, old.next)  # no frame twice
+        told |= {"fps": fps, "frame": subscription.next}
+        if stream == "fap":
+            told["names"] = [row.name for row in faps()]
+        elif stream == "au":
+            told["names"] = list(AU_NAMES())
+    connection.subscriptions[stream, message.character] = subscription
+    session.reply(connection.id, Subscribed(character=message.character, **told))
+
+
+def _check_picture(session: Session, message: Subscribe) -> None:
+    largest = session.settings.max_size
+    if not all(16 <= side <= largest for side in message.size):
+        raise Wrong("size", f"wanted sides of 16..{largest} pixels, got {list(message.size)}")
+
+
+def _mesh_of(session: Session, index: int) -> dict[str, Any]:
+    from realizer.face import face_scale
+
+    face = session.face(index)
+    scale, offset = face_scale(face)
+    return {
+        "face": session.face_name(index),
+        "vertices": len(face.vertices),
+        "scale": float(scale),
+        "offset": [float(v) for v in offset],
+    }
+
+
+def _character(session: Session, message: CharacterMessage) -> None:
+    if message.face is not None:
+        session.load_face(message.face)
+    index = index_of(session, message.id)
+    if message.face is not None:
+        session.faces[index] = message.face
+        session.broadcast.face_changed(index)
+    if message.voice is not None:
+        session.voices[index] = message.voice
+
+
+def _set(session: Session, message: SetMessage, t: float) -> None:
+    rows = faps()
+    values: dict[str, float | None] = {}
+    for name, value in message.aus.items():
+        names = [n for n in (name, f"{name}L", f"{name}R") if n in AU_NAMES()]
+        if not names:
+            raise Wrong("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
+        values |= dict.fromkeys(names, value)
+    for name, value in message.faps.items():
+        if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
+            name = rows[int(name) - 1].name
+        if name not in [row.name for row in rows[2:]]:
+            raise Wrong("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
+        values[name] = value
+    session.player.set_direct(values, t, index_of(session, message.character))
+
+
+def _state(session: Session, connection: Connection, t: float) -> StateMessage:
+    state = session.player.state(t)
+    preparing = [
+        {"id": w.block.id, "character": w.block.character_id, "status": "IN_PREP"}
+        for w in session.preparation.waiting
+    ]
+    voice: dict[str, Any] = {"name": session.settings.voice}
+    if session.voice_fault is not None:
+        voice["fault"] = session.voice_fault
+    return StateMessage(
+        session=session.id,
+        time=t,
+        blocks=[*state["blocks"], *preparing],
+        characters=state["characters"],
+        voice=voice,
+        connections=len(session.connections),
+        dropped=connection.dropped,
+    )
+
+
+def index_of(session: Session, character: str | None) -> int:
+    """Where a character stands in the session; it is added where it is new."""
+    known = session.player.characters
+    if character not in (None, *known) and len(known) >= MAX_CHARACTERS:
+        raise Wrong("character", f"wanted at most {MAX_CHARACTERS} characters in a session")
+    return session.player.character_index(character)
+
+
+class Wrong(Exception):
+    """A control message whose field `where` cannot be followed."""
+
+    def __init__(self, where: str, text: str) -> None:
+        super().__init__(text)
+        self.where = where

@@ -1,0 +1,39 @@
+"""Feedback in, numbered XML out: what a session keeps for clients that come back."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from bml_schema import Feedback
+
+__all__: list[str] = []
+
+
+class FeedbackLog:
+    """The newest messages of a session, each with its `seq` 1, 2, ...
+
+    Args:
+        keep: how many are kept.
+
+    Attributes:
+        newest: seq of the last message, 0 while there is none.
+    """
+
+    def __init__(self, keep: int) -> None:
+        self.newest = 0
+        self._kept: deque[str] = deque(maxlen=keep)
+
+    @property
+    def first(self) -> int:
+        """Seq of the oldest message that is kept; of the next one where none is."""
+        return self.newest - len(self._kept) + 1
+
+    def add(self, feedback: Feedback) -> None:
+        """Number a message and keep it."""
+        self.newest += 1
+        self._kept.append(feedback.to_xml(self.newest))
+
+    def since(self, seq: int) -> list[str]:
+        """The kept messages from `seq` on, in order."""
+        skipped = max(0, seq - self.first)
+        return [text for n, text in enumerate(self._kept) if n >= skipped]
