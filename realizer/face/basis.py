@@ -10,6 +10,7 @@ import numpy as np
 
 from realizer.arrays import Float32, Int32
 from realizer.errors import FaceError
+from realizer.face.archive import read_arrays
 from realizer.face.model import Fapu
 from realizer.tables import faps
 
@@ -56,8 +57,6 @@ def basis_from(
         FaceError: a missing array, an index out of range, or a value that is not finite.
     """
     from scipy.sparse import csr_matrix
-
-    from realizer.face.load import read_arrays  # load reads the folder and comes back for its basis
 
     stored = read_arrays(path, ARRAYS)
     n = len(vertices)

@@ -19,7 +19,8 @@ from realizer.errors import FaceError
 from realizer.face import head, hm08, paint, parts
 from realizer.face.basis import pack
 from realizer.face.features import Point, write_features
-from realizer.face.fields import Ground, face_fields
+from realizer.face.fields import face_fields
+from realizer.face.ground import Ground
 from realizer.face.lids import Lid
 from realizer.face.lips import close_lips
 from realizer.face.parts import Part, smooth

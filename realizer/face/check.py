@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from realizer.errors import FaceError
+from realizer.face.archive import read_arrays
 from realizer.face.basis import ARRAYS
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
-from realizer.face.load import MESH, folder_of, load_face, read_arrays, read_head
+from realizer.face.load import MESH, folder_of, load_face, read_head
 from realizer.face.model import Face
 from realizer.tables import faps
 

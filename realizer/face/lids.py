@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from realizer.arrays import Float64
+from realizer.face.ground import FORWARD, UP, Ground, scaled
 from realizer.face.parts import smooth
-
-if TYPE_CHECKING:
-    from realizer.face.fields import Ground
 
 __all__: list[str] = []
 
@@ -73,8 +69,6 @@ class Lid:
 
 def lid_fields(ground: Ground) -> dict[int, Float64]:
     """Fields of FAPs 19-22, and what 27 and 28 do to the lids; `deform` pushes them over the balls."""
-    from realizer.face.fields import FORWARD, UP, scaled
-
     out = {}
     for side, numbers, names in ((1, (19, 21), ("3.1", "3.3")), (-1, (20, 22), ("3.2", "3.4"))):
         lid = Lid(ground, side)

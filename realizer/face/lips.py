@@ -6,15 +6,13 @@ corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60)
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from realizer.arrays import Bool, Float64
+from realizer.face.ground import FORWARD, LEFT, UP, Ground, scaled
 from realizer.face.parts import smooth
-
-if TYPE_CHECKING:
-    from realizer.face.fields import Ground
 
 __all__: list[str] = []
 
@@ -179,8 +177,6 @@ def close_lips(ground: Ground) -> Float64:
 
 def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     """Fields of FAPs 4-13, 16-18 and 51-60."""
-    from realizer.face.fields import FORWARD, UP, scaled
-
     at, points = ground.at, ground.points
     knots = hats(lips.u)
     in_front = ground.body & (at[:, 2] > -0.03)
@@ -221,8 +217,6 @@ def _corners(
     ground: Ground, lips: Lips, left: Float64, right: Float64, inner: Float64, outer: Float64
 ) -> dict[int, Float64]:
     """FAPs 6, 7, 12, 13 (inner) and 53, 54, 59, 60 (outer): splines on the lips, CC0 shapes in the cheeks."""
-    from realizer.face.fields import LEFT, UP, scaled
-
     at, points, out = ground.at, ground.points, {}
     in_front = ground.body & (at[:, 2] > -0.06)
     # From the lips outwards the spline hands over to the shape of the cheek.

@@ -14,6 +14,7 @@ import numpy as np
 
 from realizer.arrays import Float32
 from realizer.errors import FaceError
+from realizer.face.archive import read_arrays
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.model import Face
@@ -104,30 +105,6 @@ def read_head(folder: Path) -> dict[str, Any]:
         if not isinstance(head.get(key), kind):
             raise FaceError(f"{path}: wanted {key} = a {kind.__name__}, got {head.get(key)!r}")
     return head
-
-
-def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
-    """The arrays of an .npz file.
-
-    Args:
-        wanted: name -> number of dimensions.
-
-    Raises:
-        FaceError: no such file, a missing array, or one of another shape.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except FileNotFoundError:
-        raise FaceError(f"{path}: wanted this file, found none; build the face again") from None
-    except (OSError, ValueError) as error:
-        raise FaceError(f"{path}: {error}; build the face again") from None
-    for name, dimensions in wanted.items():
-        if name not in arrays:
-            raise FaceError(f"{path}: wanted an array {name!r}, found {', '.join(sorted(arrays))}")
-        if arrays[name].ndim != dimensions:
-            raise FaceError(f"{path}: {name}: wanted {dimensions} dimensions, got {arrays[name].shape}")
-    return arrays
 
 
 def _places(directory: Path | str | None) -> Iterator[Path]:

@@ -43,7 +43,7 @@ class Face:
         occlusion: (n,) float32, 0 dark .. 1 open: baked ambient occlusion.
         gloss: (n,) float32, 0..1: eyes, lips, teeth shine.
         parts: name -> (first, last + 1) vertex range: skin, left_eye, right_eye, upper_teeth, lower_teeth,
-            tongue, brows, hair.
+            tongue, brows, lashes, hair, shirt; a face may leave some out.
         feature_points: "2.1" -> index of the vertex nearest to the MPEG-4 feature point.
         points: "2.1" -> (3,) float32 metres, the feature point itself (may lie inside the head: 7.1, 3.5).
         fapu: measured from the feature points.

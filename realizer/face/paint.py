@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from realizer.arrays import Float64, Int32
+from realizer.face.ground import Ground
+from realizer.face.lips import Lips
 from realizer.face.parts import smooth
-
-if TYPE_CHECKING:
-    from realizer.face.fields import Ground
-    from realizer.face.lips import Lips
 
 __all__: list[str] = []
 
