@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from bml_schema import Feedback
 
 __all__: list[str] = []
 
@@ -51,8 +55,20 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
             click.echo(f"realizer: {path} was left out: {error}", err=True)
 
 
+def _line(feedback: Feedback) -> str:
+    """Feedback as a line for people; predictions are left to programs."""
+    from bml_schema import BlockProgress, SyncPointProgress, WarningFeedback
+
+    match feedback:
+        case BlockProgress() | SyncPointProgress():
+            return f"  {feedback.global_time:8.3f} s  {feedback.id}"
+        case WarningFeedback():
+            return f"  warning     {feedback.id}: {feedback.type}: {feedback.text}"
+    return ""
+
+
 async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | None, face: str) -> None:
-    """Serve, send every example as a client would, print its feedback."""
+    """Serve, send every example as a client would, print what is told of it and when."""
     from realizer.client import connect
     from realizer.server.serve import Server
     from realizer.settings import Settings
@@ -69,7 +85,8 @@ async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | 
                 click.echo(f"\n{name}")
                 await client.send(text)
                 async for feedback in client.until_end():
-                    click.echo(f"  {feedback.to_xml()}")
+                    if line := _line(feedback):
+                        click.echo(line)
         if not once:
             click.echo("\nthe page is open for you; Ctrl-C ends")
             await server.wait_closed()
