@@ -247,16 +247,37 @@ def play(
 @contextmanager
 def _opened(voice: Voice | str | None) -> Iterator[Voice]:
     """A voice by its name, closed afterwards; a voice that was handed in stays open."""
-    if voice is None or isinstance(voice, str):
+    if voice is not None and not isinstance(voice, str):
+        yield voice
+        return
+    speaker = _Speaker(voice)
+    try:
+        yield speaker
+    finally:
+        speaker.close()
+
+
+class _Speaker:
+    """The voice of a name; the default one is looked for when something is to be said."""
+
+    def __init__(self, name: str | None) -> None:
+        self.name = name or "default"
+        self._voice = None if name is None else self._find(name)
+
+    def say(self, request: Say) -> Utterance:
+        if self._voice is None:
+            self._voice = self._find(None)
+        return self._voice.say(request)
+
+    def close(self) -> None:
+        if self._voice is not None:
+            self._voice.close()
+
+    @staticmethod
+    def _find(name: str | None) -> Voice:
         from realizer.speech import find_voice
 
-        found = find_voice(voice)
-        try:
-            yield found
-        finally:
-            found.close()
-    else:
-        yield voice
+        return find_voice(name)
 
 
 def warning_of(error: BMLError) -> Warning:

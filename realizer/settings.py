@@ -2,45 +2,99 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing import Any, TypeVar
 
 from realizer.errors import RealizerError
 
 __all__ = ["Settings", "SettingsError"]
 
+T = TypeVar("T")
+PREFIX = "REALIZER_"
+
 
 class SettingsError(RealizerError):
-    """A setting with a wrong value; the text says which, where from and what was wanted."""
+    """A setting with a wrong value; the text says which, what was wanted and what came."""
 
 
-class Settings(BaseModel):
-    """What a service can be told. `REALIZER_FPS=30` and `fps = 30` in a TOML file mean `--fps 30`."""
+def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[[Any], Any]:
+    wanted = f"{'a whole number' if kind is int else 'a number'} {low:g}..{high:g}"
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    def read(value: Any) -> Any:
+        try:
+            number = kind(value)
+        except (TypeError, ValueError):
+            raise ValueError(wanted) from None
+        if isinstance(value, bool) or not math.isfinite(number) or not low <= number <= high:
+            raise ValueError(wanted)
+        return number
 
-    host: str = "127.0.0.1"
-    port: int = Field(8765, ge=0, le=65535, description="0 takes a free port")
-    face: str = "default"
-    voice: str | None = Field(None, description="None: espeak-ng where installed, otherwise silent")
-    language: str = Field("en-US", description="BCP-47, of speech that names none")
-    fps: float = Field(25.0, gt=0, le=240)
-    scene: Path | None = Field(None, description="a file of targets every session starts with")
-    seed: int = 0
-    idle: bool = True
-    keep: float = Field(60.0, ge=0, description="seconds a named session outlives its last connection")
-    drain: float = Field(5.0, ge=0, description="seconds given to what plays when the service ends")
-    max_message: int = Field(16 * 2**20, gt=0, description="bytes of one WebSocket message")
-    max_document: int = Field(2**20, gt=0, description="bytes of one document")
-    max_behaviours: int = Field(10_000, gt=0, description="behaviours in one block")
-    max_blocks: int = Field(1_000, gt=0, description="blocks playing or waiting in one session")
-    max_sessions: int = Field(5_000, gt=0, description="sessions of the service")
-    max_size: int = Field(2048, gt=0, description="pixels of a picture's longer side")
+    return read
+
+
+def _flag(value: Any) -> bool:
+    words = dict.fromkeys(("1", "true", "yes", "on"), True) | dict.fromkeys(
+        ("0", "false", "no", "off"), False
+    )
+    known = words.get(str(value).strip().lower())
+    if known is None:
+        raise ValueError("true or false")
+    return known
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError("a word")
+    return value
+
+
+def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
+    return lambda value: None if value is None or value == "" else read(value)
+
+
+def _setting(default: Any, read: Callable[[Any], Any], says: str) -> Any:
+    return field(default=default, metadata={"read": read, "says": says})
+
+
+# Not pydantic, which the messages of the service use: loading it takes longer than planning a document.
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What a service can be told. `REALIZER_FPS=30` and `fps = 30` in a TOML file mean `--fps 30`.
+
+    Raises:
+        SettingsError: a value of the wrong kind or out of range.
+    """
+
+    host: str = _setting("127.0.0.1", _text, "address to listen on")
+    port: int = _setting(8765, _number(int, 0, 65535), "0 takes a free port")
+    face: str = _setting("default", _text, "of characters that name none")
+    voice: str | None = _setting(None, _optional(_text), "none: espeak-ng where installed, else silent")
+    language: str = _setting("en-US", _text, "BCP-47, of speech that names none")
+    fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
+    scene: Path | None = _setting(None, _optional(Path), "a file of targets every session starts with")
+    seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
+    idle: bool = _setting(True, _flag, "blinks and small head motion")
+    keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")
+    drain: float = _setting(5.0, _number(float, 0, 3600), "seconds given to what plays when the service ends")
+    max_message: int = _setting(16 * 2**20, _number(int, 1, 2**31), "bytes of one WebSocket message")
+    max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of one document")
+    max_behaviours: int = _setting(10_000, _number(int, 1, 10**6), "behaviours in one block")
+    max_blocks: int = _setting(1_000, _number(int, 1, 10**6), "blocks playing or waiting in one session")
+    max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service")
+    max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            try:
+                object.__setattr__(self, f.name, f.metadata["read"](value))
+            except ValueError as wanted:
+                raise SettingsError(f"setting {f.name}: wanted {wanted}, got {value!r}") from None
 
     @classmethod
     def read(
@@ -61,21 +115,17 @@ class Settings(BaseModel):
             SettingsError: an unknown name or a wrong value.
         """
         environment = os.environ if environment is None else environment
+        known = {f.name for f in fields(cls)}
         values: dict[str, Any] = {}
         if file is not None:
             try:
                 values |= tomllib.loads(file.read_text("utf-8"))
             except (OSError, tomllib.TOMLDecodeError) as error:
                 raise SettingsError(f"{file}: {error}") from None
-        prefix = "REALIZER_"
         for name, value in environment.items():
-            field = name.removeprefix(prefix).lower()
-            if name.startswith(prefix) and field in cls.model_fields:
-                values[field] = value
+            if name.startswith(PREFIX) and name.removeprefix(PREFIX).lower() in known:
+                values[name.removeprefix(PREFIX).lower()] = value
         values |= {name: value for name, value in (flags or {}).items() if value is not None}
-        try:
-            return cls.model_validate(values)
-        except ValidationError as error:
-            first = error.errors()[0]
-            name = ".".join(map(str, first["loc"]))
-            raise SettingsError(f"setting {name}: {first['msg']}, got {first['input']!r}") from None
+        if unknown := sorted(values.keys() - known):
+            raise SettingsError(f"setting {unknown[0]}: wanted one of {', '.join(sorted(known))}")
+        return cls(**values)

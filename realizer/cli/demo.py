@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,7 +78,7 @@ async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | 
     try:
         server = await Server(settings).start()
     except OSError:
-        server = await Server(settings.model_copy(update={"port": 0})).start()
+        server = await Server(replace(settings, port=0)).start()
     try:
         click.echo(f"page: http://{settings.host}:{server.port}/?session=demo")
         async with connect(f"ws://{settings.host}:{server.port}/ws?session=demo") as client:

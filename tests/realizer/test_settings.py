@@ -22,7 +22,7 @@ def test_flags_win_over_variables_and_those_over_the_file(tmp_path: Path) -> Non
 
 
 def test_a_wrong_value_says_which_and_what_came() -> None:
-    with pytest.raises(SettingsError, match=r"setting port: .*65535.*got '70000'"):
+    with pytest.raises(SettingsError, match=r"setting port: wanted a whole number 0..65535, got '70000'"):
         Settings.read(environment={"REALIZER_PORT": "70000"})
 
 
@@ -38,3 +38,18 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
     file.write_text("port 1")
     with pytest.raises(SettingsError, match=r"realizer\.toml"):
         Settings.read(file=file, environment={})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("fps", "nan"), ("fps", "0"), ("fps", "fast"), ("idle", "maybe"), ("face", ""), ("max_blocks", "-1")],
+)
+def test_what_cannot_be_is_refused_with_what_was_wanted(name: str, value: str) -> None:
+    with pytest.raises(SettingsError, match=rf"setting {name}: wanted .*, got '{value}'"):
+        Settings.read(environment={f"REALIZER_{name.upper()}": value})
+
+
+def test_words_of_the_environment_become_what_they_mean() -> None:
+    words = {"IDLE": "off", "SEED": "7", "SCENE": "a/b", "VOICE": ""}
+    settings = Settings.read(environment={f"REALIZER_{name}": word for name, word in words.items()})
+    assert (settings.idle, settings.seed, settings.scene, settings.voice) == (False, 7, Path("a/b"), None)
