@@ -112,13 +112,8 @@ class Realization:
             utterance = speaking.utterance
             if utterance.pcm is None or not len(utterance.pcm):
                 continue
-            pcm = resample(utterance.pcm, utterance.sample_rate, rate)
+            pcm = heard(speaking, rate)
             first = round(speaking.start * rate)
-            if speaking.until < speaking.start + utterance.duration:
-                kept = max(0, round((speaking.until + CUT - speaking.start) * rate))
-                ramp = min(kept, round(CUT * rate))
-                pcm = pcm[:kept].copy()
-                pcm[kept - ramp :] *= np.linspace(1, 0, len(pcm[kept - ramp :]), dtype=np.float32)
             last = min(len(mix), first + len(pcm))
             mix[first:last] += pcm[: max(0, last - first)]
         return np.clip(np.rint(mix), -32768, 32767).astype(np.int16)
@@ -299,6 +294,22 @@ def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
         for warning in utterances[behaviour].warnings:
             print(f"realizer: {behaviour}: {warning}", file=sys.stderr)
     return utterances
+
+
+def heard(speaking: Speaking, rate: int) -> Float32:
+    """(n,) float32: the sound of an utterance at a rate, cut off and faded where it was stopped.
+
+    Films and streams are made from it alike. The utterance must have sound.
+    """
+    utterance = speaking.utterance
+    assert utterance.pcm is not None
+    pcm = resample(utterance.pcm, utterance.sample_rate, rate)
+    if speaking.until < speaking.start + utterance.duration:
+        kept = max(0, round((speaking.until + CUT - speaking.start) * rate))
+        pcm = pcm[:kept].copy()
+        ramp = min(len(pcm), round(CUT * rate))
+        pcm[len(pcm) - ramp :] *= np.linspace(1, 0, ramp, dtype=np.float32)
+    return pcm
 
 
 def resample(pcm: Int16, rate: int, wanted: int) -> Float32:

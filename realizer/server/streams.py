@@ -12,7 +12,7 @@ import numpy as np
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.arrays import Float32, Int16, Int32
-from realizer.pipeline import CUT, resample
+from realizer.pipeline import CUT, heard
 from realizer.player import Player, Speaking
 from realizer.server.wire import FrameKind, json_frame, pack
 
@@ -178,18 +178,11 @@ class Sound:
         return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
 
     def _pcm(self, speaking: Speaking) -> Float32:
-        """(n,) float32 at the stream's rate, cut and faded where it is cut off; as a film has it."""
+        """(n,) float32 at the stream's rate, as a film has it; made once."""
         known = self._cache.get(id(speaking))
         if known is not None and known[0] is speaking:
             return known[1]
-        utterance = speaking.utterance
-        assert utterance.pcm is not None
-        pcm = resample(utterance.pcm, utterance.sample_rate, self.rate)
-        if speaking.until < speaking.start + utterance.duration:
-            kept = max(0, round((speaking.until + CUT - speaking.start) * self.rate))
-            pcm = pcm[:kept].copy()
-            ramp = min(len(pcm), round(CUT * self.rate))
-            pcm[len(pcm) - ramp :] *= np.linspace(1, 0, ramp, dtype=np.float32)
+        pcm = heard(speaking, self.rate)
         alive = {id(s) for s in self.player.speech()}
         self._cache = {key: value for key, value in self._cache.items() if key in alive}
         self._cache[id(speaking)] = (speaking, pcm)
