@@ -1,7 +1,15 @@
 """The language BML 1.0: text in, typed nodes out, and back; feedback likewise."""
 
+from bml_schema.asap import (
+    Activate,
+    AudioFile,
+    FaceInterpolator,
+    FaceKeyframe,
+    Interrupt,
+    ParameterValueChange,
+    Trajectory,
+)
 from bml_schema.behaviours import (
-    VOCABULARY,
     Face,
     FaceFacs,
     FaceLexeme,
@@ -25,7 +33,6 @@ from bml_schema.behaviours import (
 from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS, parse, read
 from bml_schema.errors import BMLError, BMLSyntaxError, Place, Problem
 from bml_schema.feedback import (
-    BMLA,
     BlockPrediction,
     BlockProgress,
     Feedback,
@@ -36,8 +43,11 @@ from bml_schema.feedback import (
     predicted,
 )
 from bml_schema.nodes import (
+    BMLA,
+    BMLT,
     CORE,
     EXTENSIONS,
+    OWN,
     After,
     Before,
     Behaviour,
@@ -48,14 +58,17 @@ from bml_schema.nodes import (
     Required,
     Synchronize,
 )
+from bml_schema.own import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood
 from bml_schema.parser import MOST_BEHAVIOURS
 from bml_schema.shape import attribute, child, children, mixed, node, sync_ref, text
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import Value, flag, integer, number, one_of, seconds, string, word
-from bml_schema.writer import OWN, write
+from bml_schema.vocabulary import VOCABULARY
+from bml_schema.writer import write
 
 __all__ = [
     "BMLA",
+    "BMLT",
     "CORE",
     "EXTENSIONS",
     "MOST_BEHAVIOURS",
@@ -63,27 +76,41 @@ __all__ = [
     "MOST_DOCUMENTS",
     "OWN",
     "VOCABULARY",
+    "Activate",
     "After",
+    "AudioFile",
     "BMLError",
     "BMLSyntaxError",
     "Before",
     "Behaviour",
+    "Blink",
     "Block",
     "BlockPrediction",
     "BlockProgress",
     "Constraint",
     "Description",
+    "Emotion",
+    "Expression",
     "Face",
     "FaceFacs",
+    "FaceInterpolator",
+    "FaceKeyframe",
     "FaceLexeme",
     "FaceShift",
+    "Fap",
+    "FapFile",
+    "Faps",
     "Feedback",
     "Gaze",
     "GazeShift",
     "Gesture",
     "Head",
     "HeadDirectionShift",
+    "Idle",
+    "Interrupt",
     "Locomotion",
+    "Mood",
+    "ParameterValueChange",
     "Part",
     "Place",
     "Pointing",
@@ -100,6 +127,7 @@ __all__ = [
     "SyncPointProgress",
     "SyncRef",
     "Synchronize",
+    "Trajectory",
     "Value",
     "Wait",
     "WarningFeedback",

@@ -1,8 +1,7 @@
-"""The behaviours of BML 1.0 core, and faceFacs: one class per element, and the vocabulary that lists them."""
+"""The behaviours of BML 1.0 core, and faceFacs: one class per element."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 from bml_schema.nodes import Behaviour, Part, core, extension
@@ -11,7 +10,6 @@ from bml_schema.sync_refs import SyncRef
 from bml_schema.values import integer, name, number, one_of, word
 
 __all__ = [
-    "VOCABULARY",
     "Face",
     "FaceFacs",
     "FaceLexeme",
@@ -43,7 +41,7 @@ SIDES: Final = ("LEFT", "RIGHT", "BOTH")
 STANCES: Final = ("SITTING", "CROUCHING", "STANDING", "LYING")
 BODY_PARTS: Final = ("ARMS", "LEFT_ARM", "RIGHT_ARM", "LEGS", "LEFT_LEG", "RIGHT_LEG", "HEAD", "WHOLEBODY")
 
-_AMOUNT = number(0, 1)
+AMOUNT = number(0, 1)
 # How far attackPeak exceeds the sustained amount; -1 would be no peak at all.
 _OVERSHOOT = number(-1, 10)
 _ANGLE = number(-360, 360)
@@ -81,7 +79,7 @@ class Head(Behaviour):
     lexeme: str = attribute(word)
     # More than 100 nods are a mistake, and each has sync points to schedule and report.
     repetition: int = attribute(integer(1, 100), default=1)
-    amount: float = attribute(_AMOUNT, default=0.5)
+    amount: float = attribute(AMOUNT, default=0.5)
 
 
 @node
@@ -99,7 +97,7 @@ class FaceLexeme(Behaviour):
     tag = core("faceLexeme")
     sync_points = PEAK
     lexeme: str = attribute(word)
-    amount: float = attribute(_AMOUNT, default=0.5)
+    amount: float = attribute(AMOUNT, default=0.5)
     overshoot: float = attribute(_OVERSHOOT, default=0.0)
 
 
@@ -111,7 +109,7 @@ class FaceFacs(Behaviour):
     sync_points = PEAK
     au: int = attribute(integer(1, 999))
     side: str = attribute(one_of(*SIDES), default="BOTH")
-    amount: float = attribute(_AMOUNT, default=0.5)
+    amount: float = attribute(AMOUNT, default=0.5)
     overshoot: float = attribute(_OVERSHOOT, default=0.0)
 
 
@@ -121,7 +119,7 @@ class Face(Behaviour):
 
     tag = core("face")
     sync_points = PEAK
-    amount: float = attribute(_AMOUNT, default=0.5)
+    amount: float = attribute(AMOUNT, default=0.5)
     overshoot: float = attribute(_OVERSHOOT, default=0.0)
     parts: tuple[FaceLexeme | FaceFacs, ...] = children(FaceLexeme, FaceFacs, least=1)
 
@@ -131,7 +129,7 @@ class FaceShift(Behaviour):
     """Several expressions and action units that are the resting face from now on."""
 
     tag = core("faceShift")
-    amount: float = attribute(_AMOUNT, default=0.5)
+    amount: float = attribute(AMOUNT, default=0.5)
     overshoot: float = attribute(_OVERSHOOT, default=0.0)
     parts: tuple[FaceLexeme | FaceFacs, ...] = children(FaceLexeme, FaceFacs, least=1)
 
@@ -249,13 +247,3 @@ class Locomotion(Behaviour):
     tag = core("locomotion")
     target: str = attribute(word)
     manner: str = attribute(word, default="WALK")
-
-
-# Which class an element becomes; extensions add theirs: {**VOCABULARY, Wink.tag: Wink}.
-VOCABULARY: Final[Mapping[str, type[Behaviour]]] = {
-    cls.tag: cls
-    for cls in (
-        *(Gaze, GazeShift, Head, HeadDirectionShift, FaceLexeme, FaceFacs, Face, FaceShift, Speech, Wait),
-        *(Gesture, Pointing, Posture, PostureShift, Locomotion),
-    )
-}

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from bml_schema.behaviours import VOCABULARY
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MOST_BEHAVIOURS, read_block
+from bml_schema.vocabulary import VOCABULARY
 
 __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
 

@@ -1,4 +1,9 @@
-"""BML feedback: what happened in, one XML element out, and back."""
+"""BML feedback: what happened in, one XML element out, and back.
+
+`to_xml` takes `seq`, the number of the message in its session, and `epoch`, the POSIX seconds at which the
+session clock was 0: with it every time of the session clock comes in POSIX milliseconds too, as BMLA has it.
+Neither is part of ==.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +13,19 @@ from typing import Any
 
 from lxml import etree
 
-from bml_schema.behaviours import VOCABULARY, Speech, SpeechText
+from bml_schema.behaviours import Speech, SpeechText
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.escape import escape, escape_value, legal
-from bml_schema.nodes import CORE, Behaviour, core
+from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
 from bml_schema.shape import local
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import NUMBER, decimal
-from bml_schema.writer import OWN, Writer
+from bml_schema.vocabulary import VOCABULARY
+from bml_schema.writer import Writer
 
 __all__ = [
-    "BMLA",
     "BlockPrediction",
     "BlockProgress",
     "Feedback",
@@ -31,8 +36,6 @@ __all__ = [
     "predicted",
 ]
 
-BMLA = "http://www.asap-project.org/bmla"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockProgress:
@@ -42,8 +45,8 @@ class BlockProgress:
         id: "block:start" or "block:end".
         global_time: seconds on the session clock.
         character_id: as in the block.
-        status: why it ended, in BMLA's words: DONE, INTERRUPTED, REVOKED; None says nothing.
-        seq: number of the message in its session; not part of ==.
+        status: BMLA's word for the block's state: IN_EXEC, DONE, INTERRUPTED, REVOKED; None says nothing.
+        posix_time: milliseconds since 1970, as read; None where it does not say.
     """
 
     id: str
@@ -51,14 +54,15 @@ class BlockProgress:
     character_id: str | None = None
     status: str | None = None
     seq: int | None = field(default=None, compare=False)
+    posix_time: int | None = field(default=None, compare=False)
 
-    def to_xml(self, seq: int | None = None) -> str:
-        """The element as text."""
+    def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
+        """The element as text; `seq` and `epoch` as the module says."""
         return _xml(
             "blockProgress",
             {"id": self.id, "globalTime": self.global_time, "characterId": self.character_id},
             seq=self.seq if seq is None else seq,
-            status=self.status,
+            bmla={"posixTime": _posix(self.global_time, epoch), "status": self.status},
         )
 
 
@@ -77,9 +81,10 @@ class SyncPointProgress:
     global_time: float
     character_id: str | None = None
     seq: int | None = field(default=None, compare=False)
+    posix_time: int | None = field(default=None, compare=False)
 
-    def to_xml(self, seq: int | None = None) -> str:
-        """The element as text."""
+    def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
+        """The element as text; `seq` and `epoch` as the module says."""
         return _xml(
             "syncPointProgress",
             {
@@ -89,6 +94,7 @@ class SyncPointProgress:
                 "characterId": self.character_id,
             },
             seq=self.seq if seq is None else seq,
+            bmla={"posixTime": _posix(self.global_time, epoch)},
         )
 
 
@@ -108,7 +114,7 @@ class WarningFeedback:
     character_id: str | None = None
     seq: int | None = field(default=None, compare=False)
 
-    def to_xml(self, seq: int | None = None) -> str:
+    def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; no CDATA and no elements inside, clients refuse both."""
         return _xml(
             "warningFeedback",
@@ -120,7 +126,11 @@ class WarningFeedback:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockPrediction:
-    """When a block is expected to start and end, seconds on the session clock; None while unknown."""
+    """When a block is expected to start and end, seconds on the session clock; None while unknown.
+
+    Attributes:
+        status: BMLA's word for its state: IN_PREP, PENDING, LURKING, IN_EXEC, SUBSIDING.
+    """
 
     id: str
     global_start: float | None = None
@@ -142,14 +152,19 @@ class PredictionFeedback:
     behaviours: tuple[Behaviour, ...] = ()
     seq: int | None = field(default=None, compare=False)
 
-    def to_xml(self, seq: int | None = None) -> str:
-        """The element as text."""
+    def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
+        """The element as text; `seq` and `epoch` as the module says."""
         writer = Writer()
         inner: list[str] = []
         for block in self.blocks:
             times = {"id": block.id, "globalStart": block.global_start, "globalEnd": block.global_end}
-            status = {} if block.status is None else {writer.name(f"{{{BMLA}}}status"): block.status}
-            inner.append(f"<bml{_attributes({**times, **status})}/>")
+            told = {
+                "posixStartTime": _posix(block.global_start, epoch),
+                "posixEndTime": _posix(block.global_end, epoch),
+                "status": block.status,
+            }
+            named = {writer.name(bmla(name)): value for name, value in told.items() if value is not None}
+            inner.append(f"<bml{_attributes({**times, **named})}/>")
         inner.extend(writer.behaviour(b) for b in self.behaviours)
         return _xml(
             "predictionFeedback",
@@ -167,12 +182,12 @@ def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behavi
     """A behaviour as predictionFeedback tells of it: id "block:behaviour", each sync point a plain number.
 
     Args:
-        node: as parsed; its descriptions and foreign attributes stay out.
+        node: as parsed; its descriptions, priority and foreign attributes stay out.
         block: id of its block.
         times: sync point -> seconds from block start. "stroke:n" has no attribute form and stays out.
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
-    node = replace(node, id=f"{block}:{node.id}", syncs=syncs, descriptions=(), foreign={})
+    node = replace(node, id=f"{block}:{node.id}", syncs=syncs, descriptions=(), foreign={}, priority=0.0)
     if isinstance(node, Speech) and node.text is not None:
         parts = tuple(
             p
@@ -199,13 +214,21 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
     kind = str(root.tag)
     who: dict[str, Any] = {"character_id": root.get("characterId"), "seq": _seq(root)}
     if kind == core("blockProgress"):
-        status = root.get(f"{{{BMLA}}}status")
+        status = root.get(bmla("status"))
         return BlockProgress(
-            id=_needed(root, "id"), global_time=_time(root, "globalTime"), status=status, **who
+            id=_needed(root, "id"),
+            global_time=_time(root, "globalTime"),
+            status=status,
+            posix_time=_milliseconds(root),
+            **who,
         )
     if kind == core("syncPointProgress"):
         return SyncPointProgress(
-            id=_needed(root, "id"), time=_time(root, "time"), global_time=_time(root, "globalTime"), **who
+            id=_needed(root, "id"),
+            time=_time(root, "time"),
+            global_time=_time(root, "globalTime"),
+            posix_time=_milliseconds(root),
+            **who,
         )
     if kind == core("warningFeedback"):
         said = "".join(str(t) for t in root.itertext())
@@ -222,7 +245,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
 def _block(child: etree._Element) -> BlockPrediction:
     start, end = (_time(child, n) if n in child.attrib else None for n in ("globalStart", "globalEnd"))
     return BlockPrediction(
-        id=_needed(child, "id"), global_start=start, global_end=end, status=child.get(f"{{{BMLA}}}status")
+        id=_needed(child, "id"), global_start=start, global_end=end, status=child.get(bmla("status"))
     )
 
 
@@ -250,8 +273,20 @@ def _line(source: etree._Element) -> int:
 
 
 def _seq(root: etree._Element) -> int | None:
-    value = root.get(f"{{{OWN}}}seq", "")
+    return _whole(root.get(own("seq"), ""))
+
+
+def _milliseconds(root: etree._Element) -> int | None:
+    return _whole(root.get(bmla("posixTime"), ""))
+
+
+def _whole(value: str) -> int | None:
     return int(value) if value.isdecimal() and len(value) < 20 else None
+
+
+def _posix(time: float | None, epoch: float | None) -> str | None:
+    """Whole milliseconds since 1970 of a time on the session clock."""
+    return None if time is None or epoch is None else str(round((epoch + time) * 1000))
 
 
 def _attributes(values: Mapping[str, str | float | None]) -> str:
@@ -269,13 +304,13 @@ def _xml(
     inside: str = "",
     *,
     seq: int | None,
-    status: str | None = None,
+    bmla: Mapping[str, str | None] | None = None,
     declarations: str = "",
 ) -> str:
     """One element in the core namespace; times to the microsecond, and never with an exponent."""
     start = f'<{name} xmlns="{CORE}"{declarations}{_attributes(values)}'
-    if status is not None:
-        start += f' xmlns:bmla="{BMLA}"{_attributes({"bmla:status": status})}'
+    if told := {f"bmla:{name}": value for name, value in (bmla or {}).items() if value is not None}:
+        start += f' xmlns:bmla="{BMLA}"{_attributes(told)}'
     if seq is not None:
         start += f' xmlns:realizer="{OWN}" realizer:seq="{seq}"'
     return f"{start}>{inside}</{name}>" if inside else f"{start}/>"

@@ -9,11 +9,14 @@ from typing import ClassVar
 from bml_schema.errors import Place, Problem
 from bml_schema.shape import attribute, node, sync_ref
 from bml_schema.sync_refs import SyncRef
-from bml_schema.values import block_name, integer, name, one_of, word
+from bml_schema.values import block_name, block_names, flag, integer, name, number, one_of, word
 
 __all__ = [
+    "BMLA",
+    "BMLT",
     "CORE",
     "EXTENSIONS",
+    "OWN",
     "After",
     "Before",
     "Behaviour",
@@ -27,6 +30,9 @@ __all__ = [
 
 CORE = "http://www.bml-initiative.org/bml/bml-1.0"
 EXTENSIONS = "http://www.bml-initiative.org/bml/coreextensions-1.0"
+BMLA = "http://www.asap-project.org/bmla"
+BMLT = "http://hmi.ewi.utwente.nl/bmlt"
+OWN = "urn:bml-realizer:1"  # what we add to BML ourselves
 COMPOSITIONS = ("MERGE", "APPEND", "REPLACE")
 
 
@@ -38,6 +44,21 @@ def core(name: str) -> str:
 def extension(name: str) -> str:
     """Clark tag of an element of the BML 1.0 core extensions namespace."""
     return f"{{{EXTENSIONS}}}{name}"
+
+
+def bmla(name: str) -> str:
+    """Clark name in the namespace of BMLA, the extensions of AsapRealizer."""
+    return f"{{{BMLA}}}{name}"
+
+
+def bmlt(name: str) -> str:
+    """Clark name in the namespace of BMLT, the extensions of Elckerlyc."""
+    return f"{{{BMLT}}}{name}"
+
+
+def own(name: str) -> str:
+    """Clark name in our own namespace."""
+    return f"{{{OWN}}}{name}"
 
 
 @node
@@ -72,6 +93,7 @@ class Behaviour:
     Attributes:
         id: unique in the block; "" only for the parts of <face> and <faceShift>.
         syncs: sync point -> where the document wants it; only those the document gives.
+        priority: bmla:priority; of two that want the same thing the lower one is dropped.
         descriptions: in document order.
         foreign: attributes this class does not know, by Clark name, kept for others and for the round trip.
     """
@@ -82,6 +104,7 @@ class Behaviour:
     marks: ClassVar[bool] = False
 
     id: str = attribute(name)
+    priority: float = attribute(number(-1e6, 1e6), default=0.0, name=bmla("priority"))
     syncs: Mapping[str, SyncRef] = field(default_factory=dict, hash=False)
     descriptions: tuple[Description, ...] = ()
     foreign: Mapping[str, str] = field(default_factory=dict, hash=False)
@@ -151,6 +174,13 @@ class Block:
         id: never empty, never "bml".
         character_id: who acts; None if the document does not say.
         composition: MERGE, APPEND or REPLACE, beside, after or instead of earlier blocks.
+        append_after: BMLA: starts when all these blocks are done, beside what composition says.
+            "APPEND-AFTER(a,b)" as composition means the same.
+        chunk_after: BMLA: starts when all these blocks are subsiding (past every relax) or done.
+        prepend_before, chunk_before: BMLA: these blocks, not started yet, append or chunk after this one.
+        interrupt: BMLA: these blocks are interrupted when this one is scheduled.
+        on_start: BMLA: these preplanned blocks are activated when this one starts.
+        preplan: BMLA: planned, but not started before somebody activates it.
         children: in document order.
         foreign: attributes this version does not know, by Clark name.
         problems: what was dropped while parsing; not part of ==.
@@ -165,6 +195,13 @@ class Block:
     id: str = attribute(block_name)
     character_id: str | None = attribute(word, default=None)
     composition: str = attribute(one_of(*COMPOSITIONS, any_case=True), default="MERGE")
+    append_after: tuple[str, ...] = attribute(block_names, default=(), name=bmla("appendAfter"))
+    chunk_after: tuple[str, ...] = attribute(block_names, default=(), name=bmla("chunkAfter"))
+    prepend_before: tuple[str, ...] = attribute(block_names, default=(), name=bmla("prependBefore"))
+    chunk_before: tuple[str, ...] = attribute(block_names, default=(), name=bmla("chunkBefore"))
+    interrupt: tuple[str, ...] = attribute(block_names, default=(), name=bmla("interrupt"))
+    on_start: tuple[str, ...] = attribute(block_names, default=(), name=bmla("onStart"))
+    preplan: bool = attribute(flag, default=False, name=bmla("preplan"))
     children: tuple[Behaviour | Required | Constraint, ...] = ()
     foreign: Mapping[str, str] = field(default_factory=dict, hash=False)
     problems: tuple[Problem, ...] = field(default=(), compare=False)

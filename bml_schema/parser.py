@@ -5,6 +5,7 @@ Faults stay where they are: a behaviour or constraint with a fault is left out a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -27,12 +28,14 @@ from bml_schema.losses import Losses
 from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
 from bml_schema.shape import local, shape_of
 from bml_schema.sync_refs import Names, Points
-from bml_schema.values import unwanted
+from bml_schema.values import block_names, unwanted
 
 __all__ = ["MOST_BEHAVIOURS"]
 
 MOST_BEHAVIOURS = 10_000  # in one block; more than anybody writes, and still scheduled in about a second
 _MOST_LISTED = 10  # lost references named in a warning's text; `Problem.lost` has them all
+# BMLA says this in composition or in an attribute of its own.
+_APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\(([^()]*)\)\s*")
 _MOST_ID = 256  # characters of an id a warning repeats
 
 
@@ -121,9 +124,12 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
             values["foreign"][name] = text
             continue
         try:
-            values[spec.field] = spec.value.read(text)
+            if name == "composition" and (after := _APPEND_AFTER.fullmatch(text)):
+                values.setdefault("append_after", block_names.read(after[1]))
+            else:
+                values[spec.field] = spec.value.read(text)
         except ValueError:
-            said = f"{name}: {unwanted(spec.value.wanted, text, shown(text))}"
+            said = f"{local(name)}: {unwanted(spec.value.wanted, text, shown(text))}"
             if name == "id":
                 raise BMLError(said, line=line, path="/bml") from None
             if text.strip():

@@ -128,6 +128,10 @@ def _read_block_name(text: str) -> str:
     return text
 
 
+def _read_names(text: str) -> tuple[str, ...]:
+    return tuple(_read_block_name(name) for name in text.split(",") if name.strip())
+
+
 def _read_flag(text: str) -> bool:
     text = text.strip()
     if text not in ("true", "1", "false", "0"):
@@ -144,5 +148,11 @@ seconds = number(-MOST_SECONDS, MOST_SECONDS, wanted=f"seconds, at most {MOST_SE
 # "a - 1" must always mean an offset. "bml" is the block itself in references.
 block_name = Value(
     f'a name of at most {_MOST_NAME} characters without ":", other than "bml"', _read_block_name
+)
+block_names = Value(
+    "names of blocks with commas between them", _read_names, lambda names: ",".join(names), "names"
+)
+names = Value(
+    "names with commas between them", lambda t: tuple(map(_read_name, t.split(","))), ",".join, "names"
 )
 name = Value(f'a name of at most {_MOST_NAME} characters without blanks or ":", other than "bml"', _read_name)

@@ -9,8 +9,11 @@ from lxml import etree
 
 from bml_schema.escape import escape, escape_value
 from bml_schema.nodes import (
+    BMLA,
+    BMLT,
     CORE,
     EXTENSIONS,
+    OWN,
     Behaviour,
     Block,
     Constraint,
@@ -20,17 +23,16 @@ from bml_schema.nodes import (
 from bml_schema.shape import Attribute, shape_of, sync_ref
 from bml_schema.sync_refs import SyncRef
 
-__all__ = ["OWN", "write"]
+__all__ = ["write"]
 
-OWN = "urn:bml-realizer:1"  # what we add to BML ourselves
 _XML = "http://www.w3.org/XML/1998/namespace"
 # Prefixes people know; any other namespace becomes ns1, ns2, ...
 _PREFIXES: Mapping[str, str] = {
     CORE: "bml",
     EXTENSIONS: "ext",
     OWN: "realizer",
-    "http://www.asap-project.org/bmla": "bmla",
-    "http://hmi.ewi.utwente.nl/bmlt": "bmlt",
+    BMLA: "bmla",
+    BMLT: "bmlt",
     "http://www.w3.org/2001/XMLSchema-instance": "xsi",
 }
 
@@ -130,7 +132,8 @@ class Writer:
     def _attribute(self, spec: Attribute, value: Any) -> str:
         if value is None or (value == "" and spec.field == "id"):
             return ""
-        return _value(spec.name, str(value) if spec.value is sync_ref else spec.value.write(value))
+        label = self.name(spec.name, attribute=True)
+        return _value(label, str(value) if spec.value is sync_ref else spec.value.write(value))
 
     def name(self, clark: str, *, attribute: bool = False) -> str:
         """Clark name -> name with a prefix, which is declared on the root; elements of the core need none."""

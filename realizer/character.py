@@ -91,4 +91,4 @@ class Character:
             for index, shift in enumerate(self.shifts)
             if not any(s.end < before and shift.regions <= s.regions for s in self.shifts[index + 1 :])
         ]
-        self.direct = {n: c for n, c in self.direct.items() if c.fade is None or c.fade[1] > before}
+        self.direct = {n: c for n, c in self.direct.items() if c.gone > before}

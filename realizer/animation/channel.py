@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from realizer.animation.targets import Target
 from realizer.arrays import Float64
 
-__all__ = ["Channel", "Layer"]
+__all__ = ["Channel", "Gain", "Layer"]
 
 
 class Layer(IntEnum):
@@ -25,6 +26,19 @@ class Layer(IntEnum):
     DIRECT = 6  # AU and FAP values set by a client
 
 
+class Gain(NamedTuple):
+    """From `begin` to `end` what a channel or a sound is multiplied with goes to `to`, and stays there."""
+
+    begin: float
+    end: float
+    to: float
+    curve: str = "smooth"
+
+    def shifted(self, seconds: float) -> Gain:
+        """The same change, later by `seconds`."""
+        return self._replace(begin=self.begin + seconds, end=self.end + seconds)
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One target over time.
@@ -37,8 +51,9 @@ class Channel:
         curve: name in `animation.curves`: "smooth" (velocity zero at each key) or "linear".
         layer: where it is blended.
         holds: the last value stays for ever (base states); otherwise the channel is 0 outside its keys.
-        fade: (begin, end) seconds: from begin to end it is faded to 0, smoothly; used when a behaviour
-            is cut off or a base state is replaced. Value and velocity do not jump.
+        gains: what it is multiplied with, 1 before the first: where a behaviour is cut off, a base state is
+            replaced or an amount changes. Each goes on from what those before it have reached, so that
+            nothing jumps.
         source: "block:behaviour" that made it, for messages.
     """
 
@@ -48,7 +63,7 @@ class Channel:
     curve: str = "smooth"
     layer: Layer = Layer.EXPRESSION
     holds: bool = False
-    fade: tuple[float, float] | None = None
+    gains: tuple[Gain, ...] = ()
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -61,17 +76,27 @@ class Channel:
 
     def shifted(self, seconds: float) -> Channel:
         """The same channel, later by `seconds`."""
-        fade = None if self.fade is None else (self.fade[0] + seconds, self.fade[1] + seconds)
-        return replace(self, times=self.times + seconds, fade=fade)
+        gains = tuple(gain.shifted(seconds) for gain in self.gains)
+        return replace(self, times=self.times + seconds, gains=gains)
 
     def faded(self, begin: float, end: float) -> Channel:
         """The same channel faded out from `begin` to `end`; an earlier fade stays as it is."""
-        if self.fade is not None and self.fade[1] <= end:
+        if self.gone <= end:
             return self
-        return replace(self, fade=(begin, end))
+        return self.scaled(Gain(begin, end, 0.0))
+
+    def scaled(self, gain: Gain) -> Channel:
+        """The same channel with one more gain."""
+        return replace(self, gains=(*self.gains, gain))
+
+    @property
+    def gone(self) -> float:
+        """When it has been faded out for good; infinite where it is not."""
+        last = self.gains[-1] if self.gains else None
+        return last.end if last is not None and last.to == 0.0 else float("inf")
 
     @property
     def span(self) -> tuple[float, float]:
         """(first, last) seconds at which it may be other than 0; last is infinite where it holds."""
         last = float("inf") if self.holds else float(self.times[-1])
-        return float(self.times[0]), min(last, self.fade[1]) if self.fade else last
+        return float(self.times[0]), min(last, self.gone)

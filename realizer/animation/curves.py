@@ -1,4 +1,4 @@
-"""Channels and times -> their values: smooth or linear between keys, 0 outside, faded where cut off."""
+"""Channels and times -> their values: smooth or linear between keys, 0 outside, times the gains they have."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from realizer.animation.channel import Channel
+from realizer.animation.channel import Channel, Gain
 from realizer.arrays import Float64
 
-__all__ = ["CURVES", "sample", "smooth", "weights"]
+__all__ = ["CURVES", "gain_at", "sample", "smooth", "weights"]
 
 # From this many keys on, a linear channel (lips: 100 keys a second) is interpolated on its own.
 MANY_KEYS = 32
@@ -63,26 +63,26 @@ def sample(channels: Sequence[Channel], times: Float64) -> Float64:
             by_curve.setdefault(channel.curve, []).append(i)
     for curve, rows in by_curve.items():
         _fill(values, rows, [channels[i] for i in rows], times, CURVES[curve])
-    fading = [i for i, channel in enumerate(channels) if channel.fade is not None]
-    if fading:
-        values[fading] *= _fade([channels[i] for i in fading], times)
+    for i, channel in enumerate(channels):
+        if channel.gains:
+            values[i] *= gain_at(channel.gains, times)
     if order is not None:
         values[:, order] = values.copy()
     return values
 
 
 def weights(channels: Sequence[Channel], times: Float64) -> Float64:
-    """How much of every channel is there: 1 from its first key to its last (for ever where it holds), less
-    where it is faded, 0 outside.
+    """How much of every channel is there: 1 from its first key to its last (for ever where it holds), times
+    its gains, 0 outside.
 
     Returns:
         (m, n) float64, 0..1.
     """
     first, last = np.array([channel.span for channel in channels]).reshape(-1, 2).T[..., None]
     there: Float64 = ((times >= first) & (times <= last)).astype(np.float64)
-    fading = [i for i, channel in enumerate(channels) if channel.fade is not None]
-    if fading:
-        there[fading] *= _fade([channels[i] for i in fading], times)
+    for i, channel in enumerate(channels):
+        if channel.gains:
+            there[i] *= gain_at(channel.gains, times)
     return there
 
 
@@ -120,9 +120,15 @@ def _fill(
     values[row[segment], frame] = value[segment] + step[segment] * shape(u)
 
 
-def _fade(channels: Sequence[Channel], times: Float64) -> Float64:
-    """(m, n) envelope of channels that fade: 1 until `begin`, smoothly to 0 at `end`."""
-    begin, end = np.array([channel.fade for channel in channels], np.float64).T[..., None]
-    length = np.maximum(end - begin, 1e-9)  # s; a fade without length is a step
-    left: Float64 = 1.0 - smooth(np.clip((times - begin) / length, 0.0, 1.0))
-    return left
+def gain_at(gains: Sequence[Gain], times: Float64) -> Float64:
+    """(n,) what something with these gains is multiplied with at times (n,), 1 before the first."""
+    if not gains:
+        return np.ones(len(times))
+    # What has been reached when a gain begins is worked out along with the rest.
+    at = np.concatenate([times, [gain.begin for gain in gains]])
+    total = np.ones(len(at))
+    for n, (begin, end, to, curve) in enumerate(gains):
+        reached = total[len(times) + n]
+        passed = np.clip((at - begin) / max(end - begin, 1e-9), 0.0, 1.0)  # no length: a step
+        total = np.where(at < begin, total, reached + (to - reached) * CURVES[curve](passed))
+    return total[: len(times)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from realizer.animation.channel import Channel
@@ -11,7 +12,7 @@ from realizer.arrays import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Say, Utterance
 
-__all__ = ["Kind", "World"]
+__all__ = ["Act", "Activate", "Change", "Interrupt", "Kind", "World"]
 
 Position = tuple[float, float, float]
 
@@ -26,12 +27,49 @@ class World:
         utterances: behaviour id -> what the voice made of it.
         language: BCP-47 of speech without its own.
         seed: for anything random.
+        media: the folder that holds the files documents may name; None: there are none.
     """
 
     scene: Mapping[str, Position] | None = None
     utterances: Mapping[str, Utterance] = field(default_factory=dict)
     language: str = "en-US"
     seed: int = 0
+    media: Path | None = None
+
+
+@dataclass(frozen=True)
+class Interrupt:
+    """End a block, or those of its behaviours that are in `include` (None: all) and not in `exclude`."""
+
+    block: str
+    include: frozenset[str] | None = None
+    exclude: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Activate:
+    """Start a preplanned block."""
+
+    block: str
+
+
+@dataclass(frozen=True)
+class Change:
+    """Let a parameter of a behaviour go to `to`, from `initial` (None: from where it is), by a curve.
+
+    At once where `curve` is None, otherwise from the start of the behaviour that does it to its end.
+    """
+
+    block: str
+    behaviour: str
+    parameter: str
+    to: float
+    initial: float | None = None
+    curve: str | None = None
+
+
+# What a behaviour does to others when it starts.
+Act = Interrupt | Activate | Change
 
 
 @dataclass(frozen=True)
@@ -54,6 +92,13 @@ class Kind:
             `timing(...).points`. Body behaviours show nothing on a face: ().
         check: (node, world) -> faults: unknown lexeme or AU, no such target. Run before timing.
         say: (node, world) -> what the voice has to say, or None. Only speech has it.
+        act: node -> what it does to other blocks and behaviours when it starts.
+        sound: (node, world) -> what sounds from its start to its end; None where it is silent.
+        claims: (node, world) -> names of what it needs for itself ("voice", "gaze", "head pitch") from its
+            start to its relax (its end where it has none): of two behaviours of a character that claim the
+            same at one time one is dropped. Expressions claim nothing: they blend.
+        parameters: name of a parameter that can be changed while it plays -> the field that says its value at
+            the beginning, or that value. "volume" scales its sound, all others what it shows.
         region: a base state this behaviour replaces for good at its end ("eyes", "head", "face"); for the
             *Shift behaviours, whose channels have `holds=True`.
     """
@@ -63,6 +108,10 @@ class Kind:
     expand: Callable[[Any, Float64, World], tuple[Channel, ...]]
     check: Callable[[Any, World], tuple[Fault, ...]] = lambda node, world: ()
     say: Callable[[Any, World], Say | None] | None = None
+    act: Callable[[Any], Act] | None = None
+    sound: Callable[[Any, World], Utterance | None] = lambda node, world: None
+    claims: Callable[[Any, World], frozenset[str]] = lambda node, world: frozenset()
+    parameters: Mapping[str, str | float] = field(default_factory=dict)
     region: str | None = None
 
     @property

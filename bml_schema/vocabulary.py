@@ -1,0 +1,19 @@
+"""Which class an element becomes: the core, its extensions, and what others and we add to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from bml_schema import asap, behaviours, own
+from bml_schema.nodes import Behaviour
+
+__all__ = ["VOCABULARY"]
+
+# Clark tag -> class; users add theirs: {**VOCABULARY, Wink.tag: Wink}.
+VOCABULARY: Final[Mapping[str, type[Behaviour]]] = {
+    cls.tag: cls
+    for module in (behaviours, asap, own)
+    for cls in map(vars(module).get, module.__all__)
+    if isinstance(cls, type) and issubclass(cls, Behaviour)
+}
