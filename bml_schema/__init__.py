@@ -42,6 +42,7 @@ from bml_schema.feedback import (
     parse_feedback,
     predicted,
 )
+from bml_schema.losses import Lost, without
 from bml_schema.nodes import (
     BMLA,
     BMLT,
@@ -109,6 +110,7 @@ __all__ = [
     "Idle",
     "Interrupt",
     "Locomotion",
+    "Lost",
     "Mood",
     "ParameterValueChange",
     "Part",
@@ -148,6 +150,7 @@ __all__ = [
     "string",
     "sync_ref",
     "text",
+    "without",
     "word",
     "write",
 ]

@@ -1,15 +1,51 @@
-"""Ids of dropped behaviours and a node in, the node without references to them out; notes what went."""
+"""Ids of dropped behaviours and a block in, the block without them and all that named them out."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
-from bml_schema.nodes import Behaviour, Constraint, Synchronize
+from bml_schema.nodes import Behaviour, Block, Constraint, Required, Synchronize
 from bml_schema.sync_refs import SyncRef
 
-__all__: list[str] = []
+__all__ = ["Lost", "without"]
+
+
+class Lost(NamedTuple):
+    """What is left of a block without some of its behaviours.
+
+    Attributes:
+        block: the rest; its places and problems are those of the whole.
+        lost: id of a behaviour that went -> what went with it: "behaviour:sync" for a reference, the id of a
+            constraint or its path.
+        fatal: ids whose loss breaks a constraint inside <required>.
+    """
+
+    block: Block
+    lost: Mapping[str, tuple[str, ...]]
+    fatal: frozenset[str]
+
+
+def without(block: Block, gone: Collection[str]) -> Lost:
+    """The block without some behaviours, the references to their sync points, and the constraints on them.
+
+    Args:
+        block: stays as it is.
+        gone: ids of behaviours; one the block does not hold costs what names it.
+    """
+    gone = frozenset(gone)
+    losses = Losses(gone)
+    children: list[Behaviour | Required | Constraint] = []
+    for child in block.children:
+        if isinstance(child, Required):
+            inside = (losses.without(c, required=True) for c in child.children)
+            children.append(replace(child, children=tuple(c for c in inside if c is not None)))
+        elif (left := losses.without(child)) is not None:
+            children.append(left)
+    lost = {id: tuple(names) for id, names in losses.lost.items()}
+    return Lost(replace(block, children=tuple(children)), lost, frozenset(losses.fatal))
 
 
 class Losses:
@@ -25,9 +61,13 @@ class Losses:
         self.lost: dict[str, list[str]] = {}
         self.fatal: set[str] = set()
 
-    def without(self, node: Behaviour | Constraint) -> Behaviour | Constraint | None:
-        """The node without references to what is gone; None for a constraint that names it."""
-        return self._constraint(node) if isinstance(node, Constraint) else self._behaviour(node)
+    def without(
+        self, node: Behaviour | Constraint, *, required: bool = False
+    ) -> Behaviour | Constraint | None:
+        """The node without references to what is gone; None if it is gone, or a constraint that names it."""
+        if isinstance(node, Constraint):
+            return self._constraint(node, required or node.required)
+        return None if node.id in self.gone else self._behaviour(node)
 
     def _is_gone(self, ref: SyncRef, name: str) -> bool:
         if ref.block is not None or ref.behaviour not in self.gone or ref.behaviour is None:
@@ -52,11 +92,11 @@ class Losses:
                 node = replace(node, text=SpeechText(parts=parts))
         return node
 
-    def _constraint(self, node: Constraint) -> Constraint | None:
+    def _constraint(self, node: Constraint, required: bool) -> Constraint | None:
         name = node.id or (node.place.path if node.place else "constraint")
         refs = [ref for part in node.parts for ref in part.refs]
         refs += [part.ref for part in node.parts if not isinstance(part, Synchronize)]
         gone = {ref.behaviour for ref in refs if self._is_gone(ref, name) and ref.behaviour}
-        if node.required:
+        if required:
             self.fatal |= gone
         return None if gone else node

@@ -2,8 +2,24 @@
 
 from __future__ import annotations
 
-from bml_schema import Block, Problem, Speech, Sync, SyncRef, Wait, parse
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bml_schema import (
+    Block,
+    Constraint,
+    Problem,
+    Required,
+    Speech,
+    Sync,
+    SyncRef,
+    Wait,
+    parse,
+    without,
+    write,
+)
 from bml_schema.losses import Losses
+from tests.strategies import blocks
 
 
 def only(inside: str) -> Block:
@@ -80,3 +96,52 @@ def test_a_node_that_names_nothing_dropped_is_itself() -> None:
     assert losses.without(node) is node
     assert losses.without(other) is other
     assert not losses.lost
+
+
+def test_without_gives_the_rest_of_a_block_and_what_went() -> None:
+    synchronize = "<synchronize><sync ref='a:end'/><sync ref='2'/></synchronize>"
+    block = only(
+        f"<wait id='a'/><wait id='c' start='a:end+1' end='9'/><constraint id='k'>{synchronize}</constraint>"
+        "<required><wait id='d' start='c:end' end='a:end'/></required>"
+    )
+    left, lost, fatal = without(block, ["a"])
+    assert left.children == (
+        Wait(id="c", syncs={"end": SyncRef(offset=9.0)}),
+        Required(children=(Wait(id="d", syncs={"start": SyncRef(behaviour="c", sync="end")}),)),
+    )
+    assert [b.id for b in left.behaviours] == ["c", "d"]
+    assert lost == {"a": ("c:start", "k", "d:end")}
+    assert not fatal
+    assert left.places == block.places
+
+
+def test_without_tells_whose_loss_breaks_a_required_constraint() -> None:
+    before = "<before ref='a:end'><sync ref='c:end'/></before>"
+    block = only(f"<wait id='a'/><wait id='c'/><required><constraint>{before}</constraint></required>")
+    left, lost, fatal = without(block, {"a"})
+    assert left.children == (Wait(id="c"), Required())
+    assert lost == {"a": ("/bml/required[1]/constraint[1]",)}
+    assert fatal == {"a"}
+    # Made by hand, a constraint is required because of where it stands.
+    made = Block(
+        id="b", children=(Wait(id="a"), Required(children=(Constraint(parts=block.constraints[0].parts),)))
+    )
+    assert without(made, {"a"}).fatal == {"a"}
+
+
+@given(blocks(), st.data())
+def test_what_is_left_names_nothing_that_went_and_is_a_sound_document(
+    block: Block, data: st.DataObject
+) -> None:
+    ids = [b.id for b in block.behaviours]
+    gone = data.draw(st.sets(st.sampled_from(ids)) if ids else st.just(set()))
+    left = without(block, gone).block
+    assert [b.id for b in left.behaviours] == [id for id in ids if id not in gone]
+    back = parse(write(left))
+    assert not back.problems
+    assert back == left
+
+
+@given(blocks())
+def test_without_nobody_a_block_is_itself(block: Block) -> None:
+    assert without(block, ()) == (block, {}, frozenset())
