@@ -4,73 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.animation.frames import FAPFrames
-from realizer.arrays import Bool, Int32
+from realizer.animation.fap_clip import FAPClip
 from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.pipeline import Realization
 
-__all__ = ["OUTPUTS", "FAPClip", "encode", "write_fap"]
-
-
-@dataclass(frozen=True, eq=False)
-class FAPClip:
-    """A text FAP file as numbers.
-
-    Attributes:
-        name: from the header; no blanks when written.
-        fps: frames a second.
-        values: (n, 68) int32 in each FAP's FAPU, column = FAP - 1; 0 where not given. Columns 0 and 1 are 0.
-        mask: (68,) bool, True where any frame gives the FAP.
-        visemes: (n, 4) int32: select1, select2, blend, def of FAP 1; zeros unless mask[0].
-        expressions: (n, 6) int32: select1, intensity1, select2, intensity2, init_face, def of FAP 2.
-        notes: how the text departed from the format, a sentence each; () for what `encode` wrote.
-    """
-
-    name: str
-    fps: float
-    values: Int32
-    mask: Bool
-    visemes: Int32
-    expressions: Int32
-    notes: tuple[str, ...] = field(default=())
-
-    @staticmethod
-    def of(frames: FAPFrames, fps: float, name: str) -> FAPClip:
-        """The frames rounded to integers; FAP 1 and 2 stay out."""
-        values = frames.integers()
-        mask = frames.mask.copy()
-        mask[:2] = False
-        values[:, ~mask] = 0
-        count = len(values)
-        return FAPClip(
-            name, fps, values, mask, np.zeros((count, 4), np.int32), np.zeros((count, 6), np.int32)
-        )
-
-    def frames(self) -> FAPFrames:
-        """The values on a clock that starts at 0; FAP 1 and 2 are left out: frames have no place for them."""
-        mask = self.mask.copy()
-        mask[:2] = False
-        return FAPFrames(np.arange(len(self.values)) / self.fps, self.values.astype(np.float32), mask)
-
-    def __eq__(self, other: object) -> bool:
-        """Same name, rate and numbers; notes do not count."""
-        if not isinstance(other, FAPClip):
-            return NotImplemented
-        arrays = ("values", "mask", "visemes", "expressions")
-        return (self.name, self.fps) == (other.name, other.fps) and all(
-            np.array_equal(getattr(self, a), getattr(other, a)) for a in arrays
-        )
-
-    __hash__ = None  # type: ignore[assignment]
+__all__ = ["OUTPUTS", "encode", "write_fap"]
 
 
 def encode(clip: FAPClip) -> str:

@@ -11,9 +11,9 @@ import wave
 import numpy as np
 import pytest
 
+from realizer.animation.fap_reader import read_fap
 from realizer.animation.targets import AU_NAMES
 from realizer.outputs import OUTPUTS, Drawing, output_for
-from realizer.outputs.fap_reader import read_fap
 from realizer.tables import faps
 
 TEXTS = (".fap", ".json", ".csv", ".vtt", ".wav")

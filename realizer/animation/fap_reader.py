@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from realizer.animation.fap_clip import FAPClip
 from realizer.arrays import Bool
 from realizer.errors import RealizerError
-from realizer.outputs.fap_text import FAPClip
 from realizer.tables import faps
 
 __all__ = ["read_fap"]
