@@ -1,0 +1,3 @@
+"""The doors of the service: one module each, all of them leading into the same sessions."""
+
+__all__: list[str] = []
