@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bml_schema.nodes import Behaviour, Part, bmla, bmlt
 from bml_schema.shape import attribute, child, node, text
-from bml_schema.values import Value, block_name, names, number, one_of, word
+from bml_schema.values import Value, block_name, name, names, number, one_of, word
 
 __all__ = [
     "Activate",
@@ -19,7 +19,7 @@ __all__ = [
 
 def _read_target(text: str) -> tuple[str, str]:
     block, _, behaviour = text.strip().partition(":")
-    return block_name.read(block), names.read(behaviour)[0]
+    return block_name.read(block), name.read(behaviour)
 
 
 # Another block's behaviour, as feedback names it.
@@ -72,10 +72,7 @@ class ParameterValueChange(Behaviour):
     tag = bmla("parametervaluechange")
     target: tuple[str, str] = attribute(behaviour_name)
     param_id: str = attribute(word)
-    trajectory: Trajectory | None = child(Trajectory, default=None)
-
-    def fault(self) -> str:
-        return "" if self.trajectory else "wanted <trajectory>, got none"
+    trajectory: Trajectory = child(Trajectory)
 
 
 @node

@@ -16,8 +16,11 @@ from bml_schema.canonical import attributes, canonical
 from bml_schema.errors import Fault, shown
 from bml_schema.escape import escape
 from bml_schema.nodes import (
+    BMLA,
+    BMLT,
     CORE,
     EXTENSIONS,
+    OWN,
     After,
     Before,
     Behaviour,
@@ -39,6 +42,7 @@ Vocabulary = Mapping[str, type[Behaviour]]
 _DRAFTS = frozenset({"http://www.mindmakers.org/projects/BML"})
 _SSML = "application/ssml+xml"
 _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
+_KNOWN = (*_OURS, f"{{{BMLA}}}", f"{{{BMLT}}}", f"{{{OWN}}}")
 _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
 
@@ -150,7 +154,8 @@ class Elements:
                 descriptions.append(self.description(child))
                 continue
             spec = shape.by_tag.get(tag)
-            if spec is None and tag.startswith(_OURS[0]):
+            if spec is None and tag.startswith(_KNOWN):
+                # Documents leave an extension's children in the core namespace, in none, or in its sister's.
                 spec = shape.by_local.get(local(tag))
             if spec is not None:
                 found.setdefault(spec[0].field, []).append(self.node(spec[1], child))

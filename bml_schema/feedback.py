@@ -62,7 +62,7 @@ class BlockProgress:
             "blockProgress",
             {"id": self.id, "globalTime": self.global_time, "characterId": self.character_id},
             seq=self.seq if seq is None else seq,
-            bmla={"posixTime": _posix(self.global_time, epoch), "status": self.status},
+            bmla={"posixTime": _posix(self.global_time, epoch, self.posix_time), "status": self.status},
         )
 
 
@@ -94,7 +94,7 @@ class SyncPointProgress:
                 "characterId": self.character_id,
             },
             seq=self.seq if seq is None else seq,
-            bmla={"posixTime": _posix(self.global_time, epoch)},
+            bmla={"posixTime": _posix(self.global_time, epoch, self.posix_time)},
         )
 
 
@@ -130,12 +130,15 @@ class BlockPrediction:
 
     Attributes:
         status: BMLA's word for its state: IN_PREP, PENDING, LURKING, IN_EXEC, SUBSIDING.
+        posix_start, posix_end: milliseconds since 1970, as read; None where it does not say.
     """
 
     id: str
     global_start: float | None = None
     global_end: float | None = None
     status: str | None = None
+    posix_start: int | None = field(default=None, compare=False)
+    posix_end: int | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,8 +162,8 @@ class PredictionFeedback:
         for block in self.blocks:
             times = {"id": block.id, "globalStart": block.global_start, "globalEnd": block.global_end}
             told = {
-                "posixStartTime": _posix(block.global_start, epoch),
-                "posixEndTime": _posix(block.global_end, epoch),
+                "posixStartTime": _posix(block.global_start, epoch, block.posix_start),
+                "posixEndTime": _posix(block.global_end, epoch, block.posix_end),
                 "status": block.status,
             }
             named = {writer.name(bmla(name)): value for name, value in told.items() if value is not None}
@@ -245,7 +248,12 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
 def _block(child: etree._Element) -> BlockPrediction:
     start, end = (_time(child, n) if n in child.attrib else None for n in ("globalStart", "globalEnd"))
     return BlockPrediction(
-        id=_needed(child, "id"), global_start=start, global_end=end, status=child.get(bmla("status"))
+        id=_needed(child, "id"),
+        global_start=start,
+        global_end=end,
+        status=child.get(bmla("status")),
+        posix_start=_milliseconds(child, "posixStartTime"),
+        posix_end=_milliseconds(child, "posixEndTime"),
     )
 
 
@@ -276,17 +284,19 @@ def _seq(root: etree._Element) -> int | None:
     return _whole(root.get(own("seq"), ""))
 
 
-def _milliseconds(root: etree._Element) -> int | None:
-    return _whole(root.get(bmla("posixTime"), ""))
+def _milliseconds(source: etree._Element, name: str = "posixTime") -> int | None:
+    return _whole(source.get(bmla(name), ""))
 
 
 def _whole(value: str) -> int | None:
     return int(value) if value.isdecimal() and len(value) < 20 else None
 
 
-def _posix(time: float | None, epoch: float | None) -> str | None:
-    """Whole milliseconds since 1970 of a time on the session clock."""
-    return None if time is None or epoch is None else str(round((epoch + time) * 1000))
+def _posix(time: float | None, epoch: float | None, read: int | None) -> str | None:
+    """Whole milliseconds since 1970 of a time on the session clock; without an epoch, what was read."""
+    if time is None or epoch is None:
+        return None if read is None else str(read)
+    return str(round((epoch + time) * 1000))
 
 
 def _attributes(values: Mapping[str, str | float | None]) -> str:
@@ -312,5 +322,7 @@ def _xml(
     if told := {f"bmla:{name}": value for name, value in (bmla or {}).items() if value is not None}:
         start += f' xmlns:bmla="{BMLA}"{_attributes(told)}'
     if seq is not None:
-        start += f' xmlns:realizer="{OWN}" realizer:seq="{seq}"'
+        declared = f'xmlns:realizer="{OWN}"'
+        # A predicted behaviour of ours has declared it already.
+        start += f' realizer:seq="{seq}"' if declared in declarations else f' {declared} realizer:seq="{seq}"'
     return f"{start}>{inside}</{name}>" if inside else f"{start}/>"

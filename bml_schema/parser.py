@@ -35,7 +35,8 @@ __all__ = ["MOST_BEHAVIOURS"]
 MOST_BEHAVIOURS = 10_000  # in one block; more than anybody writes, and still scheduled in about a second
 _MOST_LISTED = 10  # lost references named in a warning's text; `Problem.lost` has them all
 # BMLA says this in composition or in an attribute of its own.
-_APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\(([^()]*)\)\s*")
+_APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\s*\(([^()]*)\)\s*", re.IGNORECASE)
+_BLOCK_LISTS = {a.field for a in shape_of(Block).attributes.values() if a.value is block_names}
 _MOST_ID = 256  # characters of an id a warning repeats
 
 
@@ -62,7 +63,7 @@ def read_block(
     if elements.tag(root) != Block.tag:
         raise BMLError(f"wanted <bml> in namespace {CORE}, got {shown(str(root.tag))}", line=line)
     try:
-        values, faults = _block_attributes(root, line)
+        values, wrong_attributes = _block_attributes(root, line)
     except Fault as wrong:
         raise BMLError(wrong.text, line=line, path="/bml") from None
     names = elements.names = Names(values["id"])
@@ -72,8 +73,8 @@ def read_block(
     if len(entries) > most_behaviours:
         said = f"wanted at most {most_behaviours} behaviours and constraints in a block, got {len(entries)}"
         raise BMLError(said, line=line, path="/bml", block=names.block)
-    for fault in faults:
-        reader.problem(names.block, fault, "/bml", root)
+    if wrong_attributes:
+        reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root)
     for entry in entries:
         reader.name(entry)
     nodes: dict[int, Behaviour | Constraint] = {}
@@ -111,11 +112,12 @@ def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour
     return replace(node, id=id)
 
 
-def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], list[Fault]]:
-    """Values by field; a fault in the id is an error, any other leaves the default."""
+def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], str]:
+    """Values by field, and what is wrong with them; a fault in the id is an error."""
     known = shape_of(Block).attributes
     values: dict[str, Any] = {"foreign": {}}
-    faults: list[Fault] = []
+    faults: list[str] = []
+    after: tuple[str, ...] = ()
     if "id" not in root.attrib:
         raise BMLError("id: wanted one, got none", line=line, path="/bml")
     for name, text in attributes(root):
@@ -124,8 +126,8 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
             values["foreign"][name] = text
             continue
         try:
-            if name == "composition" and (after := _APPEND_AFTER.fullmatch(text)):
-                values.setdefault("append_after", block_names.read(after[1]))
+            if name == "composition" and (listed := _APPEND_AFTER.fullmatch(text)):
+                after = block_names.read(listed[1])
             else:
                 values[spec.field] = spec.value.read(text)
         except ValueError:
@@ -133,8 +135,14 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
             if name == "id":
                 raise BMLError(said, line=line, path="/bml") from None
             if text.strip():
-                faults.append(Fault(f"{said}; taken as {spec.default or 'none'}", root))
-    return values, faults
+                default = "" if spec.default is None else spec.value.write(spec.default)
+                faults.append(f"{said}; taken as {default or 'none'}")
+    if after:
+        values["append_after"] = tuple(dict.fromkeys((*values.get("append_after", ()), *after)))
+    for field in _BLOCK_LISTS & values.keys():
+        # A block cannot wait for itself; its id in such a list says nothing.
+        values[field] = tuple(id for id in values[field] if id != values["id"])
+    return values, "; ".join(faults)
 
 
 class _Entry(NamedTuple):
@@ -232,10 +240,18 @@ class _Reader:
 
     def unknown(self, entry: _Entry) -> Fault:
         tag, element = entry.tag, entry.element
-        if not tag.startswith((f"{{{CORE}}}", f"{{{EXTENSIONS}}}")):
+        standard = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
+        if not tag.startswith(standard):
             return Fault(f"no behaviour {shown(tag)} is known here", element, CUSTOM_BEHAVIOR_NOT_SUPPORTED)
-        near = self.names.suggest(local(tag), [local(t) for t in self.elements.vocabulary])
-        return Fault(f"no behaviour <{local(tag)}> in BML 1.0{near}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
+        name = local(tag)
+        elsewhere = [t for t in self.elements.vocabulary if local(t) == name]
+        if elsewhere:
+            hint = f", but one in the namespace {elsewhere[0][1:].partition('}')[0]}"
+        else:
+            hint = self.names.suggest(
+                name, [local(t) for t in self.elements.vocabulary if t.startswith(standard)]
+            )
+        return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
     def constraint(self, entry: _Entry) -> Constraint | None:
         """The node of an entry; None, and a Problem, if it is dropped."""

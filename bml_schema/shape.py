@@ -59,7 +59,7 @@ class Shape:
         attributes: XML name -> Attribute.
         children: in order of declaration.
         by_tag: Clark tag -> (Child, class); `by_local`: the same by local name, for documents that leave an
-            extension's own children in the core namespace.
+            extension's own children in another namespace.
         mixed: field of the mixed content (text and children in order), or "".
         text: field of the character data, or "".
         names: names of all fields.

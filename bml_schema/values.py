@@ -128,8 +128,19 @@ def _read_block_name(text: str) -> str:
     return text
 
 
-def _read_names(text: str) -> tuple[str, ...]:
+def _read_block_names(text: str) -> tuple[str, ...]:
     return tuple(_read_block_name(name) for name in text.split(",") if name.strip())
+
+
+def _read_names(text: str) -> tuple[str, ...]:
+    return tuple(_read_name(name) for name in re.split(r"[,\s]+", text.strip()) if name)
+
+
+def _write_names(names: tuple[str, ...]) -> str:
+    for one in names:
+        if "," in one:
+            raise ValueError(f'wanted a name without ",", which stands between names in a list, got "{one}"')
+    return ",".join(names)
 
 
 def _read_flag(text: str) -> bool:
@@ -144,15 +155,18 @@ word = Value("a word", _read_word)
 string = Value("text", str)
 flag = Value("true or false", _read_flag, lambda v: "true" if v else "false", "boolean")
 seconds = number(-MOST_SECONDS, MOST_SECONDS, wanted=f"seconds, at most {MOST_SECONDS:g}")
-# Ids hold no colon, because references and feedback ids are joined with it, and no blank, because
-# "a - 1" must always mean an offset. "bml" is the block itself in references.
+# Ids hold no colon, because references and feedback ids are joined with it. Those of behaviours hold no
+# blank, because "a - 1" must always mean an offset. "bml" is the block itself in references.
 block_name = Value(
-    f'a name of at most {_MOST_NAME} characters without ":", other than "bml"', _read_block_name
+    f'a name of at most {_MOST_NAME} characters without ":", other than "bml"',
+    _read_block_name,
+    type="name",
 )
-block_names = Value(
-    "names of blocks with commas between them", _read_names, lambda names: ",".join(names), "names"
+name = Value(
+    f'a name of at most {_MOST_NAME} characters without blanks or ":", other than "bml"',
+    _read_name,
+    type="name",
 )
-names = Value(
-    "names with commas between them", lambda t: tuple(map(_read_name, t.split(","))), ",".join, "names"
-)
-name = Value(f'a name of at most {_MOST_NAME} characters without blanks or ":", other than "bml"', _read_name)
+# BMLA puts commas between names; ids of behaviours hold no blanks, so that blanks may stand there too.
+block_names = Value("names of blocks with commas between them", _read_block_names, _write_names, "blockNames")
+names = Value("names of behaviours with commas between them", _read_names, _write_names, "names")

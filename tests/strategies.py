@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 from hypothesis import strategies as st
 
 from bml_schema import (
+    BMLA,
     CORE,
     VOCABULARY,
     After,
@@ -17,20 +17,16 @@ from bml_schema import (
     Block,
     Constraint,
     Description,
-    FaceFacs,
-    FaceLexeme,
-    FaceShift,
-    Pose,
+    Emotion,
+    Mood,
     Required,
     Speech,
     SpeechText,
-    Stance,
     Sync,
     Synchronize,
     SyncRef,
     Value,
 )
-from bml_schema.behaviours import Face
 from bml_schema.shape import shape_of, sync_ref
 
 __all__ = ["attribute_values", "blocks", "descriptions", "names", "numbers", "xml_text"]
@@ -42,6 +38,7 @@ _CHARACTERS = st.one_of(
     st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"),
 )
 
+# No commas: names in lists have none.
 names = st.text(_LETTERS, min_size=1, max_size=8).filter(lambda n: n != "bml" and n == n.strip())
 numbers = st.one_of(
     st.floats(-86400, 86400, allow_nan=False),
@@ -64,6 +61,12 @@ def attribute_values(value: Value) -> st.SearchStrategy[Any]:
         return st.floats(value.low, value.high, allow_nan=False)
     if value.type == "boolean":
         return st.booleans()
+    if value.type == "name":
+        return names
+    if value.type in ("names", "blockNames"):
+        return st.lists(names, max_size=3, unique=True).map(tuple)
+    if value.type == "behaviourName":
+        return st.tuples(names, names)
     return xml_text(1).map(str.strip).filter(bool)
 
 
@@ -112,22 +115,37 @@ def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
     for spec in shape_of(cls).attributes.values():
         if spec.field != "id" and spec.value is not sync_ref and (spec.required or draw(st.booleans())):
             values[spec.field] = draw(attribute_values(spec.value))
+    if cls in (Emotion, Mood):
+        # Named by a word, or by a place on the wheel.
+        word, angle = values.pop("name", None), values.pop("angle", None)
+        if word:
+            values.pop("activation", None)
+        values.update({"name": word} if word else {"angle": angle or 0.0})
     return values
 
 
-def _content(draw: st.DrawFn, cls: type[Behaviour]) -> dict[str, Any]:
-    """Values for the children of a class."""
-    own = {f.name for f in fields(cls)}
-    values: dict[str, Any] = {}
-    if issubclass(cls, Face | FaceShift):
-        kinds = st.sampled_from([FaceLexeme, FaceFacs])
-        chosen = draw(st.lists(kinds, min_size=1, max_size=3))
-        values["parts"] = tuple(k(id=draw(st.just("") | names), **_own_values(draw, k)) for k in chosen)
-    if "stance" in own:
-        values["stance"] = draw(st.none() | st.just(Stance(type="SITTING")))
-        poses = draw(st.integers(0, 2))
-        values["poses"] = tuple(Pose(**_own_values(draw, Pose)) for _ in range(poses))
+def _content(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
+    """Values for the children and the text of a class; not for mixed content, which holds references."""
+    shape = shape_of(cls)
+    values: dict[str, Any] = {shape.text: draw(xml_text())} if shape.text else {}
+    for kind in shape.children:
+        if kind.classes == (SpeechText,):
+            continue
+        most = 3 if kind.many else 1
+        chosen = draw(st.lists(st.sampled_from(kind.classes), min_size=kind.least, max_size=most))
+        nodes = [_part(draw, c) for c in chosen]
+        if kind.many:
+            values[kind.field] = tuple(nodes)
+        elif nodes:
+            values[kind.field] = nodes[0]
     return values
+
+
+def _part(draw: st.DrawFn, cls: type[Any]) -> Any:
+    values = _own_values(draw, cls) | _content(draw, cls)
+    if issubclass(cls, Behaviour):  # a part of a face, which needs no id
+        values["id"] = draw(st.just("") | names)
+    return cls(**values)
 
 
 @st.composite
@@ -139,7 +157,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     """
     ids = draw(st.lists(names, max_size=6, unique=True))
     kinds = {id: draw(st.sampled_from(sorted(VOCABULARY.values(), key=lambda c: c.tag))) for id in ids}
-    values = {id: _own_values(draw, kinds[id]) | _content(draw, kinds[id]) for id in ids}
+    given = {id: _own_values(draw, kinds[id]) | _content(draw, kinds[id]) for id in ids}
     marks = {
         id: draw(st.lists(names.filter(lambda n: n not in ("start", "end")), max_size=3, unique=True))
         for id in ids
@@ -148,12 +166,12 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     points: dict[str, list[tuple[str, int | None]]] = {}
     for id, cls in kinds.items():
         points[id] = [(p, None) for p in (*cls.sync_points, *marks.get(id, []))]
-        times = values[id].get("repetition", 1)
+        times = given[id].get("repetition", 1)
         if times > 1:
             points[id] += [("stroke", n) for n in range(1, min(times, 4) + 1)]
     refs = _references(points) if points else numbers.map(lambda t: SyncRef(offset=t))
     others = st.dictionaries(
-        st.sampled_from(["zz", "{urn:a}b", "{http://www.asap-project.org/bmla}priority", f"{{{CORE}}}id"]),
+        st.sampled_from(["zz", "{urn:a}b", f"{{{BMLA}}}unheardOf", f"{{{CORE}}}id"]),
         xml_text(),
         max_size=2,
     )
@@ -163,13 +181,13 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
             parts: list[str | Sync] = [draw(xml_text(1))]
             for mark in marks[id]:
                 parts += [Sync(id=mark, ref=draw(st.none() | refs)), draw(xml_text(1))]
-            values[id]["text"] = SpeechText(parts=tuple(parts))
+            given[id]["text"] = SpeechText(parts=tuple(parts))
         node = cls(
             id=id,
             syncs={p: draw(refs) for p in cls.sync_points if draw(st.integers(0, 2)) == 0},
             descriptions=tuple(draw(st.lists(descriptions(), max_size=1))),
             foreign=draw(others) if foreign else {},
-            **values[id],
+            **given[id],
         )
         nodes.append(node)
     some = st.lists(refs, min_size=1, max_size=3).map(tuple)
@@ -184,10 +202,8 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     cut = draw(st.integers(0, len(nodes)))
     inside = tuple(draw(st.permutations(nodes[cut:])))
     children = (*nodes[:cut], *((Required(children=inside),) if draw(st.booleans()) else inside))
-    return Block(
-        id=draw(names),
-        character_id=draw(st.none() | names),
-        composition=draw(st.sampled_from(["MERGE", "APPEND", "REPLACE"])),
-        children=children,
-        foreign=draw(others) if foreign else {},
-    )
+    id = draw(names)
+    values = _own_values(draw, Block)
+    # Its own id in a list of blocks says nothing, and is not kept.
+    lists = {k: tuple(n for n in v if n != id) for k, v in values.items() if isinstance(v, tuple)}
+    return Block(id=id, children=children, foreign=draw(others) if foreign else {}, **values | lists)

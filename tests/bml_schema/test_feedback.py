@@ -13,6 +13,7 @@ from bml_schema import (
     BMLA,
     CORE,
     OWN,
+    Blink,
     BlockPrediction,
     BlockProgress,
     BMLError,
@@ -90,10 +91,31 @@ def test_the_number_of_a_message_is_in_our_own_namespace(told: Feedback, seq: in
 
 @given(feedback)
 def test_every_element_is_in_a_known_namespace_and_names_are_plain(told: Feedback) -> None:
-    root = etree.fromstring(told.to_xml(7).encode())
+    root = etree.fromstring(told.to_xml(7, 1.7e9).encode())
     assert str(root.tag).startswith(f"{{{CORE}}}")
     for name in root.attrib:
-        assert not name.startswith("{") or name in (f"{{{OWN}}}seq", f"{{{BMLA}}}status")
+        known = (f"{{{OWN}}}seq", f"{{{BMLA}}}status", f"{{{BMLA}}}posixTime")
+        assert not name.startswith("{") or name in known
+
+
+@given(feedback, st.integers(0, 2 * 10**9))
+def test_wall_clock_times_come_beside_those_of_the_session(told: Feedback, epoch: int) -> None:
+    back = parse_feedback(told.to_xml(1, epoch))
+    assert back == told
+    if isinstance(back, BlockProgress | SyncPointProgress):
+        assert back.posix_time == round((epoch + back.global_time) * 1000)
+    if isinstance(back, PredictionFeedback):
+        for block in back.blocks:
+            for time, posix in ((block.global_start, block.posix_start), (block.global_end, block.posix_end)):
+                assert posix == (None if time is None else round((epoch + time) * 1000))
+    assert back.to_xml() == told.to_xml(1, epoch), "what was read can be passed on as it was"
+
+
+def test_a_predicted_behaviour_of_ours_and_a_number_share_a_prefix() -> None:
+    told = PredictionFeedback(behaviours=(Blink(id="b:x"),))
+    root = etree.fromstring(told.to_xml(4).encode())
+    assert root.get(f"{{{OWN}}}seq") == "4"
+    assert parse_feedback(told.to_xml(4)) == told
 
 
 def test_block_progress_looks_like_the_standards() -> None:

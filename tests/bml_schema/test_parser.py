@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import CORE, Block, BMLError, Place, Required, SyncRef, Wait, parse
+from bml_schema import BMLA, CORE, Block, BMLError, Place, Required, SyncRef, Wait, parse, write
 
 
 def only(inside: str, attributes: str = "id='b'") -> Block:
@@ -44,6 +44,67 @@ def test_an_unknown_composition_is_told_of_and_taken_as_merge() -> None:
     (problem,) = block.problems
     assert (problem.id, problem.type, problem.fatal) == ("b", "PARSING_FAILURE", False)
     assert problem.text == 'composition: wanted MERGE, APPEND or REPLACE, got "BLEND"; taken as MERGE'
+
+
+LISTS = {
+    "append_after": "appendAfter",
+    "chunk_after": "chunkAfter",
+    "prepend_before": "prependBefore",
+    "chunk_before": "chunkBefore",
+    "interrupt": "interrupt",
+    "on_start": "onStart",
+}
+
+
+@pytest.mark.parametrize("field", LISTS)
+def test_bmlas_lists_of_blocks_have_commas_and_may_be_empty(field: str) -> None:
+    def read(listed: str) -> object:
+        block = only("", f"id='b' xmlns:a='{BMLA}' a:{LISTS[field]}='{listed}'")
+        assert not block.problems
+        assert parse(write(block)) == block
+        return getattr(block, field)
+
+    assert read("b1, my block ,b-3") == ("b1", "my block", "b-3")
+    assert read("b1") == ("b1",)
+    assert read("") == read(" , ") == ()
+    assert read("b1,b,b2") == ("b1", "b2"), "a block cannot wait for itself"
+
+
+@pytest.mark.parametrize(
+    ("composition", "after"),
+    [
+        ("APPEND-AFTER(b1,b2)", ("b1", "b2")),
+        (" append-after ( b1 , b2 ) ", ("b1", "b2")),
+        ("APPEND-AFTER()", ()),
+        ("APPEND-AFTER(b)", ()),
+    ],
+)
+def test_append_after_may_stand_in_the_composition(composition: str, after: tuple[str, ...]) -> None:
+    block = only("", f"id='b' composition='{composition}'")
+    assert (block.composition, block.append_after, block.problems) == ("MERGE", after, ())
+
+
+def test_append_after_in_both_places_is_both() -> None:
+    for attributes in (
+        "a:appendAfter='b1,b2' composition='APPEND-AFTER(b2,b3)'",
+        "composition='APPEND-AFTER(b1,b2)' a:appendAfter='b3'",
+    ):
+        block = only("", f"id='b' xmlns:a='{BMLA}' {attributes}")
+        assert sorted(block.append_after) == ["b1", "b2", "b3"]
+
+
+def test_wrong_attributes_of_a_block_are_one_problem_and_leave_their_defaults() -> None:
+    attributes = "composition='MIX' a:preplan='maybe' a:chunkAfter='a:b' a:appendAfter='bml' a:onStart='b2'"
+    block = only("<wait id='w'/>", f"id='b' xmlns:a='{BMLA}' {attributes}")
+    assert block == Block(id="b", on_start=("b2",), children=(Wait(id="w"),))
+    (problem,) = block.problems
+    assert (problem.id, problem.type, problem.fatal) == ("b", "PARSING_FAILURE", False)
+    assert problem.text == (
+        'composition: wanted MERGE, APPEND or REPLACE, got "MIX"; taken as MERGE; '
+        'preplan: wanted true or false, got "maybe"; taken as false; '
+        'chunkAfter: wanted names of blocks with commas between them, got "a:b"; taken as none; '
+        'appendAfter: wanted names of blocks with commas between them, got "bml"; taken as none'
+    )
 
 
 def test_the_character_is_read_and_an_empty_one_is_none() -> None:
@@ -118,7 +179,7 @@ def test_the_later_goes_even_when_the_first_is_bad() -> None:
 @pytest.mark.parametrize(
     ("inside", "type", "said"),
     [
-        ("<blink id='x'/>", "BEHAVIOR_TYPE_NOT_SUPPORTED", "no behaviour <blink> in BML 1.0"),
+        ("<wiggle id='x'/>", "BEHAVIOR_TYPE_NOT_SUPPORTED", "no behaviour <wiggle> in BML 1.0"),
         (
             "<haed id='x'/>",
             "BEHAVIOR_TYPE_NOT_SUPPORTED",

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import flag, integer, number, one_of, seconds, string, word
-from bml_schema.values import block_name, decimal, name, unwanted
+from bml_schema.values import block_name, block_names, decimal, name, names, unwanted
 from tests.strategies import attribute_values
 
 AMOUNT = number(0, 1)
@@ -103,9 +103,15 @@ def test_a_flag_is_true_or_false(text: str, value: bool) -> None:
         flag.read("yes")
 
 
+def test_names_in_a_list_have_commas_between_them_and_those_of_behaviours_blanks_too() -> None:
+    assert names.read(" a,b  c ,") == ("a", "b", "c")
+    assert block_names.read(" a b,c ,") == ("a b", "c")
+    assert names.read(" ") == block_names.read("") == ()
+
+
 @given(st.data())
 def test_each_value_reads_back_what_it_writes(data: st.DataObject) -> None:
-    kinds = [AMOUNT, integer(-3, 3), one_of("A", "B"), flag, word, seconds, string]
+    kinds = [AMOUNT, integer(-3, 3), one_of("A", "B"), flag, word, seconds, string, names, block_names]
     kind = data.draw(st.sampled_from(kinds))
     value = data.draw(attribute_values(kind))
     assert kind.read(kind.write(value)) == value

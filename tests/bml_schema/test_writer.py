@@ -54,9 +54,9 @@ def test_a_document_is_written_for_people_to_read() -> None:
 
 
 def test_foreign_namespaces_get_the_prefixes_people_know() -> None:
-    known = "{http://www.asap-project.org/bmla}appendAfter"
+    known = "{http://www.asap-project.org/bmla}unheardOf"
     text = write(Block(id="b", foreign={known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}))
-    assert 'bmla:appendAfter="x" ns2:k="1" ns3:k="2"' in text
+    assert 'bmla:unheardOf="x" ns2:k="1" ns3:k="2"' in text
     assert parse(text).foreign == {known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}
 
 

@@ -11,8 +11,11 @@ from hypothesis import given
 from lxml import etree
 
 from bml_schema import (
+    BMLA,
+    BMLT,
     CORE,
     EXTENSIONS,
+    OWN,
     VOCABULARY,
     After,
     Before,
@@ -20,12 +23,16 @@ from bml_schema import (
     Block,
     Constraint,
     Description,
+    FaceInterpolator,
+    Fap,
     Pose,
     Required,
     SpeechText,
     Stance,
     Sync,
     Synchronize,
+    Trajectory,
+    parse,
     write,
 )
 from bml_schema.shape import Attribute, shape_of
@@ -33,12 +40,16 @@ from tests.strategies import blocks
 
 XSD = Path(str(files("bml_schema") / "xsd"))
 XS = "{http://www.w3.org/2001/XMLSchema}"
-SCHEMAS = {
-    CORE: etree.parse(XSD / "bml-1.0.xsd").getroot(),
-    EXTENSIONS: etree.parse(XSD / "coreextensions-1.0.xsd").getroot(),
+FILES = {
+    CORE: "bml-1.0.xsd",
+    EXTENSIONS: "coreextensions-1.0.xsd",
+    BMLA: "bmla.xsd",
+    BMLT: "bmlt.xsd",
+    OWN: "realizer-1.xsd",
 }
-SCHEMA = etree.XMLSchema(etree.parse(XSD / "bml-1.0.xsd"))
-PREFIXES = {"bml": CORE, "ext": EXTENSIONS}
+SCHEMAS = {space: etree.parse(XSD / name).getroot() for space, name in FILES.items()}
+SCHEMA = etree.XMLSchema(etree.parse(XSD / "realizer-1.xsd"))  # it imports the others
+PREFIXES = {"bml": CORE, "ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 
 Element = etree._Element
 
@@ -67,6 +78,8 @@ def attributes(declaration: Element) -> dict[str, Element]:
             found[part.get("name", "")] = part
         elif part.tag == XS + "attributeGroup":
             found |= attributes(referred("attributeGroup", part.get("ref", "")))
+        elif part.tag in (XS + "simpleContent", XS + "extension"):
+            found |= attributes(part)
     return found
 
 
@@ -85,7 +98,10 @@ def children(declaration: Element) -> set[str]:
 
 def facets(attribute: Element) -> dict[str, Any]:
     """What the type of an attribute says: base, words, range."""
-    restriction = referred("simpleType", attribute.get("type", "")).find(XS + "restriction")
+    qname = attribute.get("type", "")
+    if qname.startswith("xs:"):
+        return {"base": qname}
+    restriction = referred("simpleType", qname).find(XS + "restriction")
     assert restriction is not None
     told: dict[str, list[str]] = {}
     for facet in restriction:
@@ -103,6 +119,9 @@ NODES: list[type[Any]] = [
     Synchronize,
     Before,
     After,
+    Trajectory,
+    FaceInterpolator,
+    Fap,
 ]
 EACH = pytest.mark.parametrize("cls", NODES, ids=[c.__name__ for c in NODES])
 
@@ -114,20 +133,35 @@ def declaration_of(cls: type[Any]) -> Element:
 
 def assert_agrees(spec: Attribute, declared: Element) -> None:
     assert spec.required == (declared.get("use") == "required"), spec.name
-    default = None if spec.required or spec.default is None else spec.value.write(spec.default)
+    default = None if spec.required or spec.default in (None, ()) else spec.value.write(spec.default)
     assert declared.get("default") == default, spec.name
     told = facets(declared)
     assert tuple(told.get("enumeration", ())) == spec.value.words, spec.name
+    if spec.value.type == "boolean":
+        assert told["base"] == "xs:boolean", spec.name
     if spec.value.low is not None:
         assert float(told["minInclusive"][0]) == spec.value.low, spec.name
         assert told["maxInclusive"] == [f"{spec.value.high:.15g}"], spec.name
         assert told["base"] == f"xs:{spec.value.type}", spec.name
 
 
+def own_attributes(cls: type[Any]) -> dict[str, Attribute]:
+    """The attributes of a class that are its element's own, not of another namespace."""
+    return {name: spec for name, spec in shape_of(cls).attributes.items() if not name.startswith("{")}
+
+
+def test_bmlas_attributes_of_blocks_and_behaviours_are_declared_and_no_others() -> None:
+    specs = {**shape_of(Block).attributes, **shape_of(Behaviour).attributes}
+    wanted = {name: spec for name, spec in specs.items() if name.startswith("{")}
+    assert {f"{{{BMLA}}}{e.get('name')}" for e in SCHEMAS[BMLA] if e.tag == XS + "attribute"} == set(wanted)
+    for name, spec in wanted.items():
+        assert_agrees(spec, named("attribute", BMLA, name.partition("}")[2]))
+
+
 @EACH
 def test_a_node_and_its_schema_have_the_same_attributes(cls: type[Any]) -> None:
     declared = attributes(declaration_of(cls))
-    specs = shape_of(cls).attributes
+    specs = own_attributes(cls)
     points = cls.sync_points if issubclass(cls, Behaviour) else ()
     assert set(declared) == set(specs) | set(points)
     for name, spec in specs.items():
@@ -170,8 +204,7 @@ def test_the_sync_of_speech_is_that_of_the_schema() -> None:
 @pytest.mark.parametrize(("part", "space"), [("faceLexeme", CORE), ("faceFacs", EXTENSIONS)])
 def test_the_parts_of_a_face_are_behaviours_without_timing(part: str, space: str) -> None:
     declared = attributes(named("complexType", space, f"{part}Part"))
-    cls = VOCABULARY[f"{{{space}}}{part}"]
-    specs = shape_of(cls).attributes
+    specs = own_attributes(VOCABULARY[f"{{{space}}}{part}"])
     assert set(declared) == set(specs)
     for name, spec in specs.items():
         if name == "id":
@@ -199,3 +232,24 @@ def test_the_schema_refuses_what_the_parser_refuses(change: str) -> None:
     given_ = {"lexeme": 'lexeme="NOD"', name: change}
     text = f'<bml xmlns="{CORE}" id="b"><head id="h" {" ".join(given_.values())}/></bml>'
     assert not SCHEMA.validate(etree.fromstring(text))
+
+
+@pytest.mark.parametrize(
+    ("on_block", "inside"),
+    [
+        ('bmla:preplan="maybe"', ""),
+        ('bmla:appendAfter="a:b"', ""),
+        ("", '<head id="h" lexeme="NOD" bmla:priority="high"/>'),
+        ("", '<bmla:interrupt id="i"/>'),
+        ("", '<bmla:interrupt id="i" target="b" include="a:b"/>'),
+        ("", '<bmla:parametervaluechange id="p" target="b1" paramId="volume"/>'),
+        ("", '<bmlt:facekeyframe id="k" type="OTHER"/>'),
+        ("", '<realizer:emotion id="e" activation="9"/>'),
+        ("", '<realizer:faps id="f"><realizer:fap number="1" value="0"/></realizer:faps>'),
+    ],
+)
+def test_the_schemas_of_the_extensions_refuse_what_the_parser_refuses(on_block: str, inside: str) -> None:
+    spaces = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in PREFIXES.items())
+    text = f'<bml xmlns="{CORE}" {spaces} id="b" {on_block}>{inside}</bml>'
+    assert not SCHEMA.validate(etree.fromstring(text))
+    assert parse(text).problems

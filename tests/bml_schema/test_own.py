@@ -1,0 +1,76 @@
+"""What this project adds to BML, in its own namespace."""
+
+from __future__ import annotations
+
+import pytest
+
+from bml_schema import OWN, Behaviour, Block, Emotion, Fap, FapFile, Faps, Idle, Mood, parse, write
+
+
+def document(inside: str) -> Block:
+    return parse(f"<bml id='b' xmlns:r='{OWN}'>{inside}</bml>")
+
+
+def only(inside: str) -> Behaviour:
+    """The one behaviour of a document, which must be sound and survive being written."""
+    block = document(inside)
+    assert not block.problems
+    assert parse(write(block)) == block
+    (behaviour,) = block.behaviours
+    return behaviour
+
+
+def test_an_emotion_has_a_word_or_a_place_on_the_wheel() -> None:
+    assert only("<r:emotion id='e' name='worried' intensity='1'/>") == Emotion(
+        id="e", name="worried", intensity=1.0
+    )
+    assert only("<r:mood id='e' angle='-90' activation='4.5' profile='k1'/>") == Mood(
+        id="e", angle=-90.0, activation=4.5, profile="k1"
+    )
+
+
+@pytest.mark.parametrize("tag", ["emotion", "mood"])
+@pytest.mark.parametrize(
+    ("attributes", "said"),
+    [
+        ("", "wanted a name, or an angle on the wheel, got neither"),
+        ("name='joy' angle='10'", "wanted a name, or an angle on the wheel, got both"),
+        ("name='joy' activation='2'", "activation: wanted an angle with it, got none"),
+        ("angle='10' activation='8'", "activation: wanted 1..7, got 8"),
+        ("name='joy' intensity='1.5'", "intensity: wanted 0..1, got 1.5"),
+    ],
+)
+def test_what_an_emotion_does_not_take(tag: str, attributes: str, said: str) -> None:
+    assert [p.text for p in document(f"<r:{tag} id='e' {attributes}/>").problems] == [said]
+
+
+def test_raw_faps_have_numbers_and_values_in_their_units() -> None:
+    node = only(
+        "<r:faps id='f' attackPeak='1'><r:fap number='3' value='-200'/><fap number='68' value='.5'/></r:faps>"
+    )
+    assert isinstance(node, Faps)
+    assert node.values == (Fap(number=3, value=-200.0), Fap(number=68, value=0.5))
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ("", "wanted <fap>, got none"),
+        ("<r:fap number='2' value='1'/>", "number: wanted a whole number 3..68, got 2"),
+        ("<r:fap number='3'/>", "value: wanted -100000..100000, got none"),
+        ("<r:fap number='3' value='1'>x</r:fap>", 'wanted elements, got the text "x"'),
+    ],
+)
+def test_what_raw_faps_do_not_take(inside: str, said: str) -> None:
+    assert [p.text for p in document(f"<r:faps id='f'>{inside}</r:faps>").problems] == [said]
+
+
+def test_files_and_idle_motion() -> None:
+    assert only("<r:fapFile id='f' fileName='a.fap'/>") == FapFile(id="f", file_name="a.fap")
+    assert only("<r:idle id='i' blinks='0'/>") == Idle(id="i", blinks=0.0)
+
+
+def test_ours_outside_our_namespace_are_pointed_to_it() -> None:
+    (problem,) = document("<blink id='x'/>").problems
+    assert (problem.id, problem.type) == ("b:x", "BEHAVIOR_TYPE_NOT_SUPPORTED")
+    assert problem.text == f"no behaviour <blink> in BML 1.0, but one in the namespace {OWN}"

@@ -1,0 +1,24 @@
+"""Which elements are behaviours."""
+
+from __future__ import annotations
+
+from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, VOCABULARY
+
+ELEMENTS = {
+    CORE: "gaze gazeShift head headDirectionShift faceLexeme face faceShift speech wait gesture pointing"
+    " posture postureShift locomotion",
+    EXTENSIONS: "faceFacs",
+    BMLA: "interrupt activate parametervaluechange",
+    BMLT: "audiofile facekeyframe",
+    OWN: "emotion mood expression faps fapFile blink idle",
+}
+
+
+def test_the_vocabulary_is_the_core_and_the_extensions() -> None:
+    assert set(VOCABULARY) == {
+        f"{{{space}}}{name}" for space, names in ELEMENTS.items() for name in names.split()
+    }
+
+
+def test_each_element_becomes_the_class_that_names_it() -> None:
+    assert all(cls.tag == tag for tag, cls in VOCABULARY.items())
