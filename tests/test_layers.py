@@ -23,7 +23,7 @@ MAY: dict[str, set[str]] = {
     "realizer.units": set(),
     "realizer.settings": {"realizer.errors"},
     "realizer.examples": set(),
-    "realizer.tables": VALUES,
+    "realizer.tables": VALUES | {"realizer.tables"},
     "realizer.scheduling": VALUES | {"bml_schema", "realizer.scheduling"},
     "realizer.speech": VALUES | {"realizer.speech", "realizer.tables"},
     "realizer.animation": VALUES | {"realizer.animation", "realizer.tables", "realizer.speech.utterance"},

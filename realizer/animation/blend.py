@@ -11,7 +11,8 @@ from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, smooth, weights
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, axis, region
+from realizer.animation.idle import Blink
+from realizer.animation.targets import AU_NAMES, axis, presence, region
 from realizer.arrays import Bool, Float64
 
 __all__ = ["blend"]
@@ -26,6 +27,8 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     - BASE states add up, so that one which is faded out while another rises passes smoothly into it; the
       part of a region that the GAZE layer has taken (its presence) is taken from them.
     - GAZE: where several gazes claim a region together more than once, each gets its share of it.
+    - IDLE: the part of its motion and of its blinks that base states have taken does not show. A blink comes
+      whole or not at all, as it is when it begins.
     - FAPs add up; presences add up to at most 1.
     - DIRECT: as far as such a channel is there, it replaces all that lies below.
 
@@ -41,6 +44,7 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     columns = sorted({channel.target.column for channel in alive})
     place = {column: i for i, column in enumerate(columns)}
     sampled = sample(alive, times)
+    _take_idle(sampled, alive, times)
     sums = _sums()[columns]
     shape = (len(columns), len(times))
     base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -84,6 +88,25 @@ def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
         if begin <= last and end >= first:
             alive.append(channel)
     return alive
+
+
+def _take_idle(sampled: Float64, channels: list[Channel], times: Float64) -> None:
+    """Take from the idle channels what the presences "motion" and "blinks" say, in place of their rows."""
+    taking = {
+        name: [i for i, channel in enumerate(channels) if channel.target == presence(name)]
+        for name in ("motion", "blinks")
+    }
+    if not any(taking.values()):
+        return
+    still = 1.0 - np.minimum(sampled[taking["motion"]].sum(axis=0), 1.0)
+    blinks = [(i, channel) for i, channel in enumerate(channels) if isinstance(channel, Blink)]
+    begins = np.array([blink.times[0] for _, blink in blinks])
+    kept = 1.0 - np.minimum(sample([channels[i] for i in taking["blinks"]], begins).sum(axis=0), 1.0)
+    for (i, blink), part in zip(blinks, kept, strict=True):
+        sampled[i] *= part > blink.draw
+    for i, channel in enumerate(channels):
+        if channel.layer is Layer.IDLE and not isinstance(channel, Blink):
+            sampled[i] *= still
 
 
 def _override(

@@ -7,6 +7,7 @@ random about it from (seed, kind, k), so any two windows of time agree where the
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +18,7 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
 
-__all__ = ["idle_channels"]
+__all__ = ["Blink", "idle_channels"]
 
 # s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
 BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
@@ -36,6 +37,17 @@ SACCADE_TIME = 0.04  # s
 COUNTER = {(52, 51): (61, 62), (53, 54): (64, 63)}
 
 
+@dataclass(frozen=True, eq=False)
+class Blink(Channel):
+    """One lid of an idle blink; it comes where the part of the blinks that the face keeps is above `draw`.
+
+    Attributes:
+        draw: 0..1, drawn from the number of the blink, so that fewer blinks are some of the usual ones.
+    """
+
+    draw: float = 0.0
+
+
 def idle_channels(start: float, end: float, seed: int) -> list[Channel]:
     """Blinks (AU45), head sway (AU51-56) and saccades (AU61-64) of the idle layer.
 
@@ -46,9 +58,16 @@ def idle_channels(start: float, end: float, seed: int) -> list[Channel]:
     Returns:
         Channels on the session clock. Blend a window of time with its own channels only.
     """
-    channels = [
-        Channel(lid, at + np.array(BLINK_TIMES), np.array(BLINK_VALUES), layer=Layer.IDLE, source="idle")
-        for at in _blinks(start, end, seed)
+    channels: list[Channel] = [
+        Blink(
+            lid,
+            at + np.array(BLINK_TIMES),
+            np.array(BLINK_VALUES),
+            layer=Layer.IDLE,
+            source="idle",
+            draw=draw,
+        )
+        for at, draw in _blinks(start, end, seed)
         for lid in au(45)
     ]
     for kind, (sides, most) in enumerate(SWAY.items()):
@@ -100,12 +119,13 @@ def _poses(
     return times, degrees
 
 
-def _blinks(start: float, end: float, seed: int) -> Float64:
-    """Onsets of the blinks that can be seen in start..end; the first comes after 0."""
+def _blinks(start: float, end: float, seed: int) -> list[tuple[float, float]]:
+    """Onset and draw of the blinks that can be seen in start..end; the first comes after 0."""
     count = 64
     while (onsets := _onsets(seed, count))[-1] <= end:
         count *= 2
-    return onsets[(onsets + BLINK_TIMES[-1] >= start) & (onsets <= end)]
+    seen = np.flatnonzero((onsets + BLINK_TIMES[-1] >= start) & (onsets <= end))
+    return list(zip(onsets[seen].tolist(), _uniform(seed, 304, seen).tolist(), strict=True))
 
 
 @lru_cache(maxsize=256)

@@ -1,4 +1,4 @@
-"""The fixed axis of what can be animated: AUs by side, the 68 FAPs, and how far a region is taken."""
+"""The fixed axis of what can be animated: AUs by side, the 68 FAPs, and how far something is taken."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from realizer import tables
 
 __all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence", "region"]
 
-# How far (0..1) a layer has taken a region from what lies below it: speech takes the lips,
-# a temporary gaze takes eyes and head from the base gaze.
-PRESENCES = ("lips", "eyes", "head")
+# How far (0..1) something is taken from what shows it otherwise: speech takes the lips, a temporary gaze
+# takes eyes and head from the base gaze, and a document takes blinks and small movements from the idle face.
+PRESENCES = ("lips", "eyes", "head", "blinks", "motion")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +62,18 @@ def fap(number: int) -> Target:
 
 
 def presence(region: str) -> Target:
-    """The column that says how far a region ("lips", "eyes", "head") is taken."""
+    """The column that says how far one of `PRESENCES` is taken."""
     return axis()[region]
 
 
 def region(target: Target) -> str:
-    """The part of the face a column moves, as base states are replaced: "eyes" (gaze), "head", or "face".
+    """What a column moves, as base states are replaced: "eyes" (gaze), "head", "face" or "idle".
 
     A presence stands in the region it takes; all FAPs but those of eyeballs and head are of the face.
     """
     name = target.name
     if name in PRESENCES:
-        return name if name != "lips" else "face"
+        return {"lips": "face", "blinks": "idle", "motion": "idle"}.get(name, name)
     if not name.rstrip("LR").isdigit():
         number = next(row.fap for row in tables.faps() if row.name == name)
         return "eyes" if 23 <= number <= 28 else "head" if 48 <= number <= 50 else "face"

@@ -6,12 +6,42 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from realizer.behaviours import bodily, face, gaze, head, speech, wait
+from realizer.behaviours import (
+    audio,
+    blink,
+    bodily,
+    control,
+    emotion,
+    expression,
+    face,
+    fap_values,
+    gaze,
+    head,
+    idle_control,
+    keyframes,
+    speech,
+    wait,
+)
 from realizer.behaviours.kind import Kind
 
 __all__ = ["KINDS", "MODULES", "VOCABULARY"]
 
-MODULES = (face, gaze, head, speech, wait, bodily)
+MODULES = (
+    face,
+    gaze,
+    head,
+    speech,
+    wait,
+    bodily,
+    emotion,
+    expression,
+    fap_values,
+    keyframes,
+    blink,
+    idle_control,
+    audio,
+    control,
+)
 
 # Clark tag of an element -> what it brings; -> the class a parser makes of it.
 KINDS: Mapping[str, Kind] = MappingProxyType({kind.tag: kind for module in MODULES for kind in module.KINDS})

@@ -52,7 +52,10 @@ def face_lexemes() -> Mapping[str, FaceLexeme]:
     Raises:
         TableError: a name that is no action unit, or an intensity outside 0..1.
     """
-    return {name: FaceLexeme(name, _aus(name, row)) for name, row in _rows("face").items()}
+    return {
+        name: FaceLexeme(name, read_aus(row["aus"], f"{FILE}, face.{name}"))
+        for name, row in _rows("face").items()
+    }
 
 
 @cache
@@ -91,18 +94,17 @@ def _rows(part: str) -> dict[str, Mapping[str, Any]]:
     return found
 
 
-def _aus(name: str, row: Mapping[str, Any]) -> dict[tuple[int, str], float]:
+def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], float]:
+    """(AU, side) -> intensity of a row such as { 1 = 0.5, 12L = 1.0 }; `place` is for messages."""
     known = tables.by_number(tables.action_units())
     aus = {}
-    for cell, amount in row["aus"].items():
+    for cell, amount in cells.items():
         match = re.fullmatch(r"(\d+)([LR]?)", cell)
         au = known.get(int(match[1])) if match else None
         if match is None or au is None or (match[2] and not au.sides):
-            raise TableError(f"{FILE}, face.{name}: wanted an action unit such as 12 or 12L, got {cell!r}")
+            raise TableError(f"{place}: wanted an action unit such as 12 or 12L, got {cell!r}")
         if not 0 < amount <= 1:
-            raise TableError(
-                f"{FILE}, face.{name}, {cell}: wanted an intensity above 0 and to 1, got {amount}"
-            )
+            raise TableError(f"{place}, {cell}: wanted an intensity above 0 and to 1, got {amount}")
         aus[au.au, SIDES[match[2]]] = float(amount)
     return aus
 

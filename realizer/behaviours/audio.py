@@ -1,0 +1,57 @@
+"""audiofile: a WAV file of the media folder -> what sounds from start to end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bml_schema import AudioFile
+from realizer.animation.channel import Channel
+from realizer.arrays import Float64
+from realizer.behaviours import media
+from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.wav_file import read_wav
+from realizer.scheduling.timing import Timing
+from realizer.speech.utterance import Utterance
+
+__all__ = ["KINDS"]
+
+
+def timing(node: AudioFile, world: World) -> Timing:
+    """As long as the file, exactly; one whose end the document gives is cut off there, or silent from its own
+    end on.
+    """
+    length = np.array([_sound(node, world).duration])
+    whole = Timing(("start", "end"), length, length, np.ones(1), rigid=True)
+    return replace(whole, least=np.zeros(1), rigid=False) if "end" in node.syncs else whole
+
+
+def expand(node: AudioFile, times: Float64, world: World) -> tuple[Channel, ...]:
+    """It moves nothing: nobody knows what is said in it."""
+    return ()
+
+
+def check(node: AudioFile, world: World) -> tuple[Fault, ...]:
+    return media.faults(node.file_name, world, read)
+
+
+def sound(node: AudioFile, world: World) -> Utterance | None:
+    return _sound(node, world)
+
+
+def read(content: bytes) -> Utterance:
+    """The sound of a file.
+
+    Raises:
+        RealizerError: no WAV, or a coding that is not supported.
+    """
+    rate, pcm = read_wav(content)
+    return Utterance(len(pcm) / rate, (), (), {}, rate, pcm)
+
+
+def _sound(node: AudioFile, world: World) -> Utterance:
+    return media.load(node.file_name, world, read)
+
+
+KINDS = (Kind(AudioFile, timing, expand, check, sound=sound, parameters={"volume": 100.0}),)

@@ -1,0 +1,25 @@
+"""blink: one blink of both lids, or a wink of one."""
+
+from __future__ import annotations
+
+from bml_schema import Blink
+from realizer.animation.channel import Channel
+from realizer.arrays import Float64
+from realizer.behaviours import poses
+from realizer.behaviours.kind import Kind, World
+from realizer.behaviours.preferred import preferred
+from realizer.scheduling.timing import Timing
+
+__all__ = ["KINDS"]
+
+
+def timing(node: Blink, world: World) -> Timing:
+    return preferred("blink")
+
+
+def expand(node: Blink, times: Float64, world: World) -> tuple[Channel, ...]:
+    """Shut from attackPeak to relax, by AU45."""
+    return poses.shown(poses.columns({(45, node.side): 1.0}, node.amount), times, node.id)
+
+
+KINDS = (Kind(Blink, timing, expand, parameters={"amount": "amount"}),)

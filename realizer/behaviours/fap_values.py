@@ -1,0 +1,122 @@
+"""faps, fapFile: raw facial animation parameters, a pose of them or a file -> FAP channels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bml_schema import FapFile, Faps
+from realizer import tables
+from realizer.animation.channel import Channel
+from realizer.animation.fap_clip import FAPClip
+from realizer.animation.fap_reader import read_fap
+from realizer.animation.targets import fap
+from realizer.arrays import Float64
+from realizer.behaviours import media, poses
+from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.preferred import preferred
+from realizer.behaviours.tracks import track
+from realizer.scheduling.timing import Timing
+
+__all__ = ["KINDS"]
+
+# 1/s^2; a recording bends less than an expression with which it is tied, and more than what is said.
+RECORDED = 100.0
+
+
+def timing(node: Faps, world: World) -> Timing:
+    return preferred("faps")
+
+
+def expand(node: Faps, times: Float64, world: World) -> tuple[Channel, ...]:
+    """There at attackPeak, held to relax, gone at end; they add to what else moves the face."""
+    return poses.shown({fap(part.number): part.value for part in node.values}, times, node.id)
+
+
+def check(node: Faps, world: World) -> tuple[Fault, ...]:
+    """A number that comes twice is fatal, a value that goes too far is not."""
+    rows = tables.faps()
+    seen: set[int] = set()
+    faults: list[Fault] = []
+    for part in node.values:
+        row = rows[part.number - 1]
+        if part.number in seen:
+            text = f"fap: wanted each number once, got {part.number} ({row.name}) twice"
+            return (Fault("CANNOT_CREATE_BEHAVIOR", text),)
+        seen.add(part.number)
+        faults += out_of_range(part.number, part.value, part.value)
+    return tuple(faults)
+
+
+def claims(node: Faps, world: World) -> frozenset[str]:
+    return frozenset(f"FAP {part.number}" for part in node.values)
+
+
+def timing_of_file(node: FapFile, world: World) -> Timing:
+    """As long as its frames last, from the first to the last; it stretches."""
+    clip = media.load(node.file_name, world, read)
+    length = (len(clip.values) - 1) / clip.fps
+    return Timing(("start", "end"), np.array([length]), np.zeros(1), np.array([RECORDED]))
+
+
+def expand_file(node: FapFile, times: Float64, world: World) -> tuple[Channel, ...]:
+    """Its frames from start to end; what is not neutral at an end gets there and back."""
+    clip = media.load(node.file_name, world, read)
+    keys = np.linspace(times[0], times[-1], len(clip.values))
+    return tuple(
+        track(fap(number), keys, clip.values[:, number - 1].astype(np.float64), node.id)
+        for number in moved(clip)
+    )
+
+
+def check_file(node: FapFile, world: World) -> tuple[Fault, ...]:
+    """A file that cannot be read is fatal; FAPs 1 and 2, and values that go too far, are not."""
+    if faults := media.faults(node.file_name, world, read):
+        return faults
+    clip = media.load(node.file_name, world, read)
+    words = []
+    if clip.visemes.any() or clip.expressions.any():
+        words.append("FAP 1 and 2 (viseme and expression) are not played")
+    far = [number for number in moved(clip) if out_of_range(number, *_extremes(clip, number))]
+    if far:
+        words.append(f"FAP {', '.join(map(str, far))} beyond the range of the standard are limited to it")
+    text = f"fileName: {node.file_name}: {'; '.join(words)}"
+    return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),) if words else ()
+
+
+def read(content: bytes) -> FAPClip:
+    """The clip of a file.
+
+    Raises:
+        MediaError: fewer than two frames.
+        RealizerError: no FAP text.
+    """
+    clip = read_fap(content)
+    if len(clip.values) < 2:
+        raise media.MediaError(f"wanted at least two frames, got {len(clip.values)}")
+    return clip
+
+
+def moved(clip: FAPClip) -> list[int]:
+    """The FAPs from 3 on that are anything but 0."""
+    return [int(column) + 1 for column in np.flatnonzero(clip.values.any(axis=0)) if column >= 2]
+
+
+def out_of_range(number: int, least: float, most: float) -> tuple[Fault, ...]:
+    """A fault, not fatal, where values go beyond the range of a FAP."""
+    row = tables.faps()[number - 1]
+    if row.least <= least and most <= row.most:
+        return ()
+    got = most if most > row.most else least
+    text = f"FAP {number} ({row.name}): wanted {row.least:g}..{row.most:g}, got {got:g}; limited to it"
+    return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
+
+
+def _extremes(clip: FAPClip, number: int) -> tuple[float, float]:
+    values = clip.values[:, number - 1]
+    return float(values.min()), float(values.max())
+
+
+KINDS = (
+    Kind(Faps, timing, expand, check, claims=claims),
+    Kind(FapFile, timing_of_file, expand_file, check_file),
+)

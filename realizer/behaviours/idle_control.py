@@ -1,0 +1,35 @@
+"""idle: how many of its blinks and how much of its small movements a face keeps from now on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bml_schema import Idle
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import presence
+from realizer.arrays import Float64
+from realizer.behaviours.kind import Kind, World
+from realizer.behaviours.preferred import preferred
+from realizer.scheduling.timing import Timing
+
+__all__ = ["KINDS"]
+
+
+def timing(node: Idle, world: World) -> Timing:
+    return preferred("idle")
+
+
+def expand(node: Idle, times: Float64, world: World) -> tuple[Channel, ...]:
+    """What is taken from blinks and motion rises from start to end, and stays.
+
+    Both channels are there even where nothing is taken: they replace what an earlier one took.
+    """
+    return tuple(
+        Channel(
+            presence(name), times, np.array([0.0, 1.0 - part]), layer=Layer.BASE, holds=True, source=node.id
+        )
+        for name, part in (("blinks", node.blinks), ("motion", node.motion))
+    )
+
+
+KINDS = (Kind(Idle, timing, expand, region="idle"),)

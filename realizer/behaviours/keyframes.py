@@ -1,0 +1,143 @@
+"""facekeyframe: keys of FAPs or action units, as BMLT writes them -> channels through them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bml_schema import FaceKeyframe
+from realizer import tables
+from realizer.animation.channel import Channel
+from realizer.animation.targets import Target, au, fap
+from realizer.arrays import Float64
+from realizer.behaviours.fap_values import RECORDED, out_of_range
+from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.tracks import track
+from realizer.scheduling.timing import Timing
+
+__all__ = ["KINDS"]
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+PART = {
+    "FAPS": re.compile(r"\d{1,3}"),
+    "FACS": re.compile(r"(\d{1,3})(?:\.(LEFT|RIGHT|BOTH))?", re.IGNORECASE),
+}
+WANTED = {"FAPS": 'FAP numbers 3..68 such as "31 32"', "FACS": 'action units such as "1.BOTH 12.LEFT"'}
+
+
+class Bad(Exception):
+    """What is wrong with a facekeyframe, as a sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """What a <FaceInterpolator> says.
+
+    Attributes:
+        parts: FAP number or (AU, side) of each column.
+        times: (k,) seconds, rising.
+        values: (k, number of parts); FAPs in FAPU, AUs 0..1.
+    """
+
+    parts: tuple[int | tuple[int, str], ...]
+    times: Float64
+    values: Float64
+
+
+def timing(node: FaceKeyframe, world: World) -> Timing:
+    """As long as from its first to its last key; it stretches."""
+    times = _keys(node).times
+    return Timing(("start", "end"), times[-1:] - times[0], np.zeros(1), np.array([RECORDED]))
+
+
+def expand(node: FaceKeyframe, times: Float64, world: World) -> tuple[Channel, ...]:
+    """Its keys, the first at start and the last at end; what is not 0 there gets there and back."""
+    keys = _keys(node)
+    first, last = keys.times[0], keys.times[-1]
+    at = times[0] + (keys.times - first) * ((times[-1] - times[0]) / (last - first))
+    channels = []
+    for column, part in enumerate(keys.parts):
+        values = keys.values[:, column]
+        channels += [track(target, at, values, node.id) for target in _targets(part) if values.any()]
+    return tuple(channels)
+
+
+def check(node: FaceKeyframe, world: World) -> tuple[Fault, ...]:
+    """What cannot be read is fatal, a FAP that goes too far is not."""
+    try:
+        keys = _keys(node)
+    except Bad as error:
+        return (Fault("CANNOT_CREATE_BEHAVIOR", str(error)),)
+    least, most = keys.values.min(axis=0), keys.values.max(axis=0)
+    return tuple(
+        fault
+        for column, part in enumerate(keys.parts)
+        if isinstance(part, int)
+        for fault in out_of_range(part, float(least[column]), float(most[column]))
+    )
+
+
+def claims(node: FaceKeyframe, world: World) -> frozenset[str]:
+    """FAPs add up, so two behaviours cannot have the same; AUs blend."""
+    return frozenset(f"FAP {part}" for part in _keys(node).parts if isinstance(part, int))
+
+
+def _keys(node: FaceKeyframe) -> Keys:
+    if node.type not in PART:
+        raise Bad(f"type: wanted FAPS or FACS, as faces are moved by parameters here, got {node.type}")
+    if node.interpolator is None:
+        raise Bad(f"wanted <FaceInterpolator parts=...> with keys of {WANTED[node.type]}, got none")
+    return _read(node.type, node.interpolator.parts, node.interpolator.keys)
+
+
+@lru_cache(maxsize=64)
+def _read(type: str, parts: str, text: str) -> Keys:
+    found = _parts(type, parts)
+    lines = [(number, line.split()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    if len(lines) < 2:
+        raise Bad(f"keys: wanted at least two lines, got {len(lines)}")
+    before = -np.inf
+    rows = np.empty((len(lines), len(found) + 1))
+    for row, (number, words) in enumerate(lines):
+        place, said = f"line {number} of the keys", " ".join(words)[:60]
+        wanted = f"wanted a time and {len(found)} value{'s' * (len(found) != 1)}"
+        if len(words) != len(found) + 1 or not all(map(NUMBER.fullmatch, words)):
+            raise Bad(f"{place}: {wanted}, got {said!r}")
+        rows[row] = [float(word) for word in words]
+        if not np.all(np.abs(rows[row]) <= 1e6):
+            raise Bad(f"{place}: wanted numbers within a million, got {said!r}")
+        if rows[row, 0] <= before:
+            raise Bad(f"{place}: wanted a time after {before:g}, got {words[0]}")
+        if type == "FACS" and not (np.all(rows[row, 1:] >= 0) and np.all(rows[row, 1:] <= 1)):
+            raise Bad(f"{place}: wanted action units 0..1, got {said!r}")
+        before = rows[row, 0]
+    return Keys(found, rows[:, 0], rows[:, 1:])
+
+
+def _parts(type: str, text: str) -> tuple[int | tuple[int, str], ...]:
+    known = tables.by_number(tables.action_units())
+    parts: list[int | tuple[int, str]] = []
+    for word in text.replace(",", " ").split():
+        match = PART[type].fullmatch(word)
+        part: int | tuple[int, str] | None = None
+        if match and type == "FAPS":
+            part = int(word) if 3 <= int(word) <= 68 else None
+        elif match and int(match[1]) in known:
+            sides = known[int(match[1])].sides
+            part = (int(match[1]), (match[2] or "BOTH").upper() if sides else "BOTH")
+        if part is None:
+            raise Bad(f"parts: wanted {WANTED[type]}, got {word[:60]!r}")
+        if part in parts:
+            raise Bad(f"parts: wanted each once, got {word!r} twice")
+        parts.append(part)
+    return tuple(parts)
+
+
+def _targets(part: int | tuple[int, str]) -> tuple[Target, ...]:
+    return (fap(part),) if isinstance(part, int) else au(*part)
+
+
+KINDS = (Kind(FaceKeyframe, timing, expand, check, claims=claims),)

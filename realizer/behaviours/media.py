@@ -1,0 +1,145 @@
+"""The name of a file in a document -> what is in it; only files inside the media folder are ever opened."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from collections import OrderedDict
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+from typing import Any, TypeVar
+from urllib.parse import unquote, urlsplit
+
+from realizer.behaviours.kind import Fault, World
+from realizer.errors import RealizerError
+
+__all__ = ["MediaError"]
+
+T = TypeVar("T")
+
+MOST_BYTES = 64 * 2**20
+MOST_NAMES = 1000  # of a folder, looked through for one that is near
+MOST_KEPT = 8  # files
+
+_loaded: OrderedDict[tuple[Path | None, str, Any], tuple[tuple[int, int], Any]] = OrderedDict()
+
+
+class MediaError(RealizerError):
+    """A file that cannot be played; the text says what was wanted and what came."""
+
+
+def load(name: str, world: World, read: Callable[[bytes], T]) -> T:
+    """What `read` makes of a file; it is read once, and again by `faults` when it has changed since.
+
+    Raises:
+        MediaError: no such file, or none that can be read.
+    """
+    kept = _loaded.get((world.media, name, read))
+    value: T = kept[1] if kept is not None else _read(name, world, read)
+    return value
+
+
+def faults(name: str, world: World, read: Callable[[bytes], Any]) -> tuple[Fault, ...]:
+    """Why a file cannot be played; it is looked at anew."""
+    try:
+        _read(name, world, read)
+    except MediaError as error:
+        return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {error}"),)
+    return ()
+
+
+def _read(name: str, world: World, read: Callable[[bytes], T]) -> T:
+    path = media_file(name, world)
+    try:
+        found = path.stat()
+        stamp, key = (found.st_mtime_ns, found.st_size), (world.media, name, read)
+        kept = _loaded.get(key)
+        if kept is not None and kept[0] == stamp:
+            known: T = kept[1]
+            return known
+        if found.st_size > MOST_BYTES:
+            raise MediaError(
+                f"wanted at most {MOST_BYTES // 2**20} MiB, got {_shown(name)} of {found.st_size} bytes"
+            )
+        content = path.read_bytes()
+    except OSError as error:
+        raise MediaError(f"wanted a file that can be read, got {_shown(name)}: {error.strerror}") from None
+    try:
+        value = read(content)
+    except RealizerError as error:
+        raise MediaError(f"{_shown(name)}: {error}") from None
+    _loaded[key] = stamp, value
+    while len(_loaded) > MOST_KEPT:
+        _loaded.popitem(last=False)
+    return value
+
+
+def media_file(name: str, world: World) -> Path:
+    """The file that a document names, inside `world.media`.
+
+    Names are relative to the folder, with "/" or, as old documents have it, with "\\". A file: URL and a path
+    with a drive letter name a place on somebody else's machine: the longest end of it that is there counts.
+
+    Raises:
+        MediaError: no folder, a name that leads elsewhere, or no such file.
+    """
+    if world.media is None:
+        raise MediaError("wanted a media folder (--media DIR), which files are read from, got none")
+    elsewhere, parts = _parts(name)
+    folder = world.media.resolve()
+    for first in range(len(parts) if elsewhere else 1):
+        try:
+            path = folder.joinpath(*parts[first:]).resolve()
+            inside, there = path.is_relative_to(folder), path.is_file()
+        except (OSError, RuntimeError, ValueError):  # a name too long, a circle of links, a null byte
+            continue
+        if there and not inside:
+            raise MediaError(
+                f"wanted a file inside the media folder, got {_shown(name)}, a link that leads out"
+            )
+        if there:
+            return path
+    near = _near(folder, parts)
+    raise MediaError(f"wanted a file of the media folder, got {_shown(name)}{near}")
+
+
+def _parts(name: str) -> tuple[bool, list[str]]:
+    """Whether a name is of another machine, and its parts."""
+    text, elsewhere = name.strip(), False
+    if text.lower().startswith("file:"):
+        text, elsewhere = unquote(urlsplit(text.replace("\\", "/")).path), True
+    elif re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", text):
+        raise MediaError(f"wanted a file of the media folder, got an address: {_shown(name)}")
+    text = text.replace("\\", "/")
+    drive = re.match(r"/*[A-Za-z]:", text)
+    if drive:
+        text, elsewhere = text[drive.end() :], True
+    if text.startswith("/") and not elsewhere:
+        raise MediaError(f"wanted a name relative to the media folder, got {_shown(name)}")
+    parts = [part for part in text.split("/") if part not in ("", ".")]
+    if ".." in parts:
+        raise MediaError(f'wanted a name inside the media folder, without "..", got {_shown(name)}')
+    if not parts:
+        raise MediaError(f"wanted the name of a file, got {_shown(name)}")
+    return elsewhere, parts
+
+
+def _near(folder: Path, parts: list[str]) -> str:
+    """`, did you mean "hello.wav"?` if a file beside it has nearly its name."""
+    try:
+        beside = folder.joinpath(*parts[:-1]).resolve()
+        if not beside.is_relative_to(folder):
+            return ""
+        with os.scandir(beside) as entries:
+            names = [entry.name for entry in islice(entries, MOST_NAMES)]
+    except (OSError, RuntimeError, ValueError):
+        return ""
+    lower = {name.lower(): name for name in names}
+    near = difflib.get_close_matches(parts[-1].lower()[:200], lower, n=1, cutoff=0.7)
+    return f', did you mean "{"/".join([*parts[:-1], lower[near[0]]])}"?' if near else ""
+
+
+def _shown(name: str) -> str:
+    return repr(name if len(name) <= 80 else name[:80] + "...")

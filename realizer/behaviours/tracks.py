@@ -1,0 +1,40 @@
+"""Keys from a file or a document -> a channel through them that starts and ends at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.animation.channel import Channel
+from realizer.animation.targets import Target
+from realizer.arrays import Float64
+
+__all__: list[str] = []
+
+# s; a track that does not begin or end at rest gets there and back in this time, or in half of it all.
+EASE = 0.12
+
+
+def track(target: Target, times: Float64, values: Float64, source: str) -> Channel:
+    """A channel with these keys, straight between them.
+
+    Args:
+        times: (k,) seconds, rising; values: (k,).
+    """
+    ease = min(EASE, float(times[-1] - times[0]) / 2)
+    if values[0] and ease > 0:
+        times, values = _eased(times, values, ease)
+    if values[-1] and ease > 0:
+        back, turned = _eased(-times[::-1], values[::-1], ease)
+        times, values = -back[::-1], turned[::-1]
+    return Channel(target, times, values, curve="linear", source=source)
+
+
+def _eased(times: Float64, values: Float64, ease: float) -> tuple[Float64, Float64]:
+    """Keys that start at 0 and are on their track `ease` seconds later."""
+    there = times[0] + ease
+    later = times > there
+    joined = float(np.interp(there, times, values))
+    return (
+        np.concatenate([[times[0], there], times[later]]),
+        np.concatenate([[0.0, joined], values[later]]),
+    )
