@@ -14,9 +14,8 @@ PACKAGES = {
     "bml_schema": Path(bml_schema.__path__[0]),
     "realizer": Path(realizer.__path__[0]),
 }
-# Tested from outside, by documents, commands and a browser: tests/realizer/test_cli.py, tests/browser,
-# tests/realizer/test_pipeline.py.
-ELSEWHERE = {"realizer/cli", "realizer/examples"}
+# Tested from outside, by documents and a browser: tests/browser, tests/realizer/test_pipeline.py.
+ELSEWHERE = {"realizer/examples"}
 
 
 def packages() -> list[str]:

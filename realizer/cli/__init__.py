@@ -7,11 +7,12 @@ import sys
 import click
 
 import realizer
+from realizer.cli.check import check
 from realizer.cli.demo import demo
 from realizer.cli.doctor import doctor
 from realizer.cli.faces import faces
 from realizer.cli.lists import outputs, voices
-from realizer.cli.play import check, realize, schedule
+from realizer.cli.play import realize, schedule
 from realizer.cli.serve import serve
 from realizer.errors import RealizerError
 

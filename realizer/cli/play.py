@@ -1,4 +1,4 @@
-"""`realize`, `schedule` and `check`: documents played without a clock."""
+"""`realize` and `schedule`: documents played without a clock."""
 
 from __future__ import annotations
 
@@ -135,35 +135,3 @@ def schedule(
                 points = "  ".join(f"{name} {time:.3f}" for name, time in times.items())
                 click.echo(f"  {behaviour:<{width}}  {points}")
     return 1 if refused or (strict and any(map(dropped, schedules))) else 0
-
-
-@click.command()
-@options.documents
-@click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
-@click.pass_context
-def check(context: click.Context, documents: tuple[str, ...], scene: str | None) -> int:
-    """Say every fault of documents, one line each, with line and path."""
-    from bml_schema import Block, read
-    from realizer.behaviours import VOCABULARY
-    from realizer.pipeline import speak, warning_of
-    from realizer.player import Player
-    from realizer.speech import SilentVoice
-
-    faults = 0
-    for name, text in zip(documents, options.read_documents(documents), strict=True):
-        # A player a file: what one document says must not colour the next one's report.
-        player = Player(scene=options.read_scene(scene), idle=False)
-        blocks = 0
-        for item in read(text, VOCABULARY):
-            if isinstance(item, Block):
-                blocks += 1
-                said = speak(player.wants(item), SilentVoice())
-                warnings = player.submit(item, 0.0, said).warnings
-            else:
-                warnings = (warning_of(item),)
-            faults += len(warnings)
-            for warning in warnings:
-                click.echo(f"{name}: {warning.id}: {warning.type}: {warning.text}")
-        if not faults and not context.obj["quiet"]:
-            click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)
-    return 1 if faults else 0

@@ -1,0 +1,142 @@
+"""A sound block in, what looks like a slip of its author all the same out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, SyncRef
+from bml_schema.shape import local, shape_of
+from bml_schema.source import Source
+from realizer.cli.diagnostics import Finding, Label
+from realizer.cli.findings import near
+
+if TYPE_CHECKING:
+    from realizer.player import Player
+    from realizer.scheduling.timing import Schedule
+
+__all__ = ["ADVICE", "advice"]
+
+ADVICE = "ADVICE"
+# s; nobody plans a single face so far ahead, but 250 and more are often milliseconds.
+LONG = 250.0
+# s; one frame at 25 fps: what is shorter may be on none.
+SHORT = 0.04
+# Of what they usually do, in standard deviations: faster than this is not a matter of style.
+FASTER = 2.0
+KNOWN_SPACES = frozenset({CORE, EXTENSIONS, BMLA, BMLT, OWN})
+
+
+def advice(file: str, source: Source, block: Block, schedule: Schedule, player: Player) -> Iterator[Finding]:
+    """Attributes and elements that look misspelt, times in the wrong unit, and what muscles cannot do.
+
+    Args:
+        schedule: of the block, as `player` made it.
+    """
+    advisor = _Advisor(file, source, block)
+    yield from advisor.attributes(block, "/bml", None)
+    for node in block.behaviours:
+        place = block.places.get(node.id)
+        if place is not None:
+            yield from advisor.attributes(node, place.path, place.line)
+            yield from advisor.children(node, place.path, place.line)
+            yield from advisor.units(node, place.path, place.line)
+            if node.id in schedule.times:
+                yield from advisor.muscles(node, place.path, place.line, schedule, player)
+
+
+class _Advisor:
+    """Makes findings of one block."""
+
+    def __init__(self, file: str, source: Source, block: Block) -> None:
+        self.file, self.source, self.block = file, source, block
+
+    def attributes(self, node: Any, path: str, line: int | None) -> Iterator[Finding]:
+        """Attributes in no namespace that nobody knows, and that are nearly one that is known."""
+        known = {*shape_of(type(node)).attributes, *getattr(node, "sync_points", ())}
+        free = {name for name in known if name not in getattr(node, "syncs", {}) and not name.startswith("{")}
+        for name in node.foreign:
+            meant = None if name.startswith("{") else near(name, free, 0.75)
+            element = self.source.find(path, line=line, block=self.block.id) if meant else None
+            if element is None or meant in element.attributes:
+                continue
+            said = f"{name}: no attribute of <{local(node.tag)}>, so it does nothing"
+            label = Label(self.source.attribute_spot(element, name), "does nothing")
+            yield self.finding(node, path, said, label, f'help: did you mean "{meant}"?')
+
+    def children(self, node: Any, path: str, line: int) -> Iterator[Finding]:
+        """Elements inside a behaviour that nobody knows, and that are nearly one that is known there."""
+        element = self.source.find(path, line=line, block=self.block.id)
+        known = {local(tag): tag for tag in shape_of(type(node)).by_tag}
+        if element is None or not known:
+            return
+        for inner in self.source.below(element):
+            prefix, _, name = inner.name.rpartition(":")
+            if not prefix or self.source.elements[inner.parent] is not element or name in known:
+                continue
+            meant = near(name, known, 0.75)
+            if meant is not None and self.namespace(inner.name) in KNOWN_SPACES:
+                said = f"<{inner.name}>: no element of <{local(node.tag)}>, so it does nothing"
+                label = Label(self.source.name_spot(inner), "does nothing")
+                yield self.finding(node, path, said, label, f'help: did you mean "{prefix}:{meant}"?')
+
+    def namespace(self, name: str) -> str:
+        """The namespace of an element name, as whoever declares its prefix first says."""
+        declared = f"xmlns:{name.rpartition(':')[0]}"
+        found = (self.source.value(e, declared) for e in self.source.elements if declared in e.attributes)
+        return next(found, "")
+
+    def units(self, node: Any, path: str, line: int) -> Iterator[Finding]:
+        """Times so long that they are probably milliseconds."""
+        times = [(name, ref.offset) for name, ref in node.syncs.items() if isinstance(ref, SyncRef)]
+        times += [("duration", node.duration)] if hasattr(node, "duration") else []
+        for name, seconds in times:
+            if abs(seconds) >= LONG:
+                said = f"{name}: {seconds:g} s are {_minutes(abs(seconds))}; BML counts in seconds"
+                spot = self.source.locate(path, name, line=line, block=self.block.id)
+                hint = f"help: if these are milliseconds, write {seconds / 1000:g}"
+                yield self.finding(node, path, said, Label(spot, _minutes(abs(seconds))), hint)
+
+    def muscles(
+        self, node: Any, path: str, line: int, schedule: Schedule, player: Player
+    ) -> Iterator[Finding]:
+        """Movements that are over in a frame, or faster than a face or a head is."""
+        from dataclasses import replace
+
+        kind, times = player.kinds[node.tag], schedule.times[node.id]
+        seconds = float(times[-1] - times[0])
+        if not node.syncs or kind.act is not None or kind.say is not None:
+            return
+        if 0 < seconds < SHORT:
+            said = f"lasts {seconds:.3g} s from start to end, less than a frame"
+            spot = self.source.locate(path, line=line, block=self.block.id)
+            hint = "help: it may not be seen at all; BML counts in seconds"
+            yield self.finding(node, path, said, Label(spot, "less than a frame"), hint)
+            return
+        if kind.region is None and not node.sync_points[1:-1]:
+            return  # nothing that rises or falls: a wait, a sound
+        timing = kind.timing(node, replace(player.world, utterances={}))
+        spread = 1 / np.sqrt(timing.stiffness)
+        for n, gap in enumerate(np.diff(times).tolist()):
+            usual = float(timing.preferred[n])
+            if timing.rigid or not gap < usual - FASTER * float(spread[n]):
+                continue
+            begin, end = timing.points[n : n + 2]
+            said = f"{begin} to {end} in {gap:.2g} s; this usually takes {usual:.2g} s"
+            name = next((p for p in (end, begin, *node.syncs) if p in node.syncs), "")
+            spot = self.source.locate(path, name, line=line, block=self.block.id)
+            hint = f"help: leave {end} or {begin} out, and they are placed where they look natural"
+            yield self.finding(node, path, said, Label(spot, "faster than muscles are"), hint)
+            return
+
+    def finding(self, node: Any, path: str, said: str, label: Label, note: str) -> Finding:
+        id = self.block.id if isinstance(node, Block) else f"{self.block.id}:{node.id}"
+        return Finding(self.file, ADVICE, id, path, said, said, (label,), (note,))
+
+
+def _minutes(seconds: float) -> str:
+    minutes = seconds / 60
+    return f"{minutes / 60:.1f} hours" if minutes >= 90 else f"{math.floor(minutes * 10) / 10:g} minutes"

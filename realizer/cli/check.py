@@ -1,0 +1,128 @@
+"""`check`: documents in, every fault explained out, and advice on what looks like a slip."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from realizer.cli import options
+
+if TYPE_CHECKING:
+    from bml_schema import Behaviour, Block
+    from realizer.player import Player
+    from realizer.scheduling.timing import Schedule, Warning
+
+__all__: list[str] = []
+
+
+@click.command()
+@options.documents
+@click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
+@click.option(
+    "--long/--short",
+    "long",
+    default=None,
+    help="Show source, marks and help, or a line for each fault.  [default: --long on a terminal]",
+)
+@click.pass_context
+def check(context: click.Context, documents: tuple[str, ...], scene: str | None, long: bool | None) -> int:
+    """Explain every fault of documents, with line, column and path.
+
+    Standard output holds the faults and nothing else; a line each, unless it is a terminal. Advice on what is
+    no fault but looks like a slip goes to standard error, and does not count.
+    """
+    from bml_schema import Block, read
+    from bml_schema.source import Source
+    from realizer.behaviours import VOCABULARY
+    from realizer.cli.advice import advice
+    from realizer.cli.diagnostics import Finding, one_line, render
+    from realizer.cli.findings import finding_of
+    from realizer.pipeline import warning_of
+    from realizer.player import Player
+
+    long = sys.stdout.isatty() if long is None else long
+    width = shutil.get_terminal_size((100, 24)).columns
+
+    def show(finding: Finding, source: Source, *, err: bool = False) -> None:
+        stream = sys.stderr if err else sys.stdout
+        words = render(finding, source, width=width) + "\n" if long else one_line(finding)
+        click.echo(words, err=err, color=_coloured(stream))
+
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a document may hold what the terminal's encoding does not
+            stream.reconfigure(errors="backslashreplace")
+    faults = 0
+    for name, text in zip(documents, options.read_documents(documents), strict=True):
+        # A player a file: what one document says must not colour the next one's report.
+        player = Player(scene=options.read_scene(scene), idle=False)
+        source = Source(text)
+        blocks = found = 0
+        for item in read(text, VOCABULARY):
+            if isinstance(item, Block):
+                blocks += 1
+                schedule, warnings = examine(item, player)
+            else:
+                schedule, warnings = None, [warning_of(item)]
+            found += len(warnings)
+            findings = [finding_of(name, source, warning, VOCABULARY) for warning in warnings]
+            for finding in sorted(findings, key=lambda finding: finding.spot or (0,)):
+                show(finding, source)
+            if isinstance(item, Block) and schedule is not None and not context.obj["quiet"]:
+                for finding in advice(name, source, item, schedule, player):
+                    show(finding, source, err=True)
+        if not found and not context.obj["quiet"]:
+            click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)
+        faults += found
+    return 1 if faults else 0
+
+
+def examine(block: Block, player: Player) -> tuple[Schedule, list[Warning]]:
+    """The schedule of a block, and everything that is wrong with it, also where one fault ends it all."""
+    from dataclasses import replace
+
+    from realizer.pipeline import speak
+    from realizer.scheduling.timing import Warning
+    from realizer.speech import SilentVoice
+
+    warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
+    said = speak(player.wants(block), SilentVoice())
+    world = replace(player.world, utterances=said)
+    bad: set[str] = set()
+    for node in block.behaviours:
+        kind = player.kinds.get(node.tag)
+        faults = kind.check(node, world) if kind is not None else ()
+        where = block.places.get(node.id)
+        place = f"line {where.line}, {where.path}: " if where else ""
+        warnings += [Warning(f"{block.id}:{node.id}", fault.type, place + fault.text) for fault in faults]
+        if any(fault.fatal for fault in faults):
+            bad.add(node.id)
+    # What was told must not end the block before its constraints are looked at.
+    whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
+    schedule = player.submit(whole, 0.0, said)
+    told = {(warning.id, warning.text) for warning in warnings}
+    return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
+
+
+def _loosened(block: Block, bad: set[str]) -> Iterator[Any]:
+    """The children of a block, with the bad behaviours of <required> outside of it."""
+    from dataclasses import replace
+
+    from bml_schema import Required
+
+    for child in block.children:
+        if not isinstance(child, Required):
+            yield child
+            continue
+        loose: list[Behaviour] = [c for c in child.children if getattr(c, "id", None) in bad]  # type: ignore[misc]
+        yield replace(child, children=tuple(c for c in child.children if c not in loose))
+        yield from loose
+
+
+def _coloured(stream: Any) -> bool:
+    """Whether a stream is a terminal whose user has not said no to colours (https://no-color.org)."""
+    return bool(stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb")

@@ -1,0 +1,128 @@
+"""Where things stand in a text: line, column, length, in whatever the parser took."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bml_schema import Block, read, write
+from bml_schema.source import Source, Spot
+from tests.strategies import blocks
+
+TEXT = """<?xml version="1.0"?>
+<!-- <bml id="no"> -->
+<bml id="a">
+  <head
+     id='n' lexeme = "NOD"
+     amount="7"/><head id="m" lexeme="NOD"/>
+  <b:required xmlns:b="urn:x">
+    <b:head id="o" b:priority="3" lexeme="&quot;"/>
+  </b:required>
+  <speech id="s"><text><![CDATA[<sync id="no"/>]]> & <sync id="t"/></text></speech>
+</bml><bml id="c"><head id="n" lexeme="x>y"/></bml>
+"""
+
+
+def under(source: Source, spot: Spot) -> str:
+    return source.line(spot.line)[spot.column - 1 : spot.column - 1 + spot.length]
+
+
+@pytest.mark.parametrize(
+    ("path", "attribute", "line", "value"),
+    [
+        ("/bml", "id", None, "a"),
+        ("/bml/head[1]", "amount", None, "7"),
+        ("/bml/head[1]", "lexeme", 6, "NOD"),
+        ("/bml/head[1]", "nothing", 6, "head"),
+        ("/bml/head[2]", "id", 6, "m"),
+        ("/bml/required[1]/head[1]", "{urn:x}priority", 8, "3"),
+        ("/bml/required[1]/head[1]", "b:priority", 8, "3"),
+        ("/bml/speech[1]/text[1]/sync[1]", "id", 10, "t"),
+        ("/bml/head[1]", "lexeme", 11, "x>y"),
+        ("/bml/head[9]", "lexeme", 6, 'amount="7"/><head id="m" lexeme="NOD"/>'),
+        ("", "", 9, "</b:required>"),
+        ("", "", 999, ""),
+    ],
+)
+def test_a_path_and_an_attribute_have_a_place(path, attribute, line, value) -> None:
+    source = Source(TEXT)
+    spot = source.locate(path, attribute, line=line)
+    assert under(source, spot) == value
+    assert spot.length == max(1, len(value))
+
+
+def test_documents_are_told_apart_by_their_id() -> None:
+    source = Source('<bml id="a"><wait id="w"/></bml><bml id="b"><wait id="w"/></bml>')
+    assert source.locate("/bml/wait[1]", "id", line=1, block="b").column == 55
+    assert source.locate("/bml/wait[1]", "id", line=1, block="a").column == 23
+
+
+def test_a_value_over_several_lines_is_marked_on_its_first() -> None:
+    source = Source('<bml id="b"><gaze id="g" target="one\r\ntwo"/></bml>')
+    assert under(source, source.locate("/bml/gaze[1]", "target")) == "one"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_bytes_are_read_as_the_parser_reads_them(encoding: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?><bml id="é"/>'
+    data = text.replace("utf-8-sig", "utf-8").encode(encoding)
+    source = Source(data)
+    assert under(source, source.locate("/bml", "id")) == "é"
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "place"),
+    [
+        ("<bml id='a'><x></y></bml>", "wanted </x>, got </y>", "</y"),
+        ("<bml id='a'>", "<bml> is never closed", ">"),
+        ("<bml id=a/>", "wanted quotes around the value of id", "a/"),
+        ("<bml id/>", 'wanted id="...", got no value', "id"),
+        ("<bml id='a' id='b'/>", "id is given twice", "id"),
+        ("<bml id='a>", "the value of id is never closed by '", "'a"),
+        ("<bml id='a'>&nbsp;</bml>", "no entity &nbsp; in XML, write the character itself", "&nbsp;"),
+        ("<bml id='&'/>", "wanted &amp; for the character &", "&"),
+        ("</bml>", "</bml> closes nothing", "</bml"),
+        ("<bml id='a'><!-- </bml>", "<!-- is never closed by -->", "<!--"),
+        ("<bml id='a' <x/></bml>", "wanted an attribute or the end of <bml>", "<"),
+    ],
+)
+def test_what_is_not_well_formed_is_named(text: str, said: str, place: str) -> None:
+    source = Source(text)
+    slip = next(s for s in source.slips if s.text == said)
+    assert text[slip.offset : slip.offset + slip.length] == place
+
+
+@given(blocks(foreign=False))
+def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
+    text = "<!-- one -->\n" + write(block)
+    source = Source(text)
+    (parsed,) = read(text)
+    assert isinstance(parsed, Block)
+    for node in parsed.behaviours:
+        place = parsed.places[node.id]
+        element = source.find(place.path, line=place.line, block=parsed.id)
+        assert element is not None
+        assert source.id(element) == node.id
+        assert source.line_of(element.end - 1) == place.line
+    assert not source.slips
+
+
+@given(st.text("<>/='\" abml!-[]?&;:\n", max_size=200))
+def test_any_text_is_taken_and_every_place_is_inside_it(text: str) -> None:
+    source = Source(text)
+    for element in source.elements:
+        for spot in (source.name_spot(element), *(source.locate_in(element, a) for a in element.attributes)):
+            assert 1 <= spot.line <= text.count("\n") + 1
+            assert spot.column - 1 <= len(source.line(spot.line))
+    for line in range(1, text.count("\n") + 2):
+        source.slip(line)
+        source.locate("/bml/a[1]", "a", line=line)
+
+
+@pytest.mark.parametrize("piece", ["<a>", "<!--", "</a>", "<bml id='", "&", "<a b='c' ", "<bml>", "<a\n"])
+def test_a_hostile_text_is_taken_too(piece: str) -> None:
+    # A scan that was not linear in the text would take hours.
+    source = Source(piece * 50_000)
+    assert source.slips
+    assert len(source.elements) in (0, 50_000)

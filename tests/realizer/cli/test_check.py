@@ -1,0 +1,266 @@
+"""`realizer check` as its user sees it: what is marked, what is said, what the exit status is."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+
+HEAD = '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b1">\n'
+
+
+def check(tmp_path: Path, text: str | bytes, *options: str) -> Result:
+    document = tmp_path / "d.bml"
+    document.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return CliRunner().invoke(cli, ["check", str(document), *options], standalone_mode=False)
+
+
+def blocks(result: Result) -> list[list[str]]:
+    """The lines of each fault."""
+    return [block.split("\n") for block in result.stdout.rstrip("\n").split("\n\n")] if result.stdout else []
+
+
+def marked(block: list[str]) -> list[str]:
+    """What stands above each underline."""
+    found = []
+    source = ""
+    for line in block[1:]:
+        gutter, bar, rest = line.partition("|")
+        if bar and gutter.strip():
+            source = line
+        elif bar and set(rest.split(maxsplit=1)[:1][0] if rest.strip() else "x") <= {"^", "-"}:
+            start = len(line) - len(rest.lstrip())
+            length = len(rest.split()[0])
+            found.append(source[start : start + length])
+    return found
+
+
+def test_a_fault_is_one_line_where_nobody_looks(tmp_path: Path) -> None:
+    done = check(tmp_path, HEAD + '<head id="n" lexeme="NOD" amount="7"/>\n</bml>')
+    assert done.return_value == 1
+    (line,) = done.stdout.splitlines()
+    assert line.endswith("d.bml:2:35: PARSING_FAILURE b1:n: line 2, /bml/head[1]: amount: wanted 0..1, got 7")
+
+
+def test_a_sound_document_says_nothing_on_standard_output_and_ends_with_0(tmp_path: Path) -> None:
+    done = check(tmp_path, HEAD + '<head id="n" lexeme="NOD"/></bml>', "--long")
+    assert (done.return_value, done.stdout) == (0, "")
+    assert "no fault in 1 block" in done.stderr
+
+
+CASES = {
+    "value": ('<head id="n" lexeme="NOD" amount="7"/>', ["7"], "without it, amount is 0.5"),
+    "id": ('<head id="nod" lexeme="NOD"/><wait id="w" start="nodd:end"/>', ["nodd"], 'mean "nod"?'),
+    "sync": ('<head id="nod" lexeme="NOD"/><wait id="w" start="nod:fin"/>', ["fin"], "nod has start, ready"),
+    "lexeme": ('<faceLexeme id="f" lexeme="RAISE_BROW"/>', ["RAISE_BROW"], "mean RAISE_BROWS?"),
+    "side": ('<faceFacs id="f" au="1" side="LEF"/>', ["LEF"], 'mean "LEFT"?'),
+    "element": ('<hed id="h"/>', ["hed"], 'mean "head"?'),
+    "attribute": ('<head id="n" lexem="NOD"/>', ["lexem"], 'mean lexeme where it says "lexem"?'),
+    "missing": ('<head id="n"/>', ["head"], ""),
+    "duplicate": ('<wait id="w"/>\n<wait id="w"/>', ["w", "w"], ""),
+    "constraint": (
+        '<wait id="w"/><constraint><before ref="w:end"><sync ref="v:end"/></before></constraint>',
+        ["v"],
+        "there is w",
+    ),
+    "text": ("<speech id='s'><text>a<b/></text></speech>", ["b"], ""),
+    "body": ('<head id="n" lexeme="NOD">words</head>', ["head"], ""),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_wrong_is_underlined_and_what_may_help_is_said(case: str, tmp_path: Path) -> None:
+    text, under, help = CASES[case]
+    done = check(tmp_path, f"{HEAD}{text}\n</bml>", "--long")
+    assert done.return_value == 1
+    (block,) = blocks(done)
+    assert sorted(marked(block)) == sorted(under)
+    assert help in done.stdout
+    assert "line 2" in block[0] or case == "duplicate"
+
+
+def test_two_faults_of_one_element_are_both_marked(tmp_path: Path) -> None:
+    text = '<head id="n" lexeme="NOD"\n  amount="x"\n  repetition="0.5"/>'
+    (block,) = blocks(check(tmp_path, f"{HEAD}{text}</bml>", "--long"))
+    assert marked(block) == ["x", "0.5"]
+    assert block[0].split(":")[1:3] == ["3", "11"]
+
+
+def test_constraints_that_cannot_hold_show_each_line(tmp_path: Path) -> None:
+    text = HEAD + (
+        '<head id="a" lexeme="NOD" start="b:end"/>\n<head id="b" lexeme="NOD"\n  start="a:end + 1"/>\n</bml>'
+    )
+    done = check(tmp_path, text, "--long")
+    (block,) = blocks(done)
+    assert "b cannot be placed" in block[0]
+    assert "IMPOSSIBLE_TO_SCHEDULE" in block[0]
+    assert marked(block) == ["b:end", "a:end + 1"]
+    assert "takes at least" in done.stdout
+    assert "b was dropped because it comes later" in done.stdout
+
+
+def test_a_clash_of_a_constraint_marks_its_reference(tmp_path: Path) -> None:
+    text = HEAD + (
+        '<head id="a" lexeme="NOD" start="1"/>\n'
+        '<constraint id="c"><synchronize>\n<sync ref="a:start"/><sync ref="3"/>\n</synchronize>'
+        "</constraint>\n</bml>"
+    )
+    (block,) = blocks(check(tmp_path, text, "--long"))
+    assert sorted(marked(block)) == ["1", "3"]
+
+
+def test_faults_of_a_block_that_fails_are_told_all_the_same(tmp_path: Path) -> None:
+    text = HEAD + (
+        '<required><head id="a" lexeme="NOPE"/>\n<head id="b" amount="7" lexeme="NOD"/></required>\n'
+        '<faceFacs id="c" au="999"/>\n'
+        '<head id="d" lexeme="NOD" start="2" end="1"/></bml>'
+    )
+    done = check(tmp_path, text)
+    assert [line.split(" ")[2] for line in done.stdout.splitlines()] == ["b1:a:", "b1:b:", "b1:c:", "b1:d:"]
+
+
+def test_a_target_that_the_scene_does_not_have_is_marked(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.txt"
+    scene.write_text("cup 0 0 1\n")
+    done = check(tmp_path, f'{HEAD}<gaze id="g" target="cupp"/></bml>', "--long", "--scene", str(scene))
+    (block,) = blocks(done)
+    assert "NO_SUCH_TARGET" in block[0]
+    assert marked(block) == ["cupp"]
+
+
+BROKEN = {
+    "mismatch": ("<head>\n</hed></bml>", ["</hed", "head"]),
+    "quotes": ("<head id=n/></bml>", ["n/"]),
+    "entity": ("<speech id='s'><text>a&nbsp;b</text></speech></bml>", ["&nbsp;"]),
+    "ampersand": ("<speech id='s'><text>a & b</text></speech></bml>", ["&"]),
+    "twice": ("<head id='a' id='b'/></bml>", ["id", "a"]),
+    "prefix": ("<no:such/></bml>", ["no:such"]),
+    "open": ("<speech id='s'>", [">", "speech"]),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_xml_is_marked_where_it_breaks(case: str, tmp_path: Path) -> None:
+    text, under = BROKEN[case]
+    done = check(tmp_path, HEAD + text, "--long")
+    (block,) = blocks(done)
+    assert "not well-formed" in block[0]
+    assert sorted(marked(block)) == sorted(under)
+
+
+def test_several_documents_are_told_apart(tmp_path: Path) -> None:
+    one = '<bml id="x"><wait id="w" duration="1"/></bml>'
+    two = '<bml id="y"><wait id="w" duration="long"/></bml>'
+    (block,) = blocks(check(tmp_path, one + two + "\n", "--long"))
+    assert "y:w" in block[0]
+    assert marked(block) == ["long"]
+    assert block[0].split(":")[2] == str(len(one) + two.index("long") + 1)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_the_mark_stands_below_wide_characters_and_tabs(encoding: str, tmp_path: Path) -> None:
+    text = '<bml id="y"><!-- 中文 é e\u0301 -->\t<wait id="w" duration="long"/></bml>'
+    (block,) = blocks(check(tmp_path, text.encode(encoding), "--long"))
+    row, mark = block[2], block[3]
+    assert "中文 é e\u0301 -->    <wait" in row
+    columns = row[: row.index("long")].replace("中文", "----").replace("\u0301", "")
+    assert mark.index("^") == len(columns)
+    assert mark.count("^") == 4
+
+
+def test_a_very_long_line_is_cut_around_the_fault(tmp_path: Path) -> None:
+    waits = "".join(f'<wait id="w{n}"/>' for n in range(2000))
+    done = check(tmp_path, f'<bml id="y">{waits}<wait id="w" duration="long"/></bml>', "--long")
+    (block,) = blocks(done)
+    assert all(len(line) <= 100 for line in block[1:])
+    assert marked(block) == ["long"]
+    assert "..." in block[2]
+
+
+def test_bytes_that_are_no_text_are_marked(tmp_path: Path) -> None:
+    done = check(tmp_path, b'<bml id="b">\n<wait id="\xff"/></bml>', "--long")
+    (block,) = blocks(done)
+    assert "0xFF" in block[0]
+    assert marked(block) == ["\N{REPLACEMENT CHARACTER}"]
+
+
+ADVICE = {
+    "start": ('<head id="h" lexeme="NOD" strt="1"/>', "strt", 'mean "start"?'),
+    "amount": ('<head id="h" lexeme="NOD" amont="0.7"/>', "amont", 'mean "amount"?'),
+    "milliseconds": ('<head id="h" lexeme="NOD" start="1500"/>', "1500", "write 1.5"),
+    "muscles": ('<head id="h" lexeme="NOD" strokeStart="1" stroke="1.045"/>', "1.045", "placed where"),
+    "shift": (
+        '<faceShift id="f" start="1" end="1.041"><faceFacs au="1"/></faceShift>',
+        "1.041",
+        "placed where",
+    ),
+    "frame": ('<wait id="w" start="1" end="1.001"/>', "wait", "BML counts in seconds"),
+}
+
+
+@pytest.mark.parametrize("case", ADVICE)
+def test_what_looks_like_a_slip_is_advice_and_no_fault(case: str, tmp_path: Path) -> None:
+    text, under, help = ADVICE[case]
+    done = check(tmp_path, f"{HEAD}{text}</bml>", "--long")
+    assert (done.return_value, done.stdout) == (0, "")
+    assert "ADVICE" in done.stderr
+    assert marked(done.stderr.split("\n\n")[0].split("\n")) == [under]
+    assert help in done.stderr
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<head id="h" lexeme="NOD" xmlns:o="urn:o" o:amont="1" style="x" start="60"/>',
+        '<gaze id="g" target="cup" type="x"/><speech id="s"><text>Hello</text></speech>',
+        '<head id="h" lexeme="NOD" stroke="1"/><face id="f" start="0" end="4"><faceFacs au="1"/></face>',
+    ],
+)
+def test_what_is_merely_unknown_gets_no_advice(text: str, tmp_path: Path) -> None:
+    assert "ADVICE" not in check(tmp_path, f"{HEAD}{text}</bml>").stderr
+
+
+def test_quiet_holds_advice_back(tmp_path: Path) -> None:
+    document = tmp_path / "d.bml"
+    document.write_text(f'{HEAD}<head id="h" lexeme="NOD" strt="1"/></bml>')
+    done = CliRunner().invoke(cli, ["-q", "check", str(document)], standalone_mode=False)
+    assert (done.return_value, done.output) == (0, "")
+
+
+def on_a_terminal(document: Path, **environment: str) -> str:
+    """What `realizer check` writes to a terminal."""
+    ours, theirs = pty.openpty()
+    clean = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}
+    command = [sys.executable, "-m", "realizer", "check", str(document)]
+    process = subprocess.Popen(
+        command, stdout=theirs, stderr=subprocess.DEVNULL, env={**clean, "TERM": "xterm", **environment}
+    )
+    os.close(theirs)
+    said = b""
+    while True:
+        try:
+            part = os.read(ours, 4096)
+        except OSError:  # Linux says so at the end
+            break
+        if not part:
+            break
+        said += part
+    os.close(ours)
+    process.wait()
+    return said.decode()
+
+
+def test_a_terminal_gets_the_source_and_colours_unless_it_wants_none(tmp_path: Path) -> None:
+    document = tmp_path / "d.bml"
+    document.write_text(f'{HEAD}<head id="n" lexeme="NOD" amount="7"/></bml>')
+    shown, plain = on_a_terminal(document), on_a_terminal(document, NO_COLOR="1")
+    assert "\x1b[" in shown
+    assert "\x1b[" not in plain
+    assert "^ wanted 0..1, got 7" in plain
