@@ -58,6 +58,11 @@ def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
     return ()
 
 
+def claims_of_mood(node: Mood, world: World) -> frozenset[str]:
+    """A face has one resting state."""
+    return frozenset({"base face"})
+
+
 def _aus(node: Emotion | Mood) -> dict[tuple[int, str], float]:
     """(AU, side) -> intensity at intensity 1."""
     aus: dict[tuple[int, str], float] = {}
@@ -107,5 +112,13 @@ def wheel(angle: float, activation: float | None = None) -> dict[str, tuple[floa
 
 KINDS = (
     Kind(Emotion, timing, expand, check, parameters=PARAMETERS),
-    Kind(Mood, timing_of_mood, expand_mood, check, parameters=PARAMETERS, region="face"),
+    Kind(
+        Mood,
+        timing_of_mood,
+        expand_mood,
+        check,
+        claims=claims_of_mood,
+        parameters=PARAMETERS,
+        region="face",
+    ),
 )

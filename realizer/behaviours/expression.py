@@ -37,10 +37,16 @@ def expand(node: Expression, times: Float64, world: World) -> tuple[Channel, ...
 
 
 def check(node: Expression, world: World) -> tuple[Fault, ...]:
-    if _key(node.name) in library():
+    """An unknown name is fatal."""
+    name = _key(node.name)
+    if name in library():
         return ()
-    known = [name.replace(PREFIX, PREFIX.lower()) for name in library()]
-    return (poses.unknown("name", node.name, known),)
+    own = PREFIX.lower()
+    if name.startswith(PREFIX):
+        fault = poses.unknown("name", name.removeprefix(PREFIX), [t.lower() for t in templates()], prefix=own)
+    else:
+        fault = poses.unknown("name", node.name, [*face_lexemes(), *(own + t.lower() for t in templates())])
+    return (fault,)
 
 
 @cache

@@ -83,6 +83,10 @@ def check_file(node: FapFile, world: World) -> tuple[Fault, ...]:
     return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),) if words else ()
 
 
+def claims_of_file(node: FapFile, world: World) -> frozenset[str]:
+    return frozenset(f"FAP {number}" for number in moved(media.load(node.file_name, world, read)))
+
+
 def read(content: bytes) -> FAPClip:
     """The clip of a file.
 
@@ -117,6 +121,6 @@ def _extremes(clip: FAPClip, number: int) -> tuple[float, float]:
 
 
 KINDS = (
-    Kind(Faps, timing, expand, check, claims=claims),
-    Kind(FapFile, timing_of_file, expand_file, check_file),
+    Kind(Faps, timing, expand, check, claims=claims, parameters={"amount": 1.0}),
+    Kind(FapFile, timing_of_file, expand_file, check_file, claims=claims_of_file, parameters={"amount": 1.0}),
 )

@@ -32,4 +32,8 @@ def expand(node: Idle, times: Float64, world: World) -> tuple[Channel, ...]:
     )
 
 
-KINDS = (Kind(Idle, timing, expand, region="idle"),)
+def claims(node: Idle, world: World) -> frozenset[str]:
+    return frozenset({"idle face"})
+
+
+KINDS = (Kind(Idle, timing, expand, claims=claims, region="idle"),)

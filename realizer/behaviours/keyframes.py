@@ -140,4 +140,4 @@ def _targets(part: int | tuple[int, str]) -> tuple[Target, ...]:
     return (fap(part),) if isinstance(part, int) else au(*part)
 
 
-KINDS = (Kind(FaceKeyframe, timing, expand, check, claims=claims),)
+KINDS = (Kind(FaceKeyframe, timing, expand, check, claims=claims, parameters={"amount": 1.0}),)

@@ -44,10 +44,13 @@ def kept(values: Mapping[Target, float], times: Float64, source: str) -> tuple[C
     )
 
 
-def unknown(attribute: str, word: str, known: Iterable[str]) -> Fault:
-    """The fault of a word that nobody knows, with those near it, or all if none is."""
-    names = list(known)
-    shown = word if len(word) <= 60 else word[:60] + "..."
-    near = difflib.get_close_matches(shown.upper(), [name.upper() for name in names], n=3)
-    wanted = [name for name in names if name.upper() in near] or names
-    return Fault("CANNOT_CREATE_BEHAVIOR", f"{attribute}: wanted one of {', '.join(wanted)}; got {shown!r}")
+def unknown(attribute: str, word: str, known: Iterable[str], *, prefix: str = "") -> Fault:
+    """The fault of a word that nobody knows, with those near it, or all if none is.
+
+    `prefix` stands before the word and before all that are known, and does not make them alike.
+    """
+    names = {name.upper(): prefix + name for name in known}
+    got = prefix + (word if len(word) <= 60 else word[:60] + "...")
+    near = difflib.get_close_matches(word[:60].upper(), list(names), n=3)
+    wanted = f"one of {', '.join(names.values())}" if not near else " or ".join(names[name] for name in near)
+    return Fault("CANNOT_CREATE_BEHAVIOR", f"{attribute}: wanted {wanted}; got {got!r}")
