@@ -53,6 +53,22 @@ def _text(value: Any) -> str:
     return value
 
 
+def _ports(value: Any) -> tuple[int, int]:
+    """Two port numbers: BML in, feedback out."""
+    port = _number(int, 0, 65535)
+    ports = value.replace(",", " ").split() if isinstance(value, str) else value
+    if not isinstance(ports, list | tuple) or len(ports) != 2 or port(ports[1]) == 0:
+        raise ValueError("two ports, of which the first may be 0")
+    return port(ports[0]), port(ports[1])
+
+
+def _address(value: Any) -> str:
+    host, _, port = str(value).rpartition(":")
+    if not host or not port.isascii() or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise ValueError("HOST:PORT")
+    return f"{host}:{int(port)}"
+
+
 def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
     return lambda value: None if value is None or value == "" else read(value)
 
@@ -72,11 +88,26 @@ class Settings:
 
     host: str = _setting("127.0.0.1", _text, "address to listen on")
     port: int = _setting(8765, _number(int, 0, 65535), "0 takes a free port")
+    asap_ports: tuple[int, int] | None = _setting(
+        None, _optional(_ports), "of Asap's TCP: BML in, feedback to this port of the client; none: no door"
+    )
+    stomp: str | None = _setting(None, _optional(_address), "HOST:PORT of a message broker; none: no door")
+    stomp_login: str | None = _setting(None, _optional(_text), "for the broker")
+    stomp_password: str | None = _setting(None, _optional(_text), "for the broker")
+    stomp_host: str | None = _setting(None, _optional(_text), 'virtual host; RabbitMQ wants "/"')
+    stomp_json_in: str | None = _setting(
+        "/topic/bmlRequests", _optional(_text), "BML in JSON; none: not read"
+    )
+    stomp_json_out: str = _setting("/topic/bmlFeedback", _text, "feedback in JSON")
+    stomp_xml_in: str | None = _setting("/topic/asap.bml.request", _optional(_text), "BML; none: not read")
+    stomp_xml_out: str = _setting("/topic/asap.bml.feedback", _text, "feedback")
+    stomp_vhmsg: str | None = _setting("/topic/DEFAULT_SCOPE", _optional(_text), "VHMSG; none: not read")
     face: str = _setting("default", _text, "of characters that name none")
     voice: str | None = _setting(None, _optional(_text), "none: espeak-ng where installed, else silent")
     language: str = _setting("en-US", _text, "BCP-47, of speech that names none")
     fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
     scene: Path | None = _setting(None, _optional(Path), "a file of targets every session starts with")
+    media: Path | None = _setting(None, _optional(Path), "the folder of the files that documents may name")
     seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
     keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")

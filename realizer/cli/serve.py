@@ -15,12 +15,21 @@ __all__: list[str] = []
 @click.command()
 @click.option("--host", metavar="ADDRESS", help="Address to listen on.  [default: 127.0.0.1]")
 @click.option("--port", type=int, help="Port of WebSocket and page; 0 takes a free one.  [default: 8765]")
+@click.option(
+    "--asap-ports",
+    nargs=2,
+    type=int,
+    metavar="BML FEEDBACK",
+    help="Serve clients of Asap's TCP: BML on our first port, feedback to their second one, as in 7500 7501.",
+)
+@click.option("--stomp", metavar="HOST:PORT", help="Serve clients of this STOMP broker: ASAP JSON, VHMSG.")
 @click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
 @click.option("--voice", metavar="NAME", help="Voice of characters that name none.")
 @click.option("--fps", type=float, help="Frames a second of streams that name no rate.  [default: 25]")
 @click.option(
     "--scene", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Targets of every session."
 )
+@options.media
 @click.option("--seed", type=int, help="Of idle motion.  [default: 0]")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion.  [default: idle]")
 @click.option(

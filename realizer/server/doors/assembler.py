@@ -1,4 +1,4 @@
-"""Bytes of a stream in, in reads of any size; whole BML documents out, and a Fault for each stretch without one."""
+"""Bytes of a stream in, in reads of any size; whole BML documents out, a Fault for what holds none."""
 
 from __future__ import annotations
 
@@ -107,13 +107,14 @@ class Assembler:
         self._closing = mark.startswith(b"</")
         if not self._closing:
             if self._document >= 0:
-                self._fault("wanted </bml> before the next <bml", self._id(start))
+                if not self._broken:
+                    self._fault("wanted </bml> before the next <bml", self._id(start))
                 self._orphans += 1
             self._document = start
         return True
 
     def _in_tag(self) -> bool:
-        """To the end of a tag of <bml>; `>` in a value is none, `<` anywhere means that it was never closed."""
+        """To the end of a tag of <bml>; `>` in a value is none, `<` means that the tag was never closed."""
         inside = _IN_VALUE.get(self._hidden, _IN_TAG)
         found = inside.search(self._data, self._here)
         if found is None:

@@ -24,7 +24,7 @@ WHOLE = {
     "empty": '<bml id="b"/>',
     "prefix": '<b:bml xmlns:b="urn:x" id="b"><b:wait id="w"/></b:bml>',
     "lines": '<bml\n  id="b"\n>\n<wait\r\nid="w"/>\n</bml\n>',
-    "end tag in CDATA": '<bml id="b"><speech id="s"><text><![CDATA[</bml> <bml id="x">]]></text></speech></bml>',
+    "end tag in CDATA": '<bml id="b"><text><![CDATA[</bml> <bml id="x">]]></text></bml>',
     "end tag in a comment": '<bml id="b"><!-- </bml> <bml> --><wait id="w"/></bml>',
     "end tag in an instruction": '<bml id="b"><?x </bml>?></bml>',
     "greater than in a value": """<bml id="a>b/>" x='"/>'><wait id="w"/></bml>""",

@@ -1,0 +1,206 @@
+"""The Asap TCP door: BML comes in on one port, feedback goes out over a call-back to the client's own port.
+
+A client connects to our BML port and sends documents, without frames. We connect back to its address at the
+feedback port, where it may begin to listen only now. Neither side says hello or good-bye: who closes its BML
+connection is gone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import re
+from collections import deque
+from collections.abc import Callable
+
+from bml_schema import WarningFeedback
+from realizer.server.doors.assembler import Assembler, Fault
+from realizer.server.hub import HubError
+from realizer.server.shell import Shell
+from realizer.settings import Settings
+
+__all__ = ["AsapDoor"]
+
+log = logging.getLogger(__name__)
+
+READ = 64 * 1024  # bytes
+# A client listens for the call-back only after its own connection stands, and looks for it once a second.
+FIRST_RETRY = 0.05  # s
+LAST_RETRY = 1.0  # s
+ATTEMPT = 5.0  # s; a host that drops packets answers nothing
+# Feedback that is kept while there is nobody to take it: hours of talk.
+KEPT = 4 * 2**20  # bytes
+# A client's reader fails where the buffer of a start tag ends, at 4096 characters in the smallest.
+LONGEST_TAG = 4000  # characters
+_LONG_TAG = re.compile(rf"<[^<>]{{{LONGEST_TAG},}}")
+
+
+class AsapDoor:
+    """Listens on `settings.host` and the first of `settings.asap_ports`, `port` once it has started.
+
+    Each BML connection has a session and a call-back of its own, so that clients on several hosts play side
+    by side. Two on one host cannot both listen on the feedback port: the later one is called back as soon as
+    it does listen.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings) -> None:
+        assert settings.asap_ports is not None
+        self.port, self._feedback_port = settings.asap_ports
+        self._host = settings.host
+        self._limit = settings.max_document
+        self._shell = shell
+        self._server: asyncio.Server | None = None
+        self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return (f"asap: BML at {host}:{self.port}, feedback to port {self._feedback_port} of each client",)
+
+    async def start(self) -> None:
+        self._server = await asyncio.start_server(self._serve, self._host, self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def ready(self) -> None:
+        return
+
+    def shut(self) -> None:
+        if self._server is not None:
+            self._server.close()
+
+    async def close(self) -> None:
+        self.shut()
+        for writer in self._clients.values():
+            writer.transport.abort()
+        await asyncio.gather(*self._clients)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One BML connection, from its opening to its end."""
+        task = asyncio.current_task()
+        assert task is not None
+        self._clients[task] = writer
+        host = writer.get_extra_info("peername")[0]
+        link = CallBack(host, self._feedback_port, writer.transport.abort)
+        try:
+            number = self._shell.join(link)
+        except HubError as error:
+            log.warning("asap: %s is not let in: %s", host, error)
+            writer.transport.abort()
+            del self._clients[task]
+            return
+        calling = asyncio.create_task(link.keep())
+        try:
+            await self._read(reader, number, link)
+        except OSError:
+            pass  # the client is gone
+        finally:
+            self._shell.leave(number)
+            calling.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await calling
+            writer.transport.abort()
+            del self._clients[task]
+
+    async def _read(self, reader: asyncio.StreamReader, number: int, link: CallBack) -> None:
+        assembler = Assembler(self._limit)
+        while data := await reader.read(READ):
+            for found in assembler.feed(data):
+                if isinstance(found, Fault):
+                    id = found.block or "<no id>"
+                    link.send(WarningFeedback(id=id, type="PARSING_FAILURE", text=found.text).to_xml())
+                elif not self._shell.receive(number, found):
+                    return
+                await asyncio.sleep(0)  # a read full of documents must not hold up the frames of others
+
+
+class CallBack(asyncio.Protocol):
+    """The way out to one client: a connection to its feedback port, made anew until it is told to stop.
+
+    Args:
+        host, port: where the client listens, sooner or later.
+        close: lets go of the client, from `end`.
+    """
+
+    def __init__(self, host: str, port: int, close: Callable[[], None]) -> None:
+        self._to = (host, port)
+        self._close = close
+        self._transport: asyncio.Transport | None = None
+        self._lost = asyncio.Event()
+        self._kept: deque[bytes] = deque()
+        self._size = 0  # bytes in _kept
+        self._left_out = 0
+
+    @property
+    def waiting(self) -> int:
+        return self._size if self._transport is None else self._transport.get_write_buffer_size()
+
+    def send(self, data: str | bytes) -> None:
+        """Feedback: one element, then a line feed. It is kept while there is no connection."""
+        if isinstance(data, bytes) or not data.startswith("<"):
+            return
+        line = _short(data).encode() + b"\n"
+        if self._transport is not None:
+            self._transport.write(line)
+            return
+        self._kept.append(line)
+        self._size += len(line)
+        while self._size > KEPT:
+            self._size -= len(self._kept.popleft())
+            self._left_out += 1
+
+    def end(self, code: int, reason: str) -> None:
+        log.warning("asap: %s is let go of: %s", self._to[0], reason)
+        self._close()
+
+    async def keep(self) -> None:
+        """Connect, and again whenever the connection is lost, until cancelled."""
+        loop = asyncio.get_running_loop()
+        try:
+            while True:
+                await self._connect(loop)
+                await self._lost.wait()
+                await asyncio.sleep(FIRST_RETRY)
+        finally:
+            if self._transport is not None:
+                self._transport.close()
+
+    async def _connect(self, loop: asyncio.AbstractEventLoop) -> None:
+        pause = FIRST_RETRY
+        while True:
+            with contextlib.suppress(OSError):  # a timeout is one too
+                async with asyncio.timeout(ATTEMPT):
+                    await loop.create_connection(lambda: self, *self._to)
+                    return
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LAST_RETRY)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._lost.clear()
+        if transport.get_extra_info("sockname") == transport.get_extra_info("peername"):
+            transport.abort()  # nobody listened, and TCP has met itself on the way
+            return
+        self._transport = transport
+        if self._left_out:
+            words = f"{self._left_out} messages came before anybody listened here and are left out"
+            warning = WarningFeedback(id="<no id>", type="IOException", text=words)
+            transport.write(warning.to_xml().encode() + b"\n")
+        transport.writelines(self._kept)
+        self._kept.clear()
+        self._size = self._left_out = 0
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._transport = None
+        self._lost.set()
+
+
+def _short(feedback: str) -> str:
+    """The feedback; a warning in its place where one of its start tags is longer than clients can read."""
+    if len(feedback) < LONGEST_TAG or (tag := _LONG_TAG.search(feedback)) is None:
+        return feedback
+    name = re.split(r"[\s/>]", tag[0][1:], maxsplit=1)[0]
+    words = (
+        f"wanted a start tag of at most {LONGEST_TAG} characters in feedback, got a <{name}> of {len(tag[0])}"
+    )
+    return WarningFeedback(id="<no id>", type="IOException", text=words).to_xml()

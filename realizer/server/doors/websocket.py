@@ -1,0 +1,184 @@
+"""The WebSocket door: messages in and out of sessions at /ws, HTTP beside it on the same port."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http
+from collections import deque
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.asyncio.server import Server as SocketServer
+from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import serve as listen
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from realizer.server.hub import HubError
+from realizer.server.shell import Shell
+from realizer.server.site import Answer, Site
+from realizer.settings import Settings
+
+__all__ = ["WebSocketDoor"]
+
+
+class WebSocketDoor:
+    """Serves `settings.host`; `port` is the one that is open after `start`."""
+
+    def __init__(self, shell: Shell, settings: Settings) -> None:
+        self.port = settings.port
+        self._shell = shell
+        self._settings = settings
+        self._site = Site(shell.health)
+        self._socket: SocketServer | None = None
+        self._closing: set[asyncio.Task[None]] = set()
+
+    @property
+    def url(self) -> str:
+        """Where BML goes."""
+        return f"ws://{self._host}:{self.port}/ws"
+
+    @property
+    def page(self) -> str:
+        """The page's address."""
+        return f"http://{self._host}:{self.port}/"
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        return f"listening on {self.url}", f"page at {self.page}"
+
+    async def start(self) -> None:
+        self._socket = await listen(
+            self._handle,
+            self._settings.host,
+            self._settings.port,
+            process_request=self._http,
+            compression=None,  # frames are dense and late is worse than large
+            max_size=self._settings.max_message,
+            ping_interval=20,
+            ping_timeout=60,
+            close_timeout=2,
+            server_header=None,
+        )
+        self.port = next(iter(self._socket.sockets)).getsockname()[1]
+
+    async def ready(self) -> None:
+        return
+
+    def shut(self) -> None:
+        if self._socket is not None:
+            self._socket.close(close_connections=False)
+
+    async def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close(close_connections=False)
+            for socket in list(self._socket.connections):
+                # After a drain the door is closed already; its connections are closed one by one.
+                self._closing.add(asyncio.create_task(socket.close(1001, "the service ends")))
+            await self._socket.wait_closed()
+
+    async def _http(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Everything but a WebSocket at /ws is answered here."""
+        path = urlsplit(request.path).path
+        upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
+        if path == "/ws" and upgrade:
+            try:
+                self._shell.check(_query(request)[0])
+            except HubError as error:
+                return _response(Answer(error.status, "text/plain; charset=utf-8", f"{error}\n".encode()))
+            return None
+        if path == "/ws" or upgrade:
+            words = f"wanted a WebSocket at /ws, got {'a WebSocket' if upgrade else 'plain HTTP'} at {path}\n"
+            return _response(Answer(426 if not upgrade else 404, "text/plain; charset=utf-8", words.encode()))
+        loop = asyncio.get_running_loop()
+        return _response(await loop.run_in_executor(None, self._site.answer, request.path))
+
+    async def _handle(self, socket: ServerConnection) -> None:
+        """One WebSocket, from its opening to its end."""
+        assert socket.request is not None
+        client = _Client(socket)
+        try:
+            number = self._shell.join(client, *_query(socket.request))
+        except HubError as error:
+            await socket.close(1013, str(error)[:120])
+            return
+        writer = asyncio.create_task(client.write())
+        try:
+            async for message in socket:
+                if not self._shell.receive(number, message):
+                    break
+        except ConnectionClosed:
+            pass
+        finally:
+            self._shell.leave(number)
+            writer.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await writer
+
+    @property
+    def _host(self) -> str:
+        host = self._settings.host
+        if host in ("", "0.0.0.0", "::"):
+            return "127.0.0.1"
+        return f"[{host}]" if ":" in host else host
+
+
+class _Client:
+    """The way out to one WebSocket: messages queue here while the socket is slow."""
+
+    def __init__(self, socket: ServerConnection) -> None:
+        self._socket = socket
+        self._queue: deque[str | bytes] = deque()
+        self._queued = 0
+        self._wake = asyncio.Event()
+        self._end: tuple[int, str] | None = None
+
+    @property
+    def waiting(self) -> int:
+        transport = self._socket.transport
+        return self._queued + (0 if transport is None else transport.get_write_buffer_size())
+
+    def send(self, data: str | bytes) -> None:
+        self._queue.append(data)
+        self._queued += len(data)
+        self._wake.set()
+
+    def end(self, code: int, reason: str) -> None:
+        self._end = (code, reason)
+        self._wake.set()
+
+    async def write(self) -> None:
+        """Write what queues, in order, until the socket closes."""
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while self._queue and self._end is None:
+                    data = self._queue.popleft()
+                    self._queued -= len(data)
+                    await self._socket.send(data)
+                if self._end is not None:
+                    await self._socket.close(*self._end)
+                    return
+
+
+def _query(request: Request) -> tuple[str | None, int | None]:
+    """`?session=ID&seen=N`; a `seen` that is no number is none."""
+    query = parse_qs(urlsplit(request.path).query)
+    session = query.get("session", [None])[-1]
+    seen = query.get("seen", [""])[-1]
+    return session, int(seen) if seen.isascii() and seen.isdigit() and len(seen) < 16 else None
+
+
+def _response(answer: Answer) -> Response:
+    headers = Headers(
+        {
+            "Content-Type": answer.media_type,
+            "Content-Length": str(len(answer.body)),
+            "X-Content-Type-Options": "nosniff",
+            "Connection": "close",
+            **dict(answer.headers),
+        }
+    )
+    return Response(answer.status, http.HTTPStatus(answer.status).phrase, headers, answer.body)

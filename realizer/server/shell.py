@@ -1,0 +1,217 @@
+"""Sessions inside an event loop: messages of connections in, what sessions want done carried out."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import itertools
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+from realizer.behaviours.kind import Position
+from realizer.server.doors.door import Client
+from realizer.server.effects import Close, Draw, Effect, Send, Speak
+from realizer.server.hub import Hub
+from realizer.server.session import Session
+from realizer.server.studio import Studio
+from realizer.settings import Settings
+
+__all__ = ["Shell"]
+
+log = logging.getLogger(__name__)
+
+# How often sessions that nobody visits are looked for.
+SWEEP = 5.0  # s
+
+
+class Shell:
+    """All sessions of the service with their timers and engines. Doors let their clients `join` here.
+
+    It is told what comes from a connection by the number that `join` gave, and hands what goes to it to the
+    Client that joined.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._hub = Hub(self._make, settings.max_sessions)
+        self._studio = Studio()
+        self._clients: dict[int, Client] = {}
+        self._timers: dict[Session, asyncio.TimerHandle] = {}
+        self._numbers = itertools.count(1)
+        self._sweeper: asyncio.TimerHandle | None = None
+        self._scene: Mapping[str, Position] | None = None
+        self._capabilities: dict[str, Any] = {}
+        self._ending = False
+        self._closed = False
+
+    async def start(self) -> None:
+        """Load what every session shares.
+
+        Raises:
+            ValueError: the scene file is not a scene.
+            FaceError: no such face.
+        """
+        self._loop = asyncio.get_running_loop()
+        if self.settings.scene is not None:
+            from realizer.pipeline import parse_scene
+
+            self._scene = parse_scene(self.settings.scene.read_text("utf-8"))
+        # A face that is not there is said before a door opens.
+        from realizer.face import load_face
+
+        await self._loop.run_in_executor(None, load_face, self.settings.face)
+        self._capabilities = await self._loop.run_in_executor(None, _capabilities)
+        self._sweeper = self._loop.call_later(SWEEP, self._sweep)
+
+    def end(self) -> None:
+        """Sessions take no more documents from now on."""
+        self._ending = True
+        for session in self._hub.sessions.values():
+            session.ending = True
+
+    @property
+    def busy(self) -> bool:
+        """Something plays, waits or is being prepared."""
+        return any(session.busy for session in self._hub.sessions.values())
+
+    async def close(self) -> None:
+        """End every session and every engine."""
+        self._closed = True
+        for timer in (*self._timers.values(), self._sweeper):
+            if timer is not None:
+                timer.cancel()
+        self._timers.clear()
+        for session in self._hub.sessions.values():
+            session.close()
+        await self._loop.run_in_executor(None, self._studio.close)
+
+    def health(self) -> dict[str, object]:
+        """How many there are."""
+        return {"sessions": len(self._hub.sessions), "connections": len(self._clients)}
+
+    # connections --------------------------------------------------------------------------------
+
+    def check(self, name: str | None) -> None:
+        """Whether a client could join.
+
+        Raises:
+            HubError: a bad name, or too many sessions.
+        """
+        self._hub.check(name)
+
+    def join(self, client: Client, name: str | None = None, seen: int | None = None) -> int:
+        """Let a client into the session of that name, or into one of its own; its number from now on.
+
+        Raises:
+            HubError: as `check`.
+        """
+        number = next(self._numbers)
+        session = self._hub.open(number, name, self._loop.time(), seen)
+        self._clients[number] = client
+        self._pump(session)
+        return number
+
+    def receive(self, number: int, message: str | bytes) -> bool:
+        """A message from a connection; False where it is in no session any more."""
+        session = self._hub.session_of(number)
+        if session is None or session.closed:
+            return False
+        try:
+            session.receive(number, message, self._loop.time())
+        except Exception:
+            self._fail(session)
+        self._pump(session)
+        return True
+
+    def leave(self, number: int) -> None:
+        """A connection is gone."""
+        left = self._hub.session_of(number)
+        self._hub.leave(number, self._loop.time())
+        self._clients.pop(number, None)
+        if left is not None:
+            self._arm(left)
+
+    # sessions -----------------------------------------------------------------------------------
+
+    def _make(self, id: str, now: float, named: bool) -> Session:
+        session = Session(
+            id, self.settings, now, named=named, scene=self._scene, capabilities=self._capabilities
+        )
+        session.ending = self._ending
+        return session
+
+    def _pump(self, session: Session) -> None:
+        """Do what a session wants done, then wake it when it next has something."""
+        for effect in self._hub.effects(session, self._loop.time()):
+            self._do(session, effect)
+        self._arm(session)
+
+    def _arm(self, session: Session) -> None:
+        """One timer a session."""
+        deadline = session.next_deadline()
+        timer = self._timers.get(session)
+        if timer is not None:
+            # One that is due is left alone: messages in quick succession must not put it off for ever.
+            if deadline is not None and timer.when() <= max(deadline, self._loop.time()):
+                return
+            timer.cancel()
+            del self._timers[session]
+        if deadline is not None and not self._closed:
+            when = max(deadline, self._loop.time())
+            self._timers[session] = self._loop.call_at(when, self._tick, session)
+
+    def _tick(self, session: Session) -> None:
+        self._timers.pop(session, None)
+        for number in session.connections:
+            session.backlog(number, self._clients[number].waiting)
+        try:
+            session.tick(self._loop.time())
+        except Exception:
+            self._fail(session)
+        self._pump(session)
+
+    def _fail(self, session: Session) -> None:
+        """A bug: the traceback is ours, this session ends, the others play on."""
+        log.exception("session %s ends: it failed", session.id)
+        for number in session.connections:
+            self._do(session, Close(number, 1011, "internal error"))
+        session.close()
+        self._hub.sessions.pop(session.id, None)
+
+    def _do(self, session: Session, effect: Effect) -> None:
+        match effect:
+            case Send(connection, data):
+                if (client := self._clients.get(connection)) is not None:
+                    client.send(data)
+            case Speak(id):
+                future = self._loop.run_in_executor(self._studio.speakers, self._studio.speak, effect)
+                future.add_done_callback(functools.partial(self._answered, session, session.spoken, id))
+            case Draw(id):
+                drawing = self._loop.run_in_executor(self._studio.drawers, self._studio.draw, effect)
+                drawing.add_done_callback(functools.partial(self._answered, session, session.drawn, id))
+            case Close(connection, code, reason):
+                if (client := self._clients.get(connection)) is not None:
+                    client.end(code, reason)
+
+    def _answered(self, session: Session, tell: Any, id: int, future: asyncio.Future[Any]) -> None:
+        if not future.cancelled() and not self._closed:
+            tell(id, future.result(), self._loop.time())
+            self._pump(session)
+
+    def _sweep(self) -> None:
+        self._hub.sweep(self._loop.time())
+        self._sweeper = self._loop.call_later(SWEEP, self._sweep)
+
+
+def _capabilities() -> dict[str, Any]:
+    """What `welcome` tells beside streams: elements, faces and voices."""
+    from realizer.behaviours import KINDS
+    from realizer.face import list_faces
+    from realizer.speech import voices
+
+    return {
+        "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
+        "faces": [face.name for face in list_faces()],
+        "voices": [voice.name for voice in voices() if voice.available],
+    }
