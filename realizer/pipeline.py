@@ -9,19 +9,22 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bml_schema import Block, BMLError, read
+from realizer.animation.curves import gain_at
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float32, Int16
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
+from realizer.composition.playing import Speaking
 from realizer.errors import RealizerError, VoiceError
-from realizer.player import Player, Speaking
+from realizer.player import Player
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Say, Utterance, Voice
 from realizer.tables import faps
@@ -146,6 +149,7 @@ def realize(
     seed: int = 0,
     idle: bool = True,
     language: str = "en-US",
+    media: Path | None = None,
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
 
@@ -157,6 +161,7 @@ def realize(
         scene: target name -> (x, y, z) metres, origin between the eyes.
         seed: for idle motion; the same seed gives the same frames.
         idle: blinks and small head motion.
+        media: the folder of the files that documents may name.
 
     Raises:
         VoiceError: the named voice is not installed.
@@ -166,8 +171,11 @@ def realize(
     texts = [documents] if isinstance(documents, str | bytes) else list(documents)
     if not (math.isfinite(fps) and fps > 0):
         raise ValueError(f"fps: wanted a number above 0, got {fps}")
-    player = Player(scene=scene, seed=seed, idle=idle, language=language)
-    schedules, refused = play(texts, player, voice)
+    player = Player(scene=scene, seed=seed, idle=idle, language=language, media=media, history=float("inf"))
+    accepted, refused = play(texts, player, voice)
+    # Blocks act on each other while they play: what is seen and heard is known when all of them have ended.
+    feedback = tuple(f.to_xml() for f in player.due(float("inf")))
+    schedules = [player.latest(s) for s in accepted]
     end = player.end
     count = frame_count(end, fps)
     if count > MOST_FRAMES:
@@ -183,7 +191,6 @@ def realize(
         aus = AUFrames(times, np.concatenate([w.values for w in windows]))
         characters[name] = Performance(aus, to_fap(aus))
     speaking = player.speech()
-    feedback = tuple(f.to_xml() for f in player.due(float("inf")))
     warnings = tuple(w for s in schedules for w in s.warnings)
     warnings += tuple(w for w in refused if w not in warnings)
     return Realization(
@@ -204,6 +211,7 @@ def schedule(
     *,
     voice: Voice | str | None = None,
     scene: Mapping[str, Position] | None = None,
+    media: Path | None = None,
 ) -> Schedule:
     """The sync times of one BML document: parse, timing, solve; no animation.
 
@@ -213,7 +221,7 @@ def schedule(
     """
     from bml_schema import parse
 
-    player = Player(scene=scene, idle=False)
+    player = Player(scene=scene, idle=False, media=media)
     block = parse(document, VOCABULARY)
     with _opened(voice) as speaker:
         return player.submit(block, 0.0, speak(player.wants(block), speaker))
@@ -309,6 +317,9 @@ def heard(speaking: Speaking, rate: int) -> Float32:
         pcm = pcm[:kept].copy()
         ramp = min(len(pcm), round(CUT * rate))
         pcm[len(pcm) - ramp :] *= np.linspace(1, 0, ramp, dtype=np.float32)
+    if speaking.gains:
+        times = speaking.start + np.arange(len(pcm)) / rate
+        pcm = (pcm * gain_at(speaking.gains, times)).astype(np.float32)
     return pcm
 
 

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from bml_schema import Block, Place, Problem, SyncRef
+from bml_schema import Block, Place, Problem, SyncRef, without
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import Kind, World
+from realizer.composition.claims import Claim, claims, losses
 from realizer.scheduling import schedule_block
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 __all__ = ["Plan", "plan"]
 
+_MOST_LISTED = 10  # references named in a warning as gone with their behaviour
+
 
 @dataclass(frozen=True)
 class Plan:
-    """A block's schedule, and behaviour id -> channels in seconds from block start."""
+    """A block that can be played.
 
+    Attributes:
+        block: without the behaviours that were dropped, and what referred to them.
+        schedule: `failed` when something required cannot be played; nothing else holds anything then.
+        channels: behaviour id -> channels in seconds from block start.
+        claims: what its behaviours need for themselves, on the clock of `schedule.start`.
+    """
+
+    block: Block
     schedule: Schedule
-    channels: Mapping[str, tuple[Channel, ...]]
+    channels: Mapping[str, tuple[Channel, ...]] = field(default_factory=dict)
+    claims: Sequence[Claim] = ()
 
 
 def plan(
@@ -27,68 +39,145 @@ def plan(
     kinds: Mapping[str, Kind],
     world: World,
     *,
+    start: float = 0.0,
     outside: Callable[[SyncRef], float | None] = lambda ref: None,
+    held: Iterable[Claim] = (),
 ) -> Plan:
     """Schedule a block and expand it; what cannot be played is dropped with one warning each.
 
     Args:
         world: with the utterances of the block's speech behaviours.
+        start: when the block starts, seconds on the session clock.
         outside: sync points of other blocks -> seconds from this block's start, None where unknown.
-
-    Returns:
-        The plan; `schedule.failed` when something required cannot be played.
+        held: what behaviours of earlier blocks of this character need for themselves, on the session clock.
     """
-    warnings = [_of_problem(p) for p in block.problems]
-    fatal = [w for p, w in zip(block.problems, warnings, strict=True) if p.fatal]
-    if fatal:
-        return _failed(block, fatal[0])
-    timings: dict[str, Timing] = {}
-    for node in block.behaviours:
-        name = f"{block.id}:{node.id}"
-        kind = kinds.get(node.tag)
-        if kind is None:
-            warning = Warning(name, "BEHAVIOR_TYPE_NOT_SUPPORTED", f"<{node.tag}> is not known here")
-            faults, dropped = [warning], True
-        else:
-            found = kind.check(node, world)
-            where = block.places.get(node.id)
-            faults = [Warning(name, fault.type, _at(where, fault.text)) for fault in found]
-            dropped = any(fault.fatal for fault in found)
-            if not dropped and kind.say is not None and node.id not in world.utterances:
-                words = _at(where, "speech: no voice could say it")
-                faults, dropped = [Warning(name, "CANNOT_CREATE_BEHAVIOR", words)], True
-        if dropped and node.id in block.required:
-            return _failed(block, Warning(block.id, faults[0].type, f"{faults[0].text} (required {node.id})"))
-        warnings += faults[:1] if dropped else faults
-        if not dropped and kind is not None:
-            timings[node.id] = kind.timing(node, world)
-    schedule = schedule_block(block, timings, outside=outside)
-    warnings += [_placed(block, warning) for warning in schedule.warnings]
-    schedule = replace(schedule, warnings=tuple(warnings))
-    if schedule.failed:
-        return Plan(schedule, {})
+    work = _Work(block, kinds, world)
+    try:
+        work.take_problems()
+        work.check()
+        schedule = work.schedule(start, outside, tuple(held))
+    except _Failed as failed:
+        warning = replace(failed.warning, id=block.id)
+        return Plan(block, Schedule(block.id, {}, {}, start=start, warnings=(warning,), failed=True))
     channels = {
         node.id: kinds[node.tag].expand(node, schedule.times[node.id], world)
-        for node in block.behaviours
+        for node in work.block.behaviours
         if node.id in schedule.times
     }
-    return Plan(schedule, channels)
+    return Plan(work.block, schedule, channels, tuple(claims(work.block, schedule, kinds, world)))
 
 
-def _placed(block: Block, warning: Warning) -> Warning:
-    """A warning of the scheduler with the place of the behaviour that it dropped."""
-    place = block.places.get(warning.id.removeprefix(f"{block.id}:"))
-    return replace(warning, text=_at(place, warning.text))
+class _Failed(Exception):
+    """Something required cannot be played: the block goes, with this warning."""
+
+    def __init__(self, warning: Warning) -> None:
+        super().__init__(warning.text)
+        self.warning = warning
+
+
+class _Work:
+    """A block while it is planned: what is left of it, and the warnings so far."""
+
+    def __init__(self, block: Block, kinds: Mapping[str, Kind], world: World) -> None:
+        self.whole = self.block = block
+        self.kinds = kinds
+        self.world = world
+        self.timings: dict[str, Timing] = {}
+        self.warnings: list[Warning] = []
+
+    def take_problems(self) -> None:
+        """What the parser dropped."""
+        for problem in self.block.problems:
+            warning = _of_problem(problem)
+            if problem.fatal:
+                raise _Failed(warning)
+            self.warnings.append(warning)
+
+    def check(self) -> None:
+        """What the behaviours' kinds have against them, and what the others want of time."""
+        gone: list[tuple[str, Warning]] = []
+        for node in self.block.behaviours:
+            name = f"{self.block.id}:{node.id}"
+            kind = self.kinds.get(node.tag)
+            if kind is None:
+                said = f"<{node.tag.rpartition('}')[2]}> is not known here"
+                gone.append((node.id, Warning(name, "BEHAVIOR_TYPE_NOT_SUPPORTED", self.at(node.id, said))))
+                continue
+            found = kind.check(node, self.world)
+            faults = [Warning(name, fault.type, self.at(node.id, fault.text)) for fault in found]
+            if any(fault.fatal for fault in found):
+                gone.append((node.id, next(w for w, f in zip(faults, found, strict=True) if f.fatal)))
+            elif kind.say is not None and node.id not in self.world.utterances:
+                said = self.at(node.id, "speech: no voice could say it")
+                gone.append((node.id, Warning(name, "CANNOT_CREATE_BEHAVIOR", said)))
+            else:
+                self.warnings += faults
+                self.timings[node.id] = kind.timing(node, self.world)
+        self.drop(gone)
+
+    def schedule(
+        self, start: float, outside: Callable[[SyncRef], float | None], held: Sequence[Claim]
+    ) -> Schedule:
+        """The times of what can be had together; solved again without what cannot."""
+        while True:
+            priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
+            found = schedule_block(self.block, self.timings, outside=outside, priorities=priorities)
+            warnings = [replace(w, text=self.at(self.behaviour(w), w.text)) for w in found.warnings]
+            if found.failed:
+                raise _Failed(warnings[0])
+            gone = self.timings.keys() - found.times.keys()
+            self.drop([(self.behaviour(w), w) for w in warnings if self.behaviour(w) in gone])
+            self.warnings += [w for w in warnings if self.behaviour(w) not in gone]
+            found = replace(found, start=start, character=self.block.character_id)
+            lost = losses(claims(self.block, found, self.kinds, self.world), held, start)
+            if not lost:
+                return replace(found, warnings=tuple(self.warnings))
+            self.drop(
+                (
+                    loss.claim.behaviour,
+                    Warning(
+                        f"{self.block.id}:{loss.claim.behaviour}",
+                        "CANNOT_CREATE_BEHAVIOR",
+                        self.at(loss.claim.behaviour, str(loss)),
+                    ),
+                )
+                for loss in lost
+            )
+
+    def drop(self, gone: Iterable[tuple[str, Warning]]) -> None:
+        """Take behaviours out, and what refers to them; each has one warning, which names what went too."""
+        dropped = dict(gone)
+        if not dropped:
+            return
+        for id in (node.id for node in self.block.behaviours if node.id in dropped):
+            if id in self.block.required:
+                warning = dropped[id]
+                raise _Failed(replace(warning, text=f"{warning.text} (required {id})"))
+        self.block, lost, fatal = without(self.block, dropped.keys())
+        for id, warning in dropped.items():
+            self.timings.pop(id, None)
+            if id in fatal:
+                raise _Failed(replace(warning, text=f"{warning.text} (a required constraint names {id})"))
+            if names := lost.get(id):
+                more = len(names) - _MOST_LISTED
+                listed = ", ".join(names[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+                warning = replace(warning, text=f"{warning.text}; with it went {listed}")
+            # What else was to be said of it no longer matters.
+            self.warnings = [w for w in self.warnings if w.id != warning.id]
+            self.warnings.append(warning)
+
+    def behaviour(self, warning: Warning) -> str:
+        """The behaviour a warning is about; "" where it is about something else."""
+        block, _, behaviour = warning.id.partition(":")
+        return behaviour if block == self.whole.id else ""
+
+    def at(self, behaviour: str, text: str) -> str:
+        """A sentence with the place of its behaviour."""
+        place = self.whole.places.get(behaviour)
+        return text if place is None else f"line {place.line}, {place.path}: {text}"
 
 
 def _of_problem(problem: Problem) -> Warning:
     place = Place(problem.line, problem.path) if problem.line else None
-    return Warning(problem.id, problem.type, _at(place, problem.text))
-
-
-def _at(place: Place | None, text: str) -> str:
-    return text if place is None else f"line {place.line}, {place.path}: {text}"
-
-
-def _failed(block: Block, warning: Warning) -> Plan:
-    return Plan(Schedule(block.id, {}, {}, warnings=(replace(warning, id=block.id),), failed=True), {})
+    text = problem.text if place is None else f"line {place.line}, {place.path}: {problem.text}"
+    return Warning(problem.id, problem.type, text)

@@ -49,18 +49,30 @@ MAY: dict[str, set[str]] = {
         "realizer.speech.utterance",
         "realizer.tables",
     },
-    "realizer.reporting": {"bml_schema", "realizer.scheduling.timing"},
     "realizer.planning": VALUES
-    | {"bml_schema", "realizer.animation", "realizer.behaviours", "realizer.scheduling"},
-    "realizer.character": VALUES | {"realizer.animation"},
-    "realizer.player": VALUES
     | {
-        "realizer.character",
         "bml_schema",
         "realizer.animation",
         "realizer.behaviours",
+        "realizer.composition.claims",
+        "realizer.scheduling",
+    },
+    "realizer.composition": VALUES
+    | {
+        "bml_schema",
+        "realizer.animation",
+        "realizer.behaviours",
+        "realizer.composition",
         "realizer.planning",
-        "realizer.reporting",
+        "realizer.scheduling.timing",
+        "realizer.speech.utterance",
+    },
+    "realizer.player": VALUES
+    | {
+        "bml_schema",
+        "realizer.animation",
+        "realizer.behaviours",
+        "realizer.composition",
         "realizer.scheduling",
         "realizer.speech.utterance",
     },
@@ -69,6 +81,7 @@ MAY: dict[str, set[str]] = {
         "bml_schema",
         "realizer.animation",
         "realizer.behaviours",
+        "realizer.composition.playing",
         "realizer.face",
         "realizer.player",
         "realizer.scheduling",

@@ -143,9 +143,15 @@ def unknown_lexeme(lexeme: str, known: Iterable[str]) -> Fault:
     return Fault("CANNOT_CREATE_BEHAVIOR", f"lexeme: wanted one of {', '.join(names)}; got {lexeme!r}{hint}")
 
 
+def claims_of_shift(node: FaceShift, world: World) -> frozenset[str]:
+    """A face has one resting state."""
+    return frozenset({"base face"})
+
+
+AMOUNT = {"amount": "amount"}
 KINDS = (
-    Kind(FaceLexeme, timing_of_lexeme, expand_part, check_part),
-    Kind(FaceFacs, timing_of_facs, expand_part, check_part),
-    Kind(Face, timing_of_face, expand_face, check_compound),
-    Kind(FaceShift, timing_of_shift, expand_shift, check_compound, region="face"),
+    Kind(FaceLexeme, timing_of_lexeme, expand_part, check_part, parameters=AMOUNT),
+    Kind(FaceFacs, timing_of_facs, expand_part, check_part, parameters=AMOUNT),
+    Kind(Face, timing_of_face, expand_face, check_compound, parameters=AMOUNT),
+    Kind(FaceShift, timing_of_shift, expand_shift, check_compound, claims=claims_of_shift, region="face"),
 )

@@ -145,7 +145,17 @@ def _converge(
     return (Channel(au(66)[0], times, values, layer=layer, holds=holds, source=source),)
 
 
+def claims(node: Gaze, world: World) -> frozenset[str]:
+    """Every influence takes the eyes: one cannot look at two things."""
+    return frozenset({"gaze"})
+
+
+def claims_of_shift(node: GazeShift, world: World) -> frozenset[str]:
+    """A base state can change to one other at a time; a temporary gaze does not mind."""
+    return frozenset({"base gaze"})
+
+
 KINDS = (
-    Kind(Gaze, timing, expand, check),
-    Kind(GazeShift, timing_of_shift, expand_shift, check, region="eyes"),
+    Kind(Gaze, timing, expand, check, claims=claims),
+    Kind(GazeShift, timing_of_shift, expand_shift, check, claims=claims_of_shift, region="eyes"),
 )

@@ -107,7 +107,13 @@ def degrees() -> Mapping[int, float]:
     return {row.au: row.degrees for row in tables.action_units()}
 
 
+def claims_of_shift(node: HeadDirectionShift, world: World) -> frozenset[str]:
+    return frozenset({"base head"})
+
+
 KINDS = (
-    Kind(Head, timing, expand, check),
-    Kind(HeadDirectionShift, timing_of_shift, expand_shift, check_shift, region="head"),
+    Kind(Head, timing, expand, check, parameters={"amount": "amount"}),
+    Kind(
+        HeadDirectionShift, timing_of_shift, expand_shift, check_shift, claims=claims_of_shift, region="head"
+    ),
 )

@@ -13,7 +13,7 @@ from realizer.animation.channel import Channel
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import MOST_TEXT, Say
+from realizer.speech.utterance import MOST_TEXT, Say, Utterance
 
 __all__ = ["KINDS"]
 
@@ -129,4 +129,13 @@ def _places(node: Speech) -> dict[str, float]:
     return {name: place / length if length else 0.0 for name, place in places.items()}
 
 
-KINDS = (Kind(Speech, timing, expand, check, say),)
+def sound(node: Speech, world: World) -> Utterance | None:
+    return world.utterances.get(node.id)
+
+
+def claims(node: Speech, world: World) -> frozenset[str]:
+    """A character has one voice."""
+    return frozenset({"voice"})
+
+
+KINDS = (Kind(Speech, timing, expand, check, say, sound=sound, claims=claims, parameters={"volume": 100.0}),)

@@ -14,13 +14,15 @@ class FeedbackLog:
 
     Args:
         keep: how many are kept.
+        epoch: POSIX seconds at which the session clock was 0; None where nobody need know.
 
     Attributes:
         newest: seq of the last message, 0 while there is none.
     """
 
-    def __init__(self, keep: int) -> None:
+    def __init__(self, keep: int, epoch: float | None = None) -> None:
         self.newest = 0
+        self._epoch = epoch
         self._kept: deque[str] = deque(maxlen=keep)
 
     @property
@@ -31,7 +33,7 @@ class FeedbackLog:
     def add(self, feedback: Feedback) -> None:
         """Number a message and keep it."""
         self.newest += 1
-        self._kept.append(feedback.to_xml(self.newest))
+        self._kept.append(feedback.to_xml(self.newest, self._epoch))
 
     def since(self, seq: int) -> list[str]:
         """The kept messages from `seq` on, in order."""

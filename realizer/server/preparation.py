@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from bml_schema import Block, SyncRef
-from bml_schema.behaviours import Speech
-from bml_schema.nodes import Synchronize
+from bml_schema import Block
+from realizer.composition.references import references
 from realizer.speech.utterance import Say, Utterance
 
 __all__: list[str] = []
@@ -43,10 +42,11 @@ class Preparation:
     def add(self, block: Block, character: int, says: dict[int, tuple[str, Say]], now: float) -> Waiting:
         """Let a block wait for its voice, and for the earlier blocks it depends on.
 
-        It depends on blocks whose sync points it names, on one with its own id, and, where it is appended,
-        on all of its character. A replacing block waits for nobody: `replaced_by` says what it ends.
+        It depends on blocks whose sync points it names, on those it is to follow, on one with its own id,
+        and, where it is appended, on all of its character. A replacing block waits for nobody:
+        `replaced_by` says what it ends. Blocks that are to follow this one depend on it.
         """
-        named = {ref.block for ref in _references(block)}
+        named = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after}
         after = {
             w
             for w in self.waiting
@@ -61,6 +61,9 @@ class Preparation:
             )
         }
         waiting = Waiting(block, character, now, says, after=after)
+        for other in self.waiting:
+            if other.block.id in (*block.prepend_before, *block.chunk_before) and other not in after:
+                other.after.add(waiting)
         self.waiting.append(waiting)
         return waiting
 
@@ -111,17 +114,3 @@ class Preparation:
         self.waiting = [w for w in self.waiting if id(w) not in ids]
         for waiting in self.waiting:
             waiting.after = {w for w in waiting.after if id(w) not in ids}
-
-
-def _references(block: Block) -> Iterator[SyncRef]:
-    for behaviour in block.behaviours:
-        yield from behaviour.syncs.values()
-        if isinstance(behaviour, Speech) and behaviour.text is not None:
-            for piece in behaviour.text.parts:
-                if not isinstance(piece, str) and piece.ref is not None:
-                    yield piece.ref
-    for constraint in block.constraints:
-        for part in constraint.parts:
-            yield from part.refs
-            if not isinstance(part, Synchronize):
-                yield part.ref

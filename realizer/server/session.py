@@ -61,6 +61,7 @@ class Session:
         scene: where targets are, to begin with.
         load_face: name -> Face, raising FaceError.
         capabilities: what `welcome` tells.
+        epoch: POSIX seconds at `now`, told with every time; None leaves them out.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
     of them, and `next_deadline` says when `tick` is wanted.
@@ -76,6 +77,7 @@ class Session:
         scene: Mapping[str, Position] | None = None,
         load_face: Callable[[str], Face] | None = None,
         capabilities: Mapping[str, Any] | None = None,
+        epoch: float | None = None,
     ) -> None:
         self.id = id
         self.settings = settings
@@ -97,7 +99,7 @@ class Session:
         self._speaks = 0
         self._connections: dict[int, Connection] = {}
         self._inbox: deque[Iterator[Block | BMLError | Warning]] = deque()
-        self.log = FeedbackLog(LOG)
+        self.log = FeedbackLog(LOG, epoch)
         self._effects: list[Effect] = []
 
     # connections --------------------------------------------------------------------------------

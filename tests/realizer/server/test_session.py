@@ -436,7 +436,7 @@ def test_hello_with_seen_sends_what_followed(driver) -> None:
     assert not viewer.feedback
     driver.send({"type": "hello", "session": "test", "seen": 1}, 2)
     assert viewer.of("welcome")[0]["session"] == "test"
-    assert [f.seq for f in viewer.feedback] == list(range(2, 12))
+    assert [f.seq for f in viewer.feedback] == list(range(2, 14))
 
 
 def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
@@ -444,8 +444,8 @@ def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
     driver.send(NOD.format("b"))
     driver.run(10)
     viewer = driver.join(2, seen=2)
-    assert viewer.of("gap") == [{"type": "gap", "seen": 2, "first": 7}]
-    assert [f.seq for f in viewer.feedback] == [7, 8, 9, 10, 11]
+    assert viewer.of("gap") == [{"type": "gap", "seen": 2, "first": 9}]
+    assert [f.seq for f in viewer.feedback] == [9, 10, 11, 12, 13]
 
 
 def test_seen_of_another_life_is_a_gap(driver) -> None:
@@ -499,6 +499,7 @@ def test_a_scene_makes_unknown_targets_a_warning_and_known_ones_not(driver) -> N
     driver.run(1)
     driver.send({"type": "scene", "objects": {"cup": {"x": 0.3, "y": 0, "z": 1}}})
     driver.send(gaze.format("b", "cup"))
+    driver.run(2)
     driver.send(gaze.format("c", "moon"))
     found = warnings(driver.run(5))
     assert [(w.id, w.type) for w in found] == [("c:g", "NO_SUCH_TARGET")]

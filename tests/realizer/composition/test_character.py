@@ -8,7 +8,7 @@ import pytest
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
-from realizer.character import Character, Shift
+from realizer.composition.character import Character, Shift
 
 SMILE = au(12, "LEFT")[0]
 HEAD = au(51)[0]

@@ -1,0 +1,98 @@
+"""What behaviours need for themselves and when in; which of them have to go out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from bml_schema import Block
+from realizer.behaviours.kind import Kind, World
+from realizer.scheduling.timing import Schedule
+
+__all__ = ["Claim", "Loss", "claims", "losses"]
+
+# s; two claims that share less than this do not disturb each other.
+TOUCH = 1e-3
+# Where one behaviour may pass into the next: two clash only if one lies within the other. A gaze does not
+# pass into that of another block, which is not to be disturbed; a base state does, or it would never change.
+PASSES = {"gaze": "own block", "base gaze": "any block", "base head": "any block", "base face": "any block"}
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A behaviour needs something for itself for a while.
+
+    Attributes:
+        what: such as "voice" or "gaze"; of one character.
+        begin, end: seconds; of all claims that are compared on the same clock.
+        block, behaviour: whose it is.
+        rank: of two of one block the lower one keeps it.
+    """
+
+    what: str
+    begin: float
+    end: float
+    block: str
+    behaviour: str
+    rank: tuple[float, bool, int] = (0.0, False, 0)
+
+    def disturbs(self, other: Claim) -> bool:
+        """Whether one of the two has to go."""
+        if self.what != other.what or min(self.end, other.end) - max(self.begin, other.begin) <= TOUCH:
+            return False
+        passes = PASSES.get(self.what)
+        if passes is None or (passes == "own block" and self.block != other.block):
+            return True
+        inner, outer = sorted((self, other), key=lambda c: c.end - c.begin)
+        return outer.begin <= inner.begin + TOUCH and inner.end <= outer.end + TOUCH
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """A claim that cannot be had, and the one that stands in its way."""
+
+    claim: Claim
+    winner: Claim
+    start: float = 0.0  # of the block that loses it
+
+    def __str__(self) -> str:
+        """`wanted the gaze from 1 to 2.5 s, g1 has it from 0 to 1.5 s`, from the start of the block."""
+        w, c = self.winner, self.claim
+        own = w.behaviour if w.block == c.block else f"{w.block}:{w.behaviour}"
+        begin, end, since, until = (f"{round(t - self.start, 3):g}" for t in (c.begin, c.end, w.begin, w.end))
+        return f"wanted the {c.what} from {begin} to {end} s, but {own} has it from {since} to {until} s"
+
+
+def claims(block: Block, schedule: Schedule, kinds: Mapping[str, Kind], world: World) -> Iterator[Claim]:
+    """What the scheduled behaviours of a block claim, on the clock of `schedule.start`."""
+    for order, node in enumerate(block.behaviours):
+        if node.id not in schedule.times:
+            continue
+        points, times = schedule.points[node.id], schedule.times[node.id]
+        last = points.index("relax") if "relax" in points else -1
+        begin, end = schedule.start + float(times[0]), schedule.start + float(times[last])
+        rank = (-node.priority, node.id not in block.required, order)
+        for what in sorted(kinds[node.tag].claims(node, world)):
+            yield Claim(what, begin, end, block.id, node.id, rank)
+
+
+def losses(wanted: Iterable[Claim], held: Iterable[Claim], start: float = 0.0) -> list[Loss]:
+    """What of `wanted` cannot be had: what is held stays, and of two that are wanted the lower rank.
+
+    One loss a behaviour, in order of rank. `start` is where their sentences count from.
+    """
+    had: dict[str, list[Claim]] = {}
+    for claim in held:
+        had.setdefault(claim.what, []).append(claim)
+    by_behaviour: dict[str, list[Claim]] = {}
+    for claim in sorted(wanted, key=lambda c: c.rank):
+        by_behaviour.setdefault(claim.behaviour, []).append(claim)
+    lost: list[Loss] = []
+    for own in by_behaviour.values():
+        clash = ((c, h) for c in own for h in had.get(c.what, ()) if h.disturbs(c))
+        if (found := next(clash, None)) is not None:
+            lost.append(Loss(*found, start))
+            continue
+        for claim in own:
+            had.setdefault(claim.what, []).append(claim)
+    return lost

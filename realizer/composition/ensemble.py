@@ -1,0 +1,448 @@
+"""All blocks of a session: accepted in turn, started, moved and ended as they depend on each other."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from bml_schema import Block, Feedback, SyncRef, WarningFeedback
+from realizer.behaviours.kind import Act, Kind, World
+from realizer.composition.acts import ActFault, perform
+from realizer.composition.character import Character
+from realizer.composition.claims import Claim
+from realizer.composition.playing import Playing, Wait
+from realizer.composition.references import references
+from realizer.composition.reporting import (
+    Event,
+    Phase,
+    State,
+    acknowledgement,
+    events,
+    prediction,
+    progress,
+    sync_progress,
+)
+from realizer.planning import plan
+from realizer.scheduling.timing import Schedule, Warning
+
+__all__ = ["Ensemble"]
+
+# Schedules of blocks that have ended, kept for references to their sync points.
+PAST = 100
+FOREVER = float("inf")
+
+
+class Ensemble:
+    """The blocks of one session, and the feedback they owe.
+
+    Args:
+        kinds: tag -> Kind.
+        characters: whose base states the blocks shift; shared with who made them.
+
+    Attributes:
+        revision: rises whenever what is shown changes.
+    """
+
+    def __init__(self, kinds: Mapping[str, Kind], characters: Sequence[Character]) -> None:
+        self.kinds = kinds
+        self.characters = characters
+        self.revision = 0
+        self._playing: list[Playing] = []
+        self._past: dict[str, Schedule] = {}
+        self._announced: dict[str, Block] = {}
+        # What was done to blocks that were announced, before they came.
+        self._revoked: set[str] = set()
+        self._activated: set[str] = set()
+        self._ahead: dict[str, list[Wait]] = {}
+        self._outbox: list[Feedback] = []
+        self._events: list[Event] = []
+        self._number = 0
+
+    def all(self) -> list[Playing]:
+        """Every block that can still be seen or heard, in order of acceptance."""
+        return self._playing
+
+    def of(self, character: int) -> list[Playing]:
+        return [p for p in self._playing if p.character == character]
+
+    def alive(self) -> list[Playing]:
+        """The blocks that play or wait, in order of acceptance."""
+        return [p for p in self._playing if not p.done]
+
+    # blocks in ----------------------------------------------------------------------------------
+
+    def announce(self, block: Block, character: int, now: float) -> None:
+        """Acknowledge a block, once."""
+        if block.id in self._announced or self._in_use(block):
+            return
+        self._announced[block.id] = block
+        start = max([now, *(w.until for w in self._waits(block, character))])
+        self.tell(acknowledgement(block, now if start == FOREVER else start))
+
+    def withdraw(self, block: Block, now: float) -> None:
+        """Give up a block that was announced."""
+        self._announced.pop(block.id, None)
+        if block.id in self._revoked:
+            self._revoked.discard(block.id)  # its end was told when that was done
+        else:
+            self.tell(progress(block, "end", now, State.REVOKED))
+
+    def submit(self, block: Block, character: int, world: World, now: float) -> Schedule:
+        """Plan a block and take it in, or refuse it."""
+        self.advance(now)
+        self.announce(block, character, now)
+        self._announced.pop(block.id, None)
+        if block.id in self._revoked:
+            self._revoked.discard(block.id)
+            return Schedule(block.id, {}, {}, start=now, failed=True)
+        if self._in_use(block):
+            text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
+            return self._refused(block, Warning(block.id, "PARSING_FAILURE", text), now)
+        waits = self._waits(block, character)
+        followers = self._followers(block)
+        if isinstance(followers, Warning):
+            return self._refused(block, followers, now)
+        if any(w.block is f or w.block.awaits(f) for w in waits for f, _ in followers):
+            text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
+            return self._refused(block, Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text), now)
+        ended = self._ended_by(block, character)
+        # While it is not known when it starts, it is planned as if that were now.
+        start = max([now, *(w.until for w in waits if w.until < FOREVER)])
+        planned = plan(
+            block,
+            self.kinds,
+            world,
+            start=start,
+            outside=lambda ref: self._outside(ref, start),
+            held=self._held(character, without=ended),
+        )
+        if planned.schedule.failed:
+            return self._refused(block, planned.schedule.warnings[0], now)
+        for earlier in ended:
+            self.stop(earlier, now)
+        preplan = block.preplan and block.id not in self._activated
+        self._activated.discard(block.id)
+        state = State.PENDING if preplan else State.LURKING
+        playing = Playing(planned, self.kinds, world, character, self._number, now, waits, state)
+        playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
+        self._number += 1
+        self._playing.append(playing)
+        self._set_out(playing)
+        for follower, wait in followers:
+            follower.waits.append(Wait(playing, wait))
+        for id_, wait in ((i, w) for ids, w in _before(block) for i in ids):
+            if id_ in self._announced:
+                self._ahead.setdefault(id_, []).append(Wait(playing, wait))
+        self._predict(playing, now)
+        for warning in planned.schedule.warnings:
+            self._warn(block, warning)
+        self._moved(playing, now)
+        return planned.schedule
+
+    def latest(self, schedule: Schedule) -> Schedule:
+        """What has become of a schedule that `submit` gave."""
+        playing = next((p for p in self._playing if p.first is schedule), None)
+        if playing is None or playing.start == FOREVER:
+            return schedule
+        more = tuple(w for w in playing.schedule.warnings if w not in schedule.warnings)
+        return replace(playing.schedule, warnings=schedule.warnings + more)
+
+    # time ---------------------------------------------------------------------------------------
+
+    def advance(self, now: float) -> None:
+        """Let everything happen that is due, in order, each thing at its own time."""
+        while self._events and self._events[0].time <= now:
+            event = heapq.heappop(self._events)
+            playing = next(p for p in self._playing if p.number == event.block)
+            self._happens(event, playing)
+
+    def due(self, now: float) -> list[Feedback]:
+        self.advance(now)
+        out, self._outbox = self._outbox, []
+        return out
+
+    def next_deadline(self) -> float | None:
+        if self._outbox:
+            return float("-inf")
+        return self._events[0].time if self._events else None
+
+    def forget(self, before: float) -> bool:
+        """Drop blocks that ended before a time; True where there were some."""
+        gone = [p for p in self._playing if p.done and p.end < before]
+        for playing in gone:
+            self._past[playing.block.id] = playing.schedule
+            self._playing.remove(playing)
+        while len(self._past) > PAST:
+            del self._past[next(iter(self._past))]
+        return bool(gone)
+
+    def _happens(self, event: Event, playing: Playing) -> None:
+        block, time = playing.block, event.time
+        match event.phase:
+            case Phase.START:
+                playing.state = State.IN_EXEC
+                self.tell(progress(block, "start", time, playing.state))
+                self.tell(prediction(block, playing.schedule, playing.state))
+                for id in block.on_start:
+                    if not self.activate(id, time):
+                        text = f"onStart: wanted a block that was preplanned and waits, got {id!r}"
+                        self._warn(block, Warning(block.id, "EXECUTION_FAILURE", text))
+            case Phase.SYNC:
+                self.tell(sync_progress(block, event.name, event.sync, time, playing.start))
+                if event.point == 0:
+                    node = block[event.name]
+                    if (act := self.kinds[node.tag].act) is not None:
+                        self._act(playing, event.name, act(node), time)
+            case Phase.SUBSIDES:
+                playing.state = State.SUBSIDING
+                self.tell(prediction(block, playing.schedule, playing.state))
+            case Phase.END:
+                playing.state = State.DONE
+                self.tell(progress(block, "end", time, playing.state))
+
+    def _act(self, playing: Playing, behaviour: str, act: Act, now: float) -> None:
+        try:
+            perform(self, playing, behaviour, act, now)
+        except ActFault as fault:
+            required = behaviour in playing.block.required
+            name = playing.block.id if required else f"{playing.block.id}:{behaviour}"
+            text = f"{behaviour}, which is required: {fault}" if required else str(fault)
+            place = playing.block.places.get(behaviour)
+            text = text if place is None else f"line {place.line}, {place.path}: {text}"
+            self._warn(playing.block, Warning(name, "EXECUTION_FAILURE", text))
+            if required and not playing.done:
+                self.stop(playing, now)
+
+    # what is done to blocks ---------------------------------------------------------------------
+
+    def find(self, id: str) -> Playing | None:
+        """The block of this id that plays or waits."""
+        return next((p for p in self.alive() if p.block.id == id), None)
+
+    def known(self, id: str) -> bool:
+        """Whether there is or was such a block."""
+        past = any(p.block.id == id for p in self._playing)
+        return past or id in self._past or id in self._announced
+
+    def revoke(self, id: str, now: float) -> bool:
+        """End a block that was announced and is not here yet; False where there is none."""
+        if id not in self._announced or id in self._revoked:
+            return False
+        self._revoked.add(id)
+        self.tell(progress(self._announced[id], "end", now, State.REVOKED))
+        return True
+
+    def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
+        """Stop these blocks, or all; returns the ids of those that played or waited."""
+        self.advance(now)
+        stopped = [p for p in self.alive() if ids is None or p.block.id in ids]
+        for playing in stopped:
+            if not playing.done:
+                self.stop(playing, now)
+        return [p.block.id for p in stopped]
+
+    def stop(self, playing: Playing, now: float) -> None:
+        """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
+        self._disarm(playing)
+        state = State.INTERRUPTED if playing.begun else State.REVOKED
+        self._withdraw_shifts(playing, playing.shifts.keys(), now)
+        playing.cut(list(playing.schedule.times), now, ends=True)
+        playing.stopped, playing.state = now, state
+        self.tell(progress(playing.block, "end", now, state))
+        self.changed()
+        self._moved(playing, now)
+
+    def cut(self, playing: Playing, behaviours: Collection[str], now: float) -> None:
+        """End some behaviours of a block; the block ends with the last of the others."""
+        pending = {(e.name, e.sync) for e in self._disarm(playing)}
+        self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
+        playing.cut(behaviours, now)
+        self._arm(playing, pending)
+        self.changed()
+        self._predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
+        self._moved(playing, now)
+
+    def activate(self, id: str, now: float) -> bool:
+        """Let a preplanned block start, when what it waits for is over; False where it is none."""
+        playing = self.find(id)
+        if playing is None:
+            waits = id in self._announced and self._announced[id].preplan
+            if waits:
+                self._activated.add(id)
+            return waits
+        if playing.state is not State.PENDING:
+            return False
+        playing.state, playing.floor = State.LURKING, now
+        self._move(playing, now)
+        return True
+
+    # starts -------------------------------------------------------------------------------------
+
+    def _waits(self, block: Block, character: int) -> list[Wait]:
+        """What a block waits for: BML 1.0's APPEND, all of its character that is known now; BMLA's lists."""
+        alive = self.alive()
+        waits = [
+            Wait(p)
+            for p in alive
+            if p.block.id in block.append_after
+            or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
+        ]
+        waits += [Wait(p, subsiding=True) for p in alive if p.block.id in block.chunk_after]
+        return waits + [w for w in self._ahead.get(block.id, ()) if not w.block.done]
+
+    def _followers(self, block: Block) -> list[tuple[Playing, bool]] | Warning:
+        """The blocks that are to wait for this one, and whether only for its subsiding."""
+        found: list[tuple[Playing, bool]] = []
+        for ids, subsiding in _before(block):
+            for id in ids:
+                playing = self.find(id)
+                if playing is not None and playing.waiting:
+                    found.append((playing, subsiding))
+                elif playing is not None or id not in self._announced:
+                    text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {id!r}"
+                    return Warning(block.id, "TargetBlockAlreadyStartedException", text)
+        return found
+
+    def _ended_by(self, block: Block, character: int) -> list[Playing]:
+        """The blocks that this one ends when it is taken in."""
+        replaced = block.composition == "REPLACE"
+        return [
+            p
+            for p in self.alive()
+            if p.block.id in block.interrupt or (replaced and p.character == character)
+        ]
+
+    def _held(self, character: int, without: Iterable[Playing] = ()) -> list[Claim]:
+        gone = {id(p) for p in without}
+        return [
+            claim
+            for p in self.alive()
+            if p.character == character and p.start < FOREVER and id(p) not in gone
+            for claim in p.plan.claims
+        ]
+
+    def _moved(self, playing: Playing, now: float) -> None:
+        """A block's times have changed: those that wait for it may start at another time."""
+        for other in self.alive():
+            if other.waiting and any(wait.block is playing for wait in other.waits):
+                self._move(other, now)
+
+    def _move(self, playing: Playing, now: float) -> None:
+        """Let a waiting block start when it now may."""
+        start = playing.earliest
+        if start == playing.start:
+            return
+        self._disarm(playing)
+        self._withdraw_shifts(playing, playing.shifts.keys(), now)
+        planned = playing.plan
+        if start < FOREVER and (playing.start == FOREVER or _refers_outside(playing.block)):
+            # Its claims were never compared, or its references have other times from the new start.
+            planned = plan(
+                playing.block,
+                self.kinds,
+                playing.world,
+                start=start,
+                outside=lambda ref: self._outside(ref, start),
+                held=self._held(playing.character, without=[playing]),
+            )
+            if planned.schedule.failed:
+                self._warn(playing.block, planned.schedule.warnings[0])
+                self.stop(playing, now)
+                return
+            told = {w.id for w in playing.schedule.warnings}
+            for warning in planned.schedule.warnings:
+                if warning.id not in told:
+                    self._warn(playing.block, warning)
+        playing.lay(planned, start)
+        self._set_out(playing)
+        self._predict(playing, now)
+        self._moved(playing, now)
+
+    def _outside(self, ref: SyncRef, start: float) -> float | None:
+        """Seconds from `start` of a sync point of another block; None where it is not known."""
+        schedule = next((p.schedule for p in reversed(self._playing) if p.block.id == ref.block), None)
+        schedule = schedule or self._past.get(ref.block or "")
+        if schedule is None or schedule.start == FOREVER:
+            return None
+        if ref.behaviour == "bml":
+            time = {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
+        else:
+            sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
+            try:
+                time = schedule.at(ref.behaviour or "", sync or "")
+            except KeyError:
+                time = None
+        return None if time is None else schedule.start + time + ref.offset - start
+
+    # events and feedback ------------------------------------------------------------------------
+
+    def tell(self, feedback: Feedback) -> None:
+        self._outbox.append(feedback)
+
+    def changed(self) -> None:
+        """What is or will be shown is not what it was."""
+        self.revision += 1
+
+    def _set_out(self, playing: Playing) -> None:
+        """A block has a new start: it shifts base states then, and its events are due."""
+        self.characters[playing.character].shift(playing.shifts.values())
+        if playing.start < FOREVER:
+            self._arm(playing, None)
+            self.changed()
+
+    def _arm(self, playing: Playing, only: Collection[tuple[str, str]] | None) -> None:
+        """Put what is still to be told of a block on the calendar; of sync points all, or `only` these."""
+        number = playing.number
+        due = events(playing.block, playing.schedule, number)
+        due = [e for e in due if only is None or (e.name, e.sync) in only]
+        if playing.waiting:
+            due.append(Event(playing.start, number, Phase.START))
+        if playing.state is not State.SUBSIDING and playing.subsides < playing.end:
+            due.append(Event(playing.subsides, number, Phase.SUBSIDES))
+        due.append(Event(playing.end, number, Phase.END))
+        self._events += due
+        heapq.heapify(self._events)
+
+    def _disarm(self, playing: Playing) -> list[Event]:
+        """Take what is still to be told of a block off the calendar."""
+        gone = [e for e in self._events if e.block == playing.number]
+        self._events = [e for e in self._events if e.block != playing.number]
+        heapq.heapify(self._events)
+        return gone
+
+    def _withdraw_shifts(self, playing: Playing, behaviours: Iterable[str], now: float) -> None:
+        gone = [playing.shifts[b] for b in behaviours]
+        self.characters[playing.character].cancel(gone, now)
+
+    def _predict(self, playing: Playing, now: float, behaviours: Iterable[str] | None = None) -> None:
+        schedule = playing.schedule
+        if schedule.start == FOREVER:
+            schedule = replace(schedule, start=now)  # as if it were activated now
+        syncs = schedule.behaviours
+        told = syncs if behaviours is None else {b: syncs[b] for b in behaviours}
+        self.tell(prediction(playing.block, schedule, playing.state, told))
+
+    def _in_use(self, block: Block) -> bool:
+        """Its id belongs to a block that plays or waits, and it is not there to replace that."""
+        return block.composition != "REPLACE" and self.find(block.id) is not None
+
+    def _warn(self, block: Block, warning: Warning) -> None:
+        self.tell(
+            WarningFeedback(
+                id=warning.id, type=warning.type, text=warning.text, character_id=block.character_id
+            )
+        )
+
+    def _refused(self, block: Block, warning: Warning, now: float) -> Schedule:
+        self._warn(block, warning)
+        return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
+
+
+def _before(block: Block) -> tuple[tuple[tuple[str, ...], bool], ...]:
+    """The blocks that are to follow this one: when it is done, and when it subsides."""
+    return (block.prepend_before, False), (block.chunk_before, True)
+
+
+def _refers_outside(block: Block) -> bool:
+    return any(ref.block is not None for ref in references(block))

@@ -1,0 +1,217 @@
+"""One accepted block: its plan laid on the session clock, and what is done to it while it waits or plays."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bml_schema import Block
+from realizer.animation.channel import Channel, Gain, Layer
+from realizer.arrays import Float64
+from realizer.behaviours.kind import Kind, World
+from realizer.composition.character import RELAX, Shift
+from realizer.composition.reporting import State
+from realizer.planning import Plan
+from realizer.scheduling.timing import Schedule
+from realizer.speech.utterance import Utterance
+
+__all__ = ["Playing", "Speaking", "Wait"]
+
+# Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
+HUSH = 0.12  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Speaking:
+    """An utterance that sounds from `start` on, cut off (with a short fade) at `until` if that is sooner."""
+
+    start: float
+    until: float
+    utterance: Utterance
+    character: int
+    gains: tuple[Gain, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Wait:
+    """A block does not start before another one has ended, or subsides."""
+
+    block: Playing
+    subsiding: bool = False
+
+    @property
+    def until(self) -> float:
+        return self.block.subsides if self.subsiding else self.block.end
+
+
+@dataclass(eq=False)
+class Playing:
+    """A block that was accepted, until it has ended and its last frames are past.
+
+    Attributes:
+        plan: its schedule has the start; inf while that is not known (it was not activated).
+        world: what it was planned with.
+        character: whose face it moves.
+        number: order of acceptance.
+        floor: it does not start sooner, seconds on the session clock.
+        waits: nor before these.
+        stopped: when it was cut off.
+        first: its schedule as it was when the block was accepted.
+        channels, shifts, speech: by behaviour, on the session clock; empty while the start is not known.
+    """
+
+    plan: Plan
+    kinds: Mapping[str, Kind]
+    world: World
+    character: int
+    number: int
+    floor: float
+    waits: list[Wait] = field(default_factory=list)
+    state: State = State.LURKING
+    stopped: float | None = None
+    channels: dict[str, tuple[Channel, ...]] = field(default_factory=dict)
+    shifts: dict[str, Shift] = field(default_factory=dict)
+    speech: dict[str, Speaking] = field(default_factory=dict)
+    first: Schedule = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.first = self.plan.schedule
+
+    @property
+    def block(self) -> Block:
+        return self.plan.block
+
+    @property
+    def schedule(self) -> Schedule:
+        return self.plan.schedule
+
+    @property
+    def begun(self) -> bool:
+        return self.state in (State.IN_EXEC, State.SUBSIDING)
+
+    @property
+    def done(self) -> bool:
+        return self.state in (State.DONE, State.INTERRUPTED, State.REVOKED)
+
+    @property
+    def waiting(self) -> bool:
+        """It was not started yet."""
+        return self.state in (State.PENDING, State.LURKING)
+
+    @property
+    def start(self) -> float:
+        """When it starts or did, seconds on the session clock; inf while that is not known."""
+        return self.schedule.start
+
+    @property
+    def end(self) -> float:
+        """When its end is due."""
+        return self.schedule.end if self.stopped is None else self.stopped
+
+    @property
+    def gone(self) -> float:
+        """When nothing of it is to be seen any more."""
+        return self.end + (RELAX if self.state is State.INTERRUPTED else 0.0)
+
+    @property
+    def subsides(self) -> float:
+        """When every behaviour is past its relax, or its end where it has no relax."""
+        if self.stopped is not None:
+            return self.stopped
+        last = 0.0
+        for points, times in zip(self.schedule.points.values(), self.schedule.times.values(), strict=True):
+            last = max(last, float(times[points.index("relax") if "relax" in points else -1]))
+        return self.start + last
+
+    @property
+    def earliest(self) -> float:
+        """When it may start: inf while it is not activated, or waits for one that is not."""
+        if self.state is State.PENDING:
+            return float("inf")
+        return max([self.floor, *(wait.until for wait in self.waits)])
+
+    def awaits(self, other: Playing) -> bool:
+        """Whether it cannot start before another one, by any chain of waits."""
+        return any(wait.block is other or wait.block.awaits(other) for wait in self.waits)
+
+    def lay(self, plan: Plan, start: float) -> None:
+        """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
+        late = start - plan.schedule.start
+        claims = tuple(replace(c, begin=c.begin + late, end=c.end + late) for c in plan.claims)
+        self.plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=claims)
+        self.channels, self.shifts, self.speech = {}, {}, {}
+        if start == float("inf"):
+            return
+        nodes = {node.id: node for node in self.block.behaviours}
+        for behaviour, times in self.schedule.times.items():
+            node = nodes[behaviour]
+            kind = self.kinds[node.tag]
+            name = f"{self.block.id}:{behaviour}"
+            own = tuple(replace(c.shifted(start), source=name) for c in plan.channels.get(behaviour, ()))
+            begin, end = start + float(times[0]), start + float(times[-1])
+            if kind.region is not None:
+                self.shifts[behaviour] = Shift.of(begin, end, kind.region, own)
+            elif own:
+                self.channels[behaviour] = own
+            sound = kind.sound(node, self.world)
+            if sound is not None:
+                whole = end - begin >= sound.duration - 1e-6
+                self.speech[behaviour] = Speaking(
+                    begin, float("inf") if whole else end, sound, self.character
+                )
+
+    def unfinished(self, now: float) -> set[str]:
+        """The behaviours whose end has not passed."""
+        return {b for b, times in self.schedule.times.items() if self.start + float(times[-1]) > now}
+
+    def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
+        """End behaviours at `now`: what is shown relaxes without a jump, what has not begun never comes.
+
+        Of their sync points those that have passed stay; relax comes at once and the end when the face has
+        relaxed (at once with `ends`, where the whole block is cut off).
+        """
+        points, times = dict(self.schedule.points), dict(self.schedule.times)
+        for behaviour in behaviours:
+            names, at = points[behaviour], times[behaviour]
+            local = now - self.start
+            if local <= at[0]:
+                for table in (points, times, self.channels, self.speech):
+                    table.pop(behaviour, None)
+            elif local < at[-1]:
+                points[behaviour], times[behaviour] = self._cut_times(behaviour, names, at, local, ends)
+                self.channels[behaviour] = tuple(
+                    c.faded(now, now + (HUSH if c.layer is Layer.SPEECH else RELAX))
+                    for c in self.channels.get(behaviour, ())
+                )
+                if behaviour in self.speech:
+                    heard = self.speech[behaviour]
+                    self.speech[behaviour] = replace(heard, until=min(heard.until, now))
+        claims = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
+        schedule = replace(self.schedule, points=points, times=times)
+        self.plan = replace(self.plan, schedule=schedule, claims=claims)
+
+    def _cut_times(
+        self, behaviour: str, names: tuple[str, ...], at: Float64, local: float, ends: bool
+    ) -> tuple[tuple[str, ...], Float64]:
+        kept = {name: float(time) for name, time in zip(names, at, strict=True) if time <= local}
+        if "relax" in names:
+            kept.setdefault("relax", local)
+        relax = 0.0 if ends else HUSH if behaviour in self.speech else RELAX
+        kept["end"] = min(local + relax, float(at[-1]))
+        return tuple(kept), np.array(list(kept.values()))
+
+    def scale(self, behaviour: str, gains: Collection[Gain], *, sound: bool) -> None:
+        """Let the sound of a behaviour, or all that it shows, become stronger or weaker."""
+        if sound and behaviour in self.speech:
+            heard = self.speech[behaviour]
+            self.speech[behaviour] = replace(heard, gains=(*heard.gains, *gains))
+        elif not sound:
+            own = self.channels.get(behaviour, ())
+            self.channels[behaviour] = tuple(replace(c, gains=(*c.gains, *gains)) for c in own)
+
+    def moving(self) -> Iterator[Channel]:
+        """Its channels that are not base states."""
+        for own in self.channels.values():
+            yield from own

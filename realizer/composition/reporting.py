@@ -1,0 +1,122 @@
+"""A planned block in; the BML feedback that tells of it out, each with the time it is due."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
+
+from bml_schema import (
+    Block,
+    BlockPrediction,
+    BlockProgress,
+    PredictionFeedback,
+    SyncPointProgress,
+    predicted,
+)
+from realizer.scheduling.timing import Schedule
+
+__all__ = ["Event", "Phase", "State", "acknowledgement", "prediction", "progress", "sync_progress"]
+
+
+class State(StrEnum):
+    """What becomes of a block, in the words of BMLA."""
+
+    IN_PREP = "IN_PREP"  # being planned
+    PENDING = "PENDING"  # planned, and waits to be activated
+    LURKING = "LURKING"  # planned, and waits for its start
+    IN_EXEC = "IN_EXEC"
+    SUBSIDING = "SUBSIDING"  # every behaviour is past its relax, some are not past their end
+    DONE = "DONE"
+    INTERRUPTED = "INTERRUPTED"
+    REVOKED = "REVOKED"  # ended before it started
+
+
+class Phase(IntEnum):
+    """What an event is, in the order of report at one instant."""
+
+    START = 0
+    SYNC = 1
+    SUBSIDES = 2
+    END = 3
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Event:
+    """Something that is due at a time; the order of the fields is the order of report.
+
+    At one instant earlier blocks report before later ones, so that what an APPEND waited for, or a REPLACE
+    ended, has ended before it starts; within a block start, sync points by behaviour, end.
+
+    Attributes:
+        time: seconds on the session clock.
+        block: number of the block, in order of acceptance.
+        behaviour, point: places of a sync point in the block and in its behaviour.
+        name, sync: what it is called: behaviour id and sync point.
+    """
+
+    time: float
+    block: int
+    phase: Phase
+    behaviour: int = 0
+    point: int = 0
+    name: str = field(default="", compare=False)
+    sync: str = field(default="", compare=False)
+
+
+def acknowledgement(block: Block, start: float) -> PredictionFeedback:
+    """Planning has begun."""
+    prediction = BlockPrediction(id=block.id, global_start=start, status=State.IN_PREP)
+    return PredictionFeedback(character_id=block.character_id, blocks=(prediction,))
+
+
+def prediction(
+    block: Block,
+    schedule: Schedule,
+    state: State,
+    behaviours: Mapping[str, Mapping[str, float]] | None = None,
+) -> PredictionFeedback:
+    """When a block starts and ends, and the sync points of behaviours where they are to be told."""
+    nodes = {node.id: node for node in block.behaviours}
+    times = BlockPrediction(
+        id=block.id, global_start=schedule.start, global_end=schedule.end, status=state.value
+    )
+    return PredictionFeedback(
+        character_id=block.character_id,
+        blocks=(times,),
+        behaviours=tuple(predicted(nodes[id], block.id, syncs) for id, syncs in (behaviours or {}).items()),
+    )
+
+
+def progress(block: Block, point: str, time: float, state: State) -> BlockProgress:
+    """The block started or ended at `time` on the session clock."""
+    return BlockProgress(
+        id=f"{block.id}:{point}", global_time=time, character_id=block.character_id, status=state.value
+    )
+
+
+def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: float) -> SyncPointProgress:
+    """A sync point passed at `time` on the session clock; the block started at `start`."""
+    return SyncPointProgress(
+        id=f"{block.id}:{behaviour}:{sync}",
+        time=time - start,
+        global_time=time,
+        character_id=block.character_id,
+    )
+
+
+def events(block: Block, schedule: Schedule, number: int, of: Iterable[str] | None = None) -> list[Event]:
+    """Every sync point of a block, or of some of its behaviours, when it is due.
+
+    Args:
+        number: order of acceptance, for blocks that report at one instant.
+    """
+    wanted = schedule.times.keys() if of is None else set(of)
+    return [
+        Event(schedule.start + float(time), number, Phase.SYNC, order, index, node.id, sync)
+        for order, node in enumerate(block.behaviours)
+        if node.id in wanted and node.id in schedule.times
+        for index, (sync, time) in enumerate(
+            zip(schedule.points[node.id], schedule.times[node.id], strict=True)
+        )
+    ]

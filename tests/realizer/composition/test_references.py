@@ -1,0 +1,16 @@
+"""Every sync reference of a block is found, wherever it stands."""
+
+from __future__ import annotations
+
+from bml_schema import parse
+from realizer.composition.references import references
+
+
+def test_references_of_attributes_texts_and_constraints_are_found() -> None:
+    block = parse(
+        """<bml id="b"><head id="h" lexeme="NOD" start="1" stroke="x:y:end"/>
+        <speech id="s"><text>a <sync id="m" ref="2"/> b</text></speech>
+        <required><constraint><before ref="h:end"><sync ref="3"/></before>
+        <synchronize><sync ref="4"/><sync ref="s:start"/></synchronize></constraint></required></bml>"""
+    )
+    assert sorted(map(str, references(block))) == ["1", "2", "3", "4", "h:end", "s:start", "x:y:end"]
