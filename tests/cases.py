@@ -14,7 +14,8 @@ Keys of a .toml; all but `says` and `proves` are optional:
     warnings   [[id, type], ...]: exactly these, in any order
     contains, path, line
                found in the text of one of the warnings
-    [reads]    "behaviour.attribute" or "block.attribute" = the value it was read as; "behaviour" = its element
+    [reads]    "behaviour" = its element; "behaviour.attribute", "block.attribute", "behaviour.poses.0.part" = the
+               value it was read as
     dropped    behaviours that are not scheduled
 
     [at]       "behaviour:sync" = seconds from block start; "block:behaviour:sync" likewise for another block
@@ -248,9 +249,15 @@ class Case:
         items = list(read(self.document if document is None else document, VOCABULARY))
         sent = list(wanted.get("sent", ()))
         times = [float(sent[n]) if n < len(sent) else max([0.0, *sent]) for n in range(len(items))]
-        script: list[tuple[float, int, Any]] = [(time, 0, item) for time, item in zip(times, items, strict=True)]
+        script: list[tuple[float, int, Any]] = [
+            (time, 0, item) for time, item in zip(times, items, strict=True)
+        ]
         script += [(i.time, 1, i) for i in (self.instants if instants is None else instants)]
-        scene = {name: tuple(map(float, place)) for name, place in wanted["scene"].items()} if "scene" in wanted else None
+        scene = (
+            {name: tuple(map(float, place)) for name, place in wanted["scene"].items()}
+            if "scene" in wanted
+            else None
+        )
         player = Player(scene=scene, idle=False)
         played = Played()
         voice = SilentVoice()
@@ -273,7 +280,9 @@ class Case:
 
         def collect(now: float) -> None:
             for feedback in player.due(now):
-                played.feedback.append(parse_feedback(feedback.to_xml(len(played.feedback) + 1, EPOCH), VOCABULARY))
+                played.feedback.append(
+                    parse_feedback(feedback.to_xml(len(played.feedback) + 1, EPOCH), VOCABULARY)
+                )
             for speaking in player.speech():
                 played.speaking[name_of(speaking)] = speaking
 

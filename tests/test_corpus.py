@@ -98,18 +98,21 @@ def check_faces(case: Case, played: Played) -> None:
 
 
 def check_reading(case: Case, played: Played) -> None:
-    for name, value in case.wanted.get("reads", {}).items():
-        owner, _, attribute = name.rpartition(".")
+    for path, value in case.wanted.get("reads", {}).items():
+        owner, *steps = path.split(".")
         found = [b for b in played.blocks if b.id == owner]
-        found += [node for block in played.blocks for node in block.behaviours if node.id == (owner or name)]
-        assert found, f"{name}: no such block or behaviour"
-        if not owner:
-            assert found[0].tag.rpartition("}")[2] == value
-            continue
-        known = shape_of(type(found[0])).attributes
-        spec = known.get(attribute) or next(a for a in known.values() if a.field == attribute)
-        got = getattr(found[0], spec.field)
-        assert (list(got) if isinstance(got, tuple) else got) == value, name
+        found += [node for block in played.blocks for node in block.behaviours if node.id == owner]
+        assert found, f"{path}: no such block or behaviour"
+        got = found[0] if steps else found[0].tag.rpartition("}")[2]
+        for step in steps:
+            got = got[int(step)] if step.isdigit() else getattr(got, field_of(got, step))
+        assert (list(got) if isinstance(got, tuple) else got) == value, path
+
+
+def field_of(node: object, name: str) -> str:
+    """The field that an attribute goes to; children and all else are named as they are."""
+    spec = shape_of(type(node)).attributes.get(name)
+    return spec.field if spec else name
 
 
 def check_meaning(case: Case, played: Played) -> None:
