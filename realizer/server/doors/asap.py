@@ -39,9 +39,9 @@ _LONG_TAG = re.compile(rf"<[^<>]{{{LONGEST_TAG},}}")
 class AsapDoor:
     """Listens on `settings.host` and the first of `settings.asap_ports`, `port` once it has started.
 
-    Each BML connection has a session and a call-back of its own, so that clients on several hosts play side
-    by side. Two on one host cannot both listen on the feedback port: the later one is called back as soon as
-    it does listen.
+    Asap serves one client at a time. Here each address has a session of its own, named `asap-ADDRESS`, which
+    viewers can join; so clients on several hosts play side by side. Two on one host share a session, and each
+    connection has its own call-back: the later one is called back once the port is its to listen on.
     """
 
     def __init__(self, shell: Shell, settings: Settings) -> None:
@@ -56,7 +56,8 @@ class AsapDoor:
     @property
     def lines(self) -> tuple[str, ...]:
         host = f"[{self._host}]" if ":" in self._host else self._host
-        return (f"asap: BML at {host}:{self.port}, feedback to port {self._feedback_port} of each client",)
+        back = f"feedback to port {self._feedback_port} of the client"
+        return (f"asap: BML at {host}:{self.port}, {back}, session asap-ADDRESS",)
 
     async def start(self) -> None:
         self._server = await asyncio.start_server(self._serve, self._host, self.port)
@@ -83,7 +84,7 @@ class AsapDoor:
         host = writer.get_extra_info("peername")[0]
         link = CallBack(host, self._feedback_port, writer.transport.abort)
         try:
-            number = self._shell.join(link)
+            number = self._shell.join(link, "asap-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host)[:59])
         except HubError as error:
             log.warning("asap: %s is not let in: %s", host, error)
             writer.transport.abort()
