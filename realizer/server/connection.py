@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from bml_schema import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.server.streams import Sound, Timeline
 
 __all__: list[str] = []
 
+ELEMENTS: Mapping[type[Feedback], str] = {
+    BlockProgress: "blockProgress",
+    SyncPointProgress: "syncPointProgress",
+    PredictionFeedback: "predictionFeedback",
+    WarningFeedback: "warningFeedback",
+}
 # Bytes that wait to be sent above which a connection loses frames: two thirds of a second of a mesh.
 SLOW = 512 * 1024
 # And above which it has stopped reading: it is closed, and can come back with `seen`.
@@ -70,12 +78,32 @@ class PictureSubscription:
 Subscription = FrameSubscription | SoundSubscription | PictureSubscription
 
 
+@dataclass(frozen=True)
+class FeedbackFilter:
+    """Which feedback a connection gets; the numbers of what it does not get are missing in what it gets.
+
+    Attributes:
+        elements: names of feedback elements; None takes all.
+        character: of whom; None takes all. What is of no character comes always.
+    """
+
+    elements: frozenset[str] | None = None
+    character: str | None = None
+
+    def takes(self, feedback: Feedback) -> bool:
+        """Whether it is to be sent."""
+        if self.elements is not None and ELEMENTS[type(feedback)] not in self.elements:
+            return False
+        return self.character is None or feedback.character_id in (None, self.character)
+
+
 @dataclass(eq=False)
 class Connection:
     """One client of a session.
 
     Attributes:
         place: seq of the next feedback to send.
+        feedback: which of it; None for none.
         backlog: bytes that wait to be sent, as the shell told.
         dropped: frames, pictures and sound packets it did not get because it was slow.
         subscriptions: (stream, character) -> what it gets.
@@ -83,7 +111,7 @@ class Connection:
 
     id: int
     place: int
-    feedback: bool = True
+    feedback: FeedbackFilter | None = FeedbackFilter()
     backlog: int = 0
     dropped: int = 0
     subscriptions: dict[tuple[str, str | None], Subscription] = field(default_factory=dict)

@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.animation.targets import AU_NAMES
 from realizer.errors import FaceError
-from realizer.server.connection import Connection, FrameSubscription, SoundSubscription, Subscription
+from realizer.server.connection import (
+    Connection,
+    FeedbackFilter,
+    FrameSubscription,
+    SoundSubscription,
+    Subscription,
+)
 from realizer.server.messages import (
     PROTOCOL,
     STREAMS,
@@ -50,7 +56,7 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
                 _subscribe(session, connection, message, t)
             case Unsubscribe():
                 if message.stream == "feedback":
-                    connection.feedback = False
+                    connection.feedback = None
                 connection.subscriptions.pop((message.stream, message.character), None)
             case SceneMessage():
                 session.player.set_scene(
@@ -94,15 +100,18 @@ def _hello(session: Session, connection: Connection, message: Hello, t: float) -
 def _subscribe(session: Session, connection: Connection, message: Subscribe, t: float) -> None:
     stream = message.stream
     encoding = message.encoding or STREAMS[stream][0]
+    told: dict[str, Any]
     if encoding not in STREAMS[stream]:
         raise Wrong("encoding", f"wanted {' or '.join(STREAMS[stream])} for {stream}, got {encoding}")
     if stream == "feedback":
-        connection.feedback = True
-        session.reply(connection.id, Subscribed(stream=stream, encoding=encoding))
+        elements = None if message.elements is None else frozenset(message.elements)
+        connection.feedback = FeedbackFilter(elements, message.character)
+        told = {"character": message.character, "elements": message.elements}
+        session.reply(connection.id, Subscribed(stream=stream, encoding=encoding, **told))
         return
     index = index_of(session, message.character)
     fps = message.fps or session.settings.fps
-    told: dict[str, Any] = {"stream": stream, "encoding": encoding, "index": index}
+    told = {"stream": stream, "encoding": encoding, "index": index}
     old = connection.subscriptions.get((stream, message.character))
     subscription: Subscription
     if stream == "audio":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from itertools import islice
 
 from bml_schema import Feedback
 
@@ -23,7 +24,7 @@ class FeedbackLog:
     def __init__(self, keep: int, epoch: float | None = None) -> None:
         self.newest = 0
         self._epoch = epoch
-        self._kept: deque[str] = deque(maxlen=keep)
+        self._kept: deque[tuple[Feedback, str]] = deque(maxlen=keep)
 
     @property
     def first(self) -> int:
@@ -33,9 +34,9 @@ class FeedbackLog:
     def add(self, feedback: Feedback) -> None:
         """Number a message and keep it."""
         self.newest += 1
-        self._kept.append(feedback.to_xml(self.newest, self._epoch))
+        self._kept.append((feedback, feedback.to_xml(self.newest, self._epoch)))
 
-    def since(self, seq: int) -> list[str]:
-        """The kept messages from `seq` on, in order."""
+    def since(self, seq: int) -> list[tuple[Feedback, str]]:
+        """The kept messages from `seq` on, in order, each with its text."""
         skipped = max(0, seq - self.first)
-        return [text for n, text in enumerate(self._kept) if n >= skipped]
+        return list(islice(self._kept, skipped, None))

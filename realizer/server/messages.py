@@ -35,6 +35,7 @@ PROTOCOL = 1
 MAX_CONTROL = 256 * 1024  # bytes
 
 Stream = Literal["feedback", "fap", "au", "mesh", "audio", "video"]
+FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
 # stream -> the encodings it has, the default first.
 STREAMS: dict[str, tuple[str, ...]] = {
     "feedback": ("text",),
@@ -63,7 +64,10 @@ class Hello(Message):
 
 
 class Subscribe(Message):
-    """Asks for a stream; answered by `subscribed`. The same stream of the same character is replaced."""
+    """Asks for a stream; answered by `subscribed`. The same stream of the same character is replaced.
+
+    Every connection gets all feedback until it asks for some of it.
+    """
 
     type: Literal["subscribe"]
     stream: Stream
@@ -73,6 +77,7 @@ class Subscribe(Message):
     size: tuple[int, int] = Field((512, 512), description="video: width, height in pixels")
     camera: str = Field("front", max_length=64, description="video")
     quality: int = Field(85, ge=1, le=100, description="video: of the JPEG")
+    elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
     rate: int = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
 
 
@@ -218,6 +223,7 @@ class Subscribed(Reply):
     rate: int | None = Field(None, description="audio: samples a second")
     size: list[int] | None = None
     media_type: str | None = None
+    elements: list[str] | None = Field(None, description="feedback: which of it comes")
 
 
 class StateMessage(Reply):

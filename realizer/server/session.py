@@ -87,7 +87,12 @@ class Session:
         self.ending = False  # the service ends: no new documents
         self.empty_since: float | None = now
         self.player = Player(
-            kinds=KINDS, scene=scene, seed=settings.seed, idle=settings.idle, language=settings.language
+            kinds=KINDS,
+            scene=scene,
+            seed=settings.seed,
+            idle=settings.idle,
+            language=settings.language,
+            media=settings.media,
         )
         self.load_face = load_face or _load_face
         self.capabilities = dict(capabilities or {})
@@ -345,8 +350,10 @@ class Session:
                 self._catch_up(connection)
 
     def _catch_up(self, connection: Connection) -> None:
-        if connection.feedback:
-            self._effects += [Send(connection.id, text) for text in self.log.since(connection.place)]
+        if connection.feedback is not None:
+            wanted = connection.feedback
+            told = self.log.since(connection.place)
+            self._effects += [Send(connection.id, text) for feedback, text in told if wanted.takes(feedback)]
         connection.place = self.log.newest + 1
 
     def resume(self, connection: int, seen: int) -> None:

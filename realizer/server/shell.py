@@ -6,6 +6,7 @@ import asyncio
 import functools
 import itertools
 import logging
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -136,7 +137,13 @@ class Shell:
 
     def _make(self, id: str, now: float, named: bool) -> Session:
         session = Session(
-            id, self.settings, now, named=named, scene=self._scene, capabilities=self._capabilities
+            id,
+            self.settings,
+            now,
+            named=named,
+            scene=self._scene,
+            capabilities=self._capabilities,
+            epoch=time.time(),
         )
         session.ending = self._ending
         return session

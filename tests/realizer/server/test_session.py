@@ -612,3 +612,71 @@ def test_in_any_order_of_events_frames_rise_and_feedback_is_whole(actions) -> No
         for id in progress:
             running = running + 1 if id.endswith("start") else max(0, running - 1)
             assert running <= 1
+
+
+def test_a_feedback_stream_can_be_narrowed_to_some_elements(driver) -> None:
+    viewer = driver.join(2)
+    asked = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
+    assert driver.send(asked, 2).of("subscribed")[0]["elements"] == ["blockProgress"]
+    driver.send(NOD.format("b"))
+    driver.run(5)
+    assert viewer.ids == ["b:start", "b:end"]
+    assert len(driver.clients[1].ids) > 2
+    numbers = [f.seq for f in viewer.feedback]
+    assert numbers == sorted(numbers)
+    assert numbers != list(range(1, len(numbers) + 1)), "what was left out keeps its number"
+
+
+def test_a_feedback_stream_can_be_narrowed_to_a_character(driver) -> None:
+    viewer = driver.join(2)
+    driver.send({"type": "subscribe", "stream": "feedback", "character": "Ann"}, 2)
+    driver.send('<bml id="a" characterId="Ann"/>')
+    driver.send('<bml id="b" characterId="Bob"/>')
+    driver.send("<bml/>")
+    driver.run(1)
+    assert {f.character_id for f in viewer.feedback} == {"Ann", None}
+    assert not any("b:" in id for id in viewer.ids)
+
+
+def test_all_feedback_comes_back_when_no_element_is_named(driver) -> None:
+    driver.send({"type": "subscribe", "stream": "feedback", "elements": ["warningFeedback"]})
+    driver.send({"type": "subscribe", "stream": "feedback"})
+    driver.send(NOD.format("b"))
+    driver.run(5)
+    assert "b:end" in driver.clients[1].ids
+
+
+def test_an_unknown_feedback_element_is_an_error(driver) -> None:
+    told = driver.send({"type": "subscribe", "stream": "feedback", "elements": ["blockprogress"]})
+    assert told.of("error")[0]["code"] == "invalid"
+
+
+BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+
+
+def test_a_block_that_is_to_follow_waits_for_the_one_before_it_in_preparation() -> None:
+    driver = Driver(mute=True)
+    driver.send(TALK.format("a"))
+    driver.send(f'<bml id="b" {BMLA} bmla:appendAfter="a"/>')
+    assert not any(id.endswith(":start") for id in driver.run(1).ids)
+    driver.say(driver.spoken[0].id, spoken(2.0))
+    times = {f.id: f.global_time for f in driver.run(9).feedback if isinstance(f, BlockProgress)}
+    assert times["b:start"] == times["a:end"] == pytest.approx(3.0)
+
+
+def test_a_block_in_preparation_waits_for_one_that_is_to_come_before_it() -> None:
+    driver = Driver(mute=True)
+    driver.send(TALK.format("a"))
+    driver.send(f'<bml id="b" {BMLA} bmla:prependBefore="a"><wait id="w" duration="1"/></bml>')
+    driver.say(driver.spoken[0].id, spoken(2.0))
+    times = {f.id: f.global_time for f in driver.run(9).feedback if isinstance(f, BlockProgress)}
+    assert times["a:start"] == times["b:end"] == pytest.approx(1.0)
+
+
+def test_a_block_in_preparation_can_be_interrupted() -> None:
+    driver = Driver(mute=True)
+    driver.send(TALK.format("a"))
+    driver.send(f'<bml id="b" {BMLA}><bmla:interrupt id="i" target="a"/></bml>')
+    driver.say(driver.spoken[0].id, spoken(2.0))
+    told = [f for f in driver.run(9).feedback if isinstance(f, BlockProgress) and f.id.startswith("a:")]
+    assert [(f.id, f.status) for f in told] == [("a:end", "REVOKED")]
