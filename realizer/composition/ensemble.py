@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from bml_schema import Block, Feedback, SyncRef, WarningFeedback
 from realizer.behaviours.kind import Act, Kind, World
 from realizer.composition.acts import ActFault, perform
+from realizer.composition.calendar import Calendar
 from realizer.composition.character import Character
 from realizer.composition.claims import Claim
+from realizer.composition.expected import Expected
 from realizer.composition.playing import Playing, Wait
 from realizer.composition.references import references
 from realizer.composition.reporting import (
@@ -18,7 +19,6 @@ from realizer.composition.reporting import (
     Phase,
     State,
     acknowledgement,
-    events,
     prediction,
     progress,
     sync_progress,
@@ -48,58 +48,50 @@ class Ensemble:
         self.kinds = kinds
         self.characters = characters
         self.revision = 0
-        self._playing: list[Playing] = []
+        self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
         self._past: dict[str, Schedule] = {}
-        self._announced: dict[str, Block] = {}
-        # What was done to blocks that were announced, before they came.
-        self._revoked: set[str] = set()
-        self._activated: set[str] = set()
-        self._ahead: dict[str, list[Wait]] = {}
+        self._expected = Expected()
         self._outbox: list[Feedback] = []
-        self._events: list[Event] = []
+        self._calendar = Calendar()
         self._number = 0
 
     def all(self) -> list[Playing]:
         """Every block that can still be seen or heard, in order of acceptance."""
-        return self._playing
+        return list(self._playing.values())
 
     def of(self, character: int) -> list[Playing]:
-        return [p for p in self._playing if p.character == character]
+        return [p for p in self._playing.values() if p.character == character]
 
     def alive(self) -> list[Playing]:
         """The blocks that play or wait, in order of acceptance."""
-        return [p for p in self._playing if not p.done]
+        return [p for p in self._playing.values() if not p.done]
 
     # blocks in ----------------------------------------------------------------------------------
 
     def announce(self, block: Block, character: int, now: float) -> None:
         """Acknowledge a block, once."""
-        if block.id in self._announced or self._in_use(block):
+        if block.id in self._expected or self._in_use(block):
             return
-        self._announced[block.id] = block
+        self._expected.add(block)
         start = max([now, *(w.until for w in self._waits(block, character))])
         self.tell(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Give up a block that was announced."""
-        self._announced.pop(block.id, None)
-        if block.id in self._revoked:
-            self._revoked.discard(block.id)  # its end was told when that was done
-        else:
+        if not self._expected.arrive(block).revoked:
             self.tell(progress(block, "end", now, State.REVOKED))
 
     def submit(self, block: Block, character: int, world: World, now: float) -> Schedule:
         """Plan a block and take it in, or refuse it."""
         self.advance(now)
         self.announce(block, character, now)
-        self._announced.pop(block.id, None)
-        if block.id in self._revoked:
-            self._revoked.discard(block.id)
+        waits = self._waits(block, character)
+        fate = self._expected.arrive(block)
+        if fate.revoked:
             return Schedule(block.id, {}, {}, start=now, failed=True)
         if self._in_use(block):
             text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
             return self._refused(block, Warning(block.id, "PARSING_FAILURE", text), now)
-        waits = self._waits(block, character)
         followers = self._followers(block)
         if isinstance(followers, Warning):
             return self._refused(block, followers, now)
@@ -121,19 +113,20 @@ class Ensemble:
             return self._refused(block, planned.schedule.warnings[0], now)
         for earlier in ended:
             self.stop(earlier, now)
-        preplan = block.preplan and block.id not in self._activated
-        self._activated.discard(block.id)
-        state = State.PENDING if preplan else State.LURKING
+        for id in block.interrupt:
+            self.revoke(id, now)
+        state = State.PENDING if block.preplan and not fate.activated else State.LURKING
         playing = Playing(planned, self.kinds, world, character, self._number, now, waits, state)
         playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
+        self._playing[self._number] = playing
         self._number += 1
-        self._playing.append(playing)
         self._set_out(playing)
         for follower, wait in followers:
             follower.waits.append(Wait(playing, wait))
-        for id_, wait in ((i, w) for ids, w in _before(block) for i in ids):
-            if id_ in self._announced:
-                self._ahead.setdefault(id_, []).append(Wait(playing, wait))
+        for ids, subsiding in _before(block):
+            for id in ids:
+                if (coming := self._expected.fate(id)) is not None:
+                    coming.waits.append(Wait(playing, subsiding))
         self._predict(playing, now)
         for warning in planned.schedule.warnings:
             self._warn(block, warning)
@@ -142,7 +135,7 @@ class Ensemble:
 
     def latest(self, schedule: Schedule) -> Schedule:
         """What has become of a schedule that `submit` gave."""
-        playing = next((p for p in self._playing if p.first is schedule), None)
+        playing = next((p for p in self._playing.values() if p.first is schedule), None)
         if playing is None or playing.start == FOREVER:
             return schedule
         more = tuple(w for w in playing.schedule.warnings if w not in schedule.warnings)
@@ -152,10 +145,8 @@ class Ensemble:
 
     def advance(self, now: float) -> None:
         """Let everything happen that is due, in order, each thing at its own time."""
-        while self._events and self._events[0].time <= now:
-            event = heapq.heappop(self._events)
-            playing = next(p for p in self._playing if p.number == event.block)
-            self._happens(event, playing)
+        for event in self._calendar.due(now):
+            self._happens(event, self._playing[event.block])
 
     def due(self, now: float) -> list[Feedback]:
         self.advance(now)
@@ -163,16 +154,14 @@ class Ensemble:
         return out
 
     def next_deadline(self) -> float | None:
-        if self._outbox:
-            return float("-inf")
-        return self._events[0].time if self._events else None
+        return float("-inf") if self._outbox else self._calendar.next
 
     def forget(self, before: float) -> bool:
         """Drop blocks that ended before a time; True where there were some."""
-        gone = [p for p in self._playing if p.done and p.end < before]
+        gone = [p for p in self._playing.values() if p.done and p.gone < before]
         for playing in gone:
             self._past[playing.block.id] = playing.schedule
-            self._playing.remove(playing)
+            del self._playing[playing.number]
         while len(self._past) > PAST:
             del self._past[next(iter(self._past))]
         return bool(gone)
@@ -222,15 +211,16 @@ class Ensemble:
 
     def known(self, id: str) -> bool:
         """Whether there is or was such a block."""
-        past = any(p.block.id == id for p in self._playing)
-        return past or id in self._past or id in self._announced
+        past = any(p.block.id == id for p in self._playing.values())
+        return past or id in self._past or id in self._expected
 
     def revoke(self, id: str, now: float) -> bool:
         """End a block that was announced and is not here yet; False where there is none."""
-        if id not in self._announced or id in self._revoked:
+        fate = self._expected.fate(id)
+        if fate is None or fate.revoked:
             return False
-        self._revoked.add(id)
-        self.tell(progress(self._announced[id], "end", now, State.REVOKED))
+        fate.revoked = True
+        self.tell(progress(fate.block, "end", now, State.REVOKED))
         return True
 
     def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
@@ -244,7 +234,7 @@ class Ensemble:
 
     def stop(self, playing: Playing, now: float) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
-        self._disarm(playing)
+        self._calendar.take(playing)
         state = State.INTERRUPTED if playing.begun else State.REVOKED
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         playing.cut(list(playing.schedule.times), now, ends=True)
@@ -255,10 +245,10 @@ class Ensemble:
 
     def cut(self, playing: Playing, behaviours: Collection[str], now: float) -> None:
         """End some behaviours of a block; the block ends with the last of the others."""
-        pending = {(e.name, e.sync) for e in self._disarm(playing)}
+        pending = {(e.name, e.sync) for e in self._calendar.take(playing)}
         self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
         playing.cut(behaviours, now)
-        self._arm(playing, pending)
+        self._calendar.put(playing, pending)
         self.changed()
         self._predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
         self._moved(playing, now)
@@ -267,10 +257,11 @@ class Ensemble:
         """Let a preplanned block start, when what it waits for is over; False where it is none."""
         playing = self.find(id)
         if playing is None:
-            waits = id in self._announced and self._announced[id].preplan
-            if waits:
-                self._activated.add(id)
-            return waits
+            fate = self._expected.fate(id)
+            if fate is None or not fate.block.preplan:
+                return False
+            fate.activated = True
+            return True
         if playing.state is not State.PENDING:
             return False
         playing.state, playing.floor = State.LURKING, now
@@ -289,7 +280,8 @@ class Ensemble:
             or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
         ]
         waits += [Wait(p, subsiding=True) for p in alive if p.block.id in block.chunk_after]
-        return waits + [w for w in self._ahead.get(block.id, ()) if not w.block.done]
+        fate = self._expected.fate(block.id)
+        return waits + [w for w in (fate.waits if fate else ()) if not w.block.done]
 
     def _followers(self, block: Block) -> list[tuple[Playing, bool]] | Warning:
         """The blocks that are to wait for this one, and whether only for its subsiding."""
@@ -299,7 +291,7 @@ class Ensemble:
                 playing = self.find(id)
                 if playing is not None and playing.waiting:
                     found.append((playing, subsiding))
-                elif playing is not None or id not in self._announced:
+                elif playing is not None or id not in self._expected:
                     text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {id!r}"
                     return Warning(block.id, "TargetBlockAlreadyStartedException", text)
         return found
@@ -333,7 +325,7 @@ class Ensemble:
         start = playing.earliest
         if start == playing.start:
             return
-        self._disarm(playing)
+        self._calendar.take(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         planned = playing.plan
         if start < FOREVER and (playing.start == FOREVER or _refers_outside(playing.block)):
@@ -361,7 +353,8 @@ class Ensemble:
 
     def _outside(self, ref: SyncRef, start: float) -> float | None:
         """Seconds from `start` of a sync point of another block; None where it is not known."""
-        schedule = next((p.schedule for p in reversed(self._playing) if p.block.id == ref.block), None)
+        newest = reversed(self._playing.values())
+        schedule = next((p.schedule for p in newest if p.block.id == ref.block), None)
         schedule = schedule or self._past.get(ref.block or "")
         if schedule is None or schedule.start == FOREVER:
             return None
@@ -388,28 +381,8 @@ class Ensemble:
         """A block has a new start: it shifts base states then, and its events are due."""
         self.characters[playing.character].shift(playing.shifts.values())
         if playing.start < FOREVER:
-            self._arm(playing, None)
+            self._calendar.put(playing)
             self.changed()
-
-    def _arm(self, playing: Playing, only: Collection[tuple[str, str]] | None) -> None:
-        """Put what is still to be told of a block on the calendar; of sync points all, or `only` these."""
-        number = playing.number
-        due = events(playing.block, playing.schedule, number)
-        due = [e for e in due if only is None or (e.name, e.sync) in only]
-        if playing.waiting:
-            due.append(Event(playing.start, number, Phase.START))
-        if playing.state is not State.SUBSIDING and playing.subsides < playing.end:
-            due.append(Event(playing.subsides, number, Phase.SUBSIDES))
-        due.append(Event(playing.end, number, Phase.END))
-        self._events += due
-        heapq.heapify(self._events)
-
-    def _disarm(self, playing: Playing) -> list[Event]:
-        """Take what is still to be told of a block off the calendar."""
-        gone = [e for e in self._events if e.block == playing.number]
-        self._events = [e for e in self._events if e.block != playing.number]
-        heapq.heapify(self._events)
-        return gone
 
     def _withdraw_shifts(self, playing: Playing, behaviours: Iterable[str], now: float) -> None:
         gone = [playing.shifts[b] for b in behaviours]

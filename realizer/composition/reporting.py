@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
+from typing import NamedTuple
 
 from bml_schema import (
     Block,
@@ -41,8 +41,7 @@ class Phase(IntEnum):
     END = 3
 
 
-@dataclass(frozen=True, order=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """Something that is due at a time; the order of the fields is the order of report.
 
     At one instant earlier blocks report before later ones, so that what an APPEND waited for, or a REPLACE
@@ -60,8 +59,8 @@ class Event:
     phase: Phase
     behaviour: int = 0
     point: int = 0
-    name: str = field(default="", compare=False)
-    sync: str = field(default="", compare=False)
+    name: str = ""
+    sync: str = ""
 
 
 def acknowledgement(block: Block, start: float) -> PredictionFeedback:
