@@ -13,6 +13,8 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from bml_schema import Behaviour, Block
     from realizer.player import Player
     from realizer.scheduling.timing import Schedule, Warning
@@ -23,6 +25,7 @@ __all__: list[str] = []
 @click.command()
 @options.documents
 @click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
+@options.media
 @click.option(
     "--long/--short",
     "long",
@@ -30,7 +33,13 @@ __all__: list[str] = []
     help="Show source, marks and help, or a line for each fault.  [default: --long on a terminal]",
 )
 @click.pass_context
-def check(context: click.Context, documents: tuple[str, ...], scene: str | None, long: bool | None) -> int:
+def check(
+    context: click.Context,
+    documents: tuple[str, ...],
+    scene: str | None,
+    media: Path | None,
+    long: bool | None,
+) -> int:
     """Explain every fault of documents, with line, column and path.
 
     Standard output holds the faults and nothing else; a line each, unless it is a terminal. Advice on what is
@@ -59,7 +68,9 @@ def check(context: click.Context, documents: tuple[str, ...], scene: str | None,
     faults = 0
     for name, text in zip(documents, options.read_documents(documents), strict=True):
         # A player a file: what one document says must not colour the next one's report.
-        player = Player(scene=options.read_scene(scene), idle=False)
+        player = Player(
+            scene=options.read_scene(scene), idle=False, media=options.settings(media=media).media
+        )
         source = Source(text)
         blocks = found = 0
         for item in read(text, VOCABULARY):

@@ -25,6 +25,14 @@ documents = click.argument(
 )
 
 
+media = click.option(
+    "--media",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Folder of the files that documents may name.",
+)
+
+
 class Number(click.FloatRange):
     """A finite number in a range; click lets NaN through."""
 
@@ -50,9 +58,10 @@ def settings(**flags: Any) -> Settings:
 
 
 def playing(command: Command) -> Command:
-    """--voice, --scene and --strict."""
+    """--voice, --scene, --media and --strict."""
     for option in (
         click.option("--strict", is_flag=True, help="Exit 1 if any behaviour was dropped."),
+        media,
         click.option(
             "--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z."
         ),

@@ -46,6 +46,7 @@ def realize(
     no_idle: bool,
     voice: str | None,
     scene: str | None,
+    media: Path | None,
     strict: bool,
 ) -> int:
     """Play documents offline and write frames, pictures, sound or film.
@@ -63,7 +64,13 @@ def realize(
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="-o") from None
     chosen = options.settings(
-        face=face, fps=fps, voice=voice, scene=scene, seed=seed, idle=False if no_idle else None
+        face=face,
+        fps=fps,
+        voice=voice,
+        scene=scene,
+        media=media,
+        seed=seed,
+        idle=False if no_idle else None,
     )
     realization = run(
         options.read_documents(documents),
@@ -74,8 +81,9 @@ def realize(
         seed=chosen.seed,
         idle=chosen.idle,
         language=chosen.language,
+        media=chosen.media,
     )
-    if realization.speaking:
+    if any(speaking.utterance.pcm is None for speaking in realization.speaking):
         options.tell_silence(chosen.voice)
     options.tell(realization.warnings)
     if writer is None:
@@ -110,16 +118,23 @@ def dropped(planned: Schedule) -> bool:
 @click.option("--json", "as_json", is_flag=True, help="As JSON instead of a table.")
 @options.playing
 def schedule(
-    documents: tuple[str, ...], as_json: bool, voice: str | None, scene: str | None, strict: bool
+    documents: tuple[str, ...],
+    as_json: bool,
+    voice: str | None,
+    scene: str | None,
+    media: Path | None,
+    strict: bool,
 ) -> int:
     """Print when every sync point falls, in seconds from block start."""
     from realizer.pipeline import play
     from realizer.player import Player
 
-    chosen = options.settings(voice=voice, scene=scene)
-    player = Player(scene=options.read_scene(chosen.scene), idle=False, language=chosen.language)
+    chosen = options.settings(voice=voice, scene=scene, media=media)
+    player = Player(
+        scene=options.read_scene(chosen.scene), idle=False, language=chosen.language, media=chosen.media
+    )
     schedules, refused = play(options.read_documents(documents), player, chosen.voice)
-    if player.speech():
+    if any(speaking.utterance.pcm is None for speaking in player.speech()):
         options.tell_silence(chosen.voice)
     options.tell(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
