@@ -1,6 +1,6 @@
 """The cases of the corpus: NAME.toml and NAME.xml in, what was told and shown when it was played out.
 
-A case is played as a session would: the player is told the time, there is no clock, no sound and no idle motion.
+A case is played as a session would: the player is told the time; no clock, no sound, no idle motion.
 Keys of a .toml; all but `says` and `proves` are optional:
 
     says       what must be true, as a sentence
@@ -8,14 +8,14 @@ Keys of a .toml; all but `says` and `proves` are optional:
 
     sent       when each document of the .xml is sent, seconds; 0 for those beyond the list
     [scene]    target = [x, y, z], declared before the first document
+    idle       true: with idle motion
     within     tolerance of times, seconds
 
     refused    true: nothing plays, and exactly one warning says why
     warnings   [[id, type], ...]: exactly these, in any order
-    contains, path, line
-               found in the text of one of the warnings
-    [reads]    "behaviour" = its element; "behaviour.attribute", "block.attribute", "behaviour.poses.0.part" = the
-               value it was read as
+    contains   found in the text of one of the warnings; so are `path` and `line`
+    [reads]    "behaviour" = its element; "behaviour.attribute", "block.attribute", "behaviour.poses.0.part" =
+               the value it was read as
     dropped    behaviours that are not scheduled
 
     [at]       "behaviour:sync" = seconds from block start; "block:behaviour:sync" likewise for another block
@@ -42,12 +42,14 @@ Keys of a .toml; all but `says` and `proves` are optional:
                change in 0.01 s, in the units of what is shown
     as_if      a document of the same meaning: read as the same nodes, told and shown the same
     unlike     a document of another meaning: something else is read, and told or shown
-    heard      [[block:behaviour, from, to], ...]: what sounds when; `to` is where it is cut off or ends
+    heard      [[from, to], ...]: what sounds when, seconds of the session clock, in order
+    loud       [[seconds, part], ...]: what the sound of the first that sounds is multiplied with
 """
 
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -79,10 +81,8 @@ from realizer.tables import faps
 __all__ = ["CASES", "CORPUS", "Case", "Played", "Told", "told"]
 
 CORPUS = Path(__file__).parent / "corpus"
-_KEYS = frozenset(
-    "says proves sent scene within refused warnings contains path line reads dropped at order equal lasts "
-    "predicted log among once never face smooth as_if unlike heard".split()
-)
+MEDIA = CORPUS / "media"  # the files that documents name
+_KEYS = frozenset(re.findall(r"^    \[*(\w+)", __doc__, re.MULTILINE)) | {"path", "line"}
 MOST_STEPS = 10_000  # deadlines of one case
 # Some day a session opened; times of feedback are rounded to a microsecond on the wire.
 EPOCH = 1_700_000_000.0
@@ -150,14 +150,14 @@ class Played:
         schedules: block id -> what `submit` returned, the last of that id.
         feedback: as a client gets it: written as XML and read again.
         faces: instant -> name of AU or FAP -> value.
-        speaking: what sounded, or would have.
+        speaking: what sounded, or would have with a voice, in order.
     """
 
     blocks: list[Block] = field(default_factory=list)
     schedules: dict[str, Schedule] = field(default_factory=dict)
     feedback: list[Feedback] = field(default_factory=list)
     faces: dict[Instant, dict[str, float]] = field(default_factory=dict)
-    speaking: dict[str, Speaking] = field(default_factory=dict)
+    speaking: tuple[Speaking, ...] = ()
 
     @cached_property
     def log(self) -> list[Told]:
@@ -254,11 +254,9 @@ class Case:
         ]
         script += [(i.time, 1, i) for i in (self.instants if instants is None else instants)]
         scene = (
-            {name: tuple(map(float, place)) for name, place in wanted["scene"].items()}
-            if "scene" in wanted
-            else None
+            {name: (x, y, z) for name, (x, y, z) in wanted["scene"].items()} if "scene" in wanted else None
         )
-        player = Player(scene=scene, idle=False)
+        player = Player(scene=scene, idle=wanted.get("idle", False), media=MEDIA, history=math.inf)
         played = Played()
         voice = SilentVoice()
 
@@ -283,11 +281,6 @@ class Case:
                 played.feedback.append(
                     parse_feedback(feedback.to_xml(len(played.feedback) + 1, EPOCH), VOCABULARY)
                 )
-            for speaking in player.speech():
-                played.speaking[name_of(speaking)] = speaking
-
-        def name_of(speaking: Speaking) -> str:
-            return getattr(speaking, "source", "") or f"{speaking.start:g}"
 
         for time, _, item in sorted(script, key=lambda entry: entry[:2]):
             hear(time)
@@ -298,7 +291,8 @@ class Case:
                 played.schedules[item.id] = player.submit(item, time, speak(player.wants(item), voice))
             else:
                 player.refuse(warning_of(item), time)
-        hear(float("inf"))
+        hear(math.inf)
+        played.speaking = player.speech()
         return played
 
 
