@@ -9,6 +9,7 @@ from types import TracebackType
 
 from realizer.server.doors.asap import AsapDoor
 from realizer.server.doors.door import Door
+from realizer.server.doors.stomp import StompDoor
 from realizer.server.doors.websocket import WebSocketDoor
 from realizer.server.shell import Shell
 from realizer.settings import Settings
@@ -142,4 +143,6 @@ def _doors(web: WebSocketDoor, shell: Shell, settings: Settings) -> list[Door]:
     doors: list[Door] = [web]
     if settings.asap_ports is not None:
         doors.append(AsapDoor(shell, settings))
+    if settings.stomp is not None:
+        doors.append(StompDoor(shell, settings))
     return doors

@@ -1,0 +1,358 @@
+"""The STOMP door: we are a client of somebody's message broker and talk all dialects there at once."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from realizer.errors import RealizerError
+from realizer.server.doors.dialects import DIALECTS, Dialect, Leave, Message, ToSession
+from realizer.server.hub import HubError
+from realizer.server.shell import Shell
+from realizer.settings import Settings
+
+__all__ = ["StompDoor"]
+
+log = logging.getLogger(__name__)
+
+FIRST_RETRY = 0.2  # s
+LAST_RETRY = 10.0  # s
+ATTEMPT = 5.0  # s; to connect, and to part
+HEARTBEAT = 10_000  # ms, both ways: what else would tell that the broker's machine is gone
+# Messages that wait for the broker; of more the oldest go.
+KEPT = 4 * 2**20  # characters
+# Messages that have come in and are not handled: so a session keeps step, and the broker waits with more.
+AHEAD = 1
+
+
+class StompDoor:
+    """A client of the broker at `settings.stomp` that comes back whenever the broker does.
+
+    Each dialect has a session of its own, by its name in DIALECTS, made when the first message comes and kept
+    while the broker is away. What is said meanwhile is said when it is back.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings) -> None:
+        assert settings.stomp is not None
+        host, _, port = settings.stomp.rpartition(":")
+        self._address = (host.strip("[]"), int(port))
+        self._shell = shell
+        self._settings = settings
+        made = {name: make(settings) for name, make in DIALECTS.items()}
+        self._seats = [_Seat(self, name, dialect) for name, dialect in made.items() if dialect is not None]
+        self._thread = ThreadPoolExecutor(1, "stomp")
+        self._link: _Link | None = None
+        self._out: deque[Message] = deque()
+        self._size = 0  # characters in _out
+        self._news = asyncio.Event()
+        self._up = asyncio.Event()
+        self._keeper: asyncio.Task[None] | None = None
+        self._leaving: asyncio.Task[None] | None = None
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        names = ", ".join(f"{seat.dialect.topic} in session {seat.name}" for seat in self._seats)
+        return (f"stomp: {self._settings.stomp} reads {names}",)
+
+    async def start(self) -> None:
+        try:
+            import stomp  # noqa: F401
+        except ImportError:
+            raise RealizerError("--stomp needs stomp.py: pip install 'bml-realizer[stomp]'") from None
+        # It tells of every lost connection, with a traceback; so do we, in a line.
+        logging.getLogger("stomp.py").setLevel(logging.CRITICAL)
+        self._loop = asyncio.get_running_loop()
+        self._keeper = asyncio.create_task(self._keep())
+
+    async def ready(self) -> None:
+        await self._up.wait()
+
+    def shut(self) -> None:
+        """Sessions refuse what comes from now on, with words; so messages are still read."""
+
+    async def close(self) -> None:
+        if self._leaving is None:
+            self._leaving = asyncio.create_task(self._leave())
+        await self._leaving
+
+    async def _leave(self) -> None:
+        """Say good-bye where somebody listens, and part."""
+        for seat in self._seats:
+            seat.leave()
+        if self._link is not None:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(ATTEMPT):
+                    while self._out and self._link is not None:
+                        await asyncio.sleep(0.01)
+        if self._keeper is not None:
+            self._keeper.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._keeper
+        self._thread.shutdown(wait=False)
+
+    # what comes and goes ------------------------------------------------------------------------
+
+    def put(self, message: Message) -> None:
+        """Send it, when the broker is there."""
+        self._out.append(message)
+        self._size += len(message.body)
+        while self._size > KEPT:
+            self._size -= len(self._out.popleft().body)
+        self._news.set()
+
+    @property
+    def waiting(self) -> int:
+        return self._size
+
+    def _take(self, link: _Link, seat: int, body: bytes) -> None:
+        """A message has come in; in the event loop."""
+        link.handled()
+        if link is not self._link or self._leaving is not None:
+            return
+        for action in self._seats[seat].dialect.incoming(body):
+            match action:
+                case Message():
+                    self.put(action)
+                case ToSession(text):
+                    self._seats[seat].receive(text)
+                case Leave():
+                    log.warning("stomp: vrKillComponent: the door closes")
+                    self._leaving = asyncio.create_task(self._leave())
+                    return
+
+    # the connection -----------------------------------------------------------------------------
+
+    async def _keep(self) -> None:
+        """Be connected, until cancelled."""
+        pause = FIRST_RETRY
+        told = False
+        while True:
+            link = _Link(self._loop, self._take)
+            try:
+                await self._connect(link)
+                log.log(
+                    logging.WARNING if told else logging.INFO, "stomp: connected to %s", self._settings.stomp
+                )
+                pause, told = FIRST_RETRY, False
+                await self._talk(link)
+                words = "the broker at %s is gone%s; looking for it"
+            except (OSError, RealizerError) as error:
+                link.fault = link.fault or str(error)
+                words = "no broker at %s%s; looking for it"
+            finally:
+                self._link = None
+                await asyncio.shield(self._part(link))
+            if not told:
+                log.warning("stomp: " + words, self._settings.stomp, link.fault and f" ({link.fault})")
+                told = True
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LAST_RETRY)
+
+    async def _connect(self, link: _Link) -> None:
+        settings = self._settings
+        async with asyncio.timeout(ATTEMPT):
+            await self._call(
+                link.connect,
+                self._address,
+                settings.stomp_host,
+                settings.stomp_login,
+                settings.stomp_password,
+            )
+            await link.settled.wait()
+        if not link.connected:
+            raise RealizerError(link.fault or "it closes the connection")
+        for number, seat in enumerate(self._seats):
+            await self._call(link.subscribe, seat.dialect.topic, number)
+        self._link = link
+        for seat in self._seats:
+            for message in reversed(seat.dialect.hello()):
+                self._out.appendleft(message)
+                self._size += len(message.body)
+        self._news.set()
+        self._up.set()
+
+    async def _talk(self, link: _Link) -> None:
+        """Send what there is to send, until the connection is lost."""
+        lost = asyncio.create_task(link.lost.wait())
+        try:
+            while not lost.done():
+                news = asyncio.create_task(self._news.wait())
+                await asyncio.wait((news, lost), return_when=asyncio.FIRST_COMPLETED)
+                news.cancel()
+                self._news.clear()
+                while self._out and not lost.done():
+                    message = self._out[0]
+                    try:
+                        await self._call(link.send, message)
+                    except (OSError, RealizerError):
+                        return  # it is said again to the next connection
+                    if self._out and self._out[0] is message:
+                        self._out.popleft()
+                        self._size -= len(message.body)
+        finally:
+            lost.cancel()
+
+    async def _part(self, link: _Link) -> None:
+        with contextlib.suppress(OSError, RealizerError):
+            async with asyncio.timeout(ATTEMPT):
+                if link.connected and not link.lost.is_set():
+                    await self._call(link.disconnect)
+                    await link.lost.wait()
+        link.drop()
+
+    async def _call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Something that blocks, in the door's own thread, one after the other."""
+        await self._loop.run_in_executor(self._thread, function, *arguments)
+
+
+class _Seat:
+    """One dialect's connection to its session; a Client."""
+
+    def __init__(self, door: StompDoor, name: str, dialect: Dialect) -> None:
+        self.name = name
+        self.dialect = dialect
+        self._door = door
+        self._number: int | None = None
+
+    def receive(self, text: str) -> None:
+        """To the session, which is made where there is none."""
+        shell = self._door._shell
+        try:
+            if self._number is None:
+                self._number = shell.join(self, self.name)
+            if not shell.receive(self._number, text):
+                shell.leave(self._number)
+                self._number = shell.join(self, self.name)
+                shell.receive(self._number, text)
+        except HubError as error:
+            log.warning("stomp: %s: %s", self.name, error)
+
+    @property
+    def waiting(self) -> int:
+        return self._door.waiting
+
+    def send(self, data: str | bytes) -> None:
+        if isinstance(data, str) and data.startswith("<"):
+            for message in self.dialect.outgoing(data):
+                self._door.put(message)
+
+    def end(self, code: int, reason: str) -> None:
+        log.warning("stomp: session %s ends: %s", self.name, reason)
+        self.leave()
+
+    def leave(self) -> None:
+        for message in self.dialect.farewell():
+            self._door.put(message)
+        if self._number is not None:
+            self._door._shell.leave(self._number)
+            self._number = None
+
+
+class _Link:
+    """One connection to the broker, over stomp.py; told of by its listener thread.
+
+    Args:
+        loop: where `take(self, seat, body)` is called for each message, and the events are set.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[_Link, int, bytes], None]) -> None:
+        self.settled = asyncio.Event()  # connected, or not
+        self.lost = asyncio.Event()
+        self.connected = False
+        self.fault = ""
+        self._loop = loop
+        self._take = take
+        self._ahead = threading.BoundedSemaphore(AHEAD)
+        self._stomp: Any = None
+
+    # in the door's thread
+
+    def connect(
+        self, address: tuple[str, int], host: str | None, login: str | None, password: str | None
+    ) -> None:
+        import stomp
+        from stomp.exception import StompException
+
+        self._stomp = stomp.Connection12(
+            [address],
+            reconnect_attempts_max=1,
+            reconnect_sleep_initial=0,  # we wait ourselves
+            reconnect_sleep_max=0,
+            timeout=ATTEMPT,
+            heartbeats=(HEARTBEAT, HEARTBEAT),
+            heart_beat_receive_scale=2.5,
+            vhost=host,
+            auto_decode=False,
+            # With a length ActiveMQ makes messages of bytes, which Java clients that wait for text pass over.
+            auto_content_length=False,
+        )
+        self._stomp.set_listener("door", self)
+        try:
+            self._stomp.connect(login, password)
+        except StompException as error:
+            raise RealizerError(str(error) or "nobody answers") from None
+
+    def subscribe(self, topic: str, number: int) -> None:
+        self._guarded(self._stomp.subscribe, topic, id=str(number))
+
+    def send(self, message: Message) -> None:
+        self._guarded(self._stomp.send, message.topic, message.body, headers=dict(message.headers))
+
+    def disconnect(self) -> None:
+        self._guarded(self._stomp.disconnect)
+
+    @staticmethod
+    def _guarded(call: Callable[..., Any], *arguments: Any, **named: Any) -> None:
+        from stomp.exception import StompException
+
+        try:
+            call(*arguments, **named)
+        except (StompException, AttributeError) as error:  # it clears its socket under our hands
+            raise RealizerError(str(error) or "the connection is lost") from None
+
+    # in any thread
+
+    def drop(self) -> None:
+        """Close the socket, if it is still open."""
+        if self._stomp is not None:
+            with contextlib.suppress(OSError, AttributeError):
+                self._stomp.transport.disconnect_socket()
+
+    # in stomp.py's thread
+
+    def on_connected(self, frame: Any) -> None:
+        self._in_loop(self._settle, True, "")
+
+    def on_error(self, frame: Any) -> None:
+        said = frame.headers.get("message", "") or bytes(frame.body or b"").decode("utf-8", "replace")
+        self._in_loop(self._settle, False, " ".join(said.split())[:200])
+
+    def on_disconnected(self) -> None:
+        self._in_loop(self._settle, False, "")
+        self._in_loop(self.lost.set)
+
+    def on_message(self, frame: Any) -> None:
+        self._ahead.acquire()
+        body = frame.body.encode() if isinstance(frame.body, str) else bytes(frame.body or b"")
+        self._in_loop(self._take, self, int(frame.headers.get("subscription", 0)), body)
+
+    def _in_loop(self, function: Callable[..., object], *arguments: Any) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(function, *arguments)
+
+    # in the event loop
+
+    def handled(self) -> None:
+        """One message less that has come in and waits."""
+        self._ahead.release()
+
+    def _settle(self, connected: bool, fault: str) -> None:
+        self.connected |= connected
+        self.fault = self.fault or fault
+        self.settled.set()
