@@ -12,6 +12,8 @@ __all__: list[str] = []
 
 # s; a track that does not begin or end at rest gets there and back in this time, or in half of it all.
 EASE = 0.12
+# The part of its furthest value up to which an end counts as at rest, so that recordings play as they are.
+AT_REST = 0.05
 
 
 def track(target: Target, times: Float64, values: Float64, source: str) -> Channel:
@@ -21,9 +23,11 @@ def track(target: Target, times: Float64, values: Float64, source: str) -> Chann
         times: (k,) seconds, rising; values: (k,).
     """
     ease = min(EASE, float(times[-1] - times[0]) / 2)
-    if values[0] and ease > 0:
+    most = AT_REST * float(np.abs(values).max())
+    first, last = abs(float(values[0])), abs(float(values[-1]))
+    if first > most and ease > 0:
         times, values = _eased(times, values, ease)
-    if values[-1] and ease > 0:
+    if last > most and ease > 0:
         back, turned = _eased(-times[::-1], values[::-1], ease)
         times, values = -back[::-1], turned[::-1]
     return Channel(target, times, values, curve="linear", source=source)

@@ -1,0 +1,77 @@
+"""Sounds of the media folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+def sound(played, rate: int = 8000) -> np.ndarray:
+    return np.abs(played.realization.sound(rate).astype(float))
+
+
+def test_a_file_sounds_from_its_start_for_as_long_as_it_is(play, media: Path) -> None:
+    played = play(
+        '<bmlt:audiofile id="a" fileName="hello.wav" start="1"/><wait id="w" duration="3"/>', media=media
+    )
+    assert played.warnings == []
+    assert played.times("a") == {"start": 1, "end": 1.5}
+    heard = sound(played)
+    assert not heard[:8000].any()
+    assert heard[8000:12000].max() == pytest.approx(0.5 * 32767, abs=200)
+    assert not heard[12000:].any()
+
+
+def test_others_hang_on_its_end_and_cannot_stretch_it(play, media: Path) -> None:
+    played = play(
+        '<bmlt:audiofile id="a" fileName="sounds/bell.wav"/><head id="h" lexeme="NOD" start="a:end"/>'
+        '<faceLexeme id="f" lexeme="SMILE" start="a:start" end="a:end"/>',
+        media=media,
+    )
+    assert played.times("a") == {"start": 0, "end": 0.25}
+    assert played.times("h")["start"] == played.times("f")["end"] == 0.25
+
+
+def test_it_is_cut_off_where_the_document_ends_it(play, media: Path) -> None:
+    played = play(
+        '<bmlt:audiofile id="a" fileName="hello.wav" end="0.2"/><wait id="w" duration="1"/>', media=media
+    )
+    assert played.times("a") == {"start": 0, "end": 0.2}
+    heard = sound(played)
+    assert heard[:1600].max() > 15000
+    assert not heard[2100:].any()
+
+
+def test_an_end_after_its_own_is_silence(play, media: Path) -> None:
+    played = play('<bmlt:audiofile id="a" fileName="hello.wav" start="0" end="2"/>', media=media)
+    assert played.times("a")["end"] == 2
+    assert not sound(played)[4000:].any()
+
+
+def test_it_ends_with_another_and_starts_early_enough(play, media: Path) -> None:
+    played = play(
+        '<bmlt:audiofile id="a" fileName="hello.wav" end="w:end"/><wait id="w" duration="2"/>', media=media
+    )
+    assert played.times("a") == pytest.approx({"start": 1.5, "end": 2})
+
+
+def test_a_file_that_is_no_sound_is_dropped_and_the_rest_plays(play, media: Path) -> None:
+    (media / "not.wav").write_bytes(b"ID3 this is an mp3")
+    played = play('<bmlt:audiofile id="a" fileName="not.wav"/><head id="h" lexeme="NOD"/>', media=media)
+    assert played.warnings == [("b:a", "CANNOT_CREATE_BEHAVIOR")]
+    assert "'not.wav': wanted a WAV file" in played.told
+    assert played.times("h")
+
+
+def test_its_volume_changes_while_it_sounds(play, media: Path) -> None:
+    played = play(
+        '<bmlt:audiofile id="a" fileName="hello.wav"/>'
+        '<bmla:parametervaluechange id="p" target="b:a" paramId="volume" start="0.25">'
+        '<bmla:trajectory type="instant" targetValue="20"/></bmla:parametervaluechange>',
+        media=media,
+    )
+    heard = sound(played)
+    assert heard[:1900].max() == pytest.approx(0.5 * 32767, rel=0.02)
+    assert heard[2800:4000].max() == pytest.approx(0.1 * 32767, rel=0.02)

@@ -1,0 +1,32 @@
+"""One blink, or a wink."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.tables.timing import gaps
+
+
+@pytest.mark.parametrize(
+    ("side", "lids", "open_"), [("BOTH", {19, 20}, set()), ("LEFT", {19}, {20}), ("RIGHT", {20}, {19})]
+)
+def test_the_lids_of_its_side_shut_and_open_again(play, side: str, lids: set[int], open_: set[int]) -> None:
+    played = play(f'<own:blink id="k" side="{side}" start="1"/>')
+    times = played.times("k")
+    for fap in lids:
+        assert played.fap(fap, 0.99) == 0
+        assert played.fap(fap, times["attackPeak"]) + played.fap(fap + 2, times["attackPeak"]) == 1024
+        assert played.fap(fap, times["end"]) == 0
+    for fap in open_:
+        assert played.fap(fap, times["attackPeak"]) == 0
+
+
+def test_a_blink_takes_a_blinks_time(play) -> None:
+    times = play('<own:blink id="k"/>').times("k")
+    assert times["end"] == pytest.approx(sum(gap.preferred for gap in gaps("faceLexeme", "BLINK").gaps))
+    assert times["end"] < 0.4
+
+
+def test_a_smaller_amount_is_a_half_blink(play) -> None:
+    played = play('<own:blink id="k" amount="0.5" start="0" attackPeak="0.1" relax="0.3" end="0.5"/>')
+    assert played.aus(0.2) == {"45L": 0.5, "45R": 0.5}

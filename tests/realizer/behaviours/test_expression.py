@@ -1,0 +1,68 @@
+"""The expression library: the twelve templates, and every face lexeme."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.tables.lexemes import face_lexemes
+from realizer.tables.templates import templates
+
+AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'
+
+
+@pytest.mark.parametrize("template", templates().values(), ids=lambda t: t.name)
+def test_a_template_shows_its_action_units(play, template) -> None:
+    played = play(f'<own:expression id="e" name="template:{template.name.lower()}" intensity="0.5" {AT}/>')
+    assert played.warnings == []
+    shown = {int(name.rstrip("LR")): value for name, value in played.aus(1.0).items()}
+    assert shown == pytest.approx({au: value / 2 for (au, _), value in template.aus.items()})
+    assert played.aus(2.0) == {}
+
+
+@pytest.mark.parametrize("name", face_lexemes())
+def test_a_face_lexeme_is_an_expression_too(play, name: str) -> None:
+    shown = play(f'<own:expression id="e" name="{name.lower()}" intensity="0.7" {AT}/>')
+    asked = play(f'<faceLexeme id="e" lexeme="{name}" amount="0.7" {AT}/>')
+    assert shown.aus(1.0) == asked.aus(1.0)
+    free = play(f'<own:expression id="e" name="{name}"/><faceLexeme id="f" lexeme="{name}"/>')
+    assert free.times("e") == pytest.approx(free.times("f"))
+
+
+def test_a_template_is_not_the_emotion_of_its_name(play) -> None:
+    template = play(f'<own:expression id="e" name="template:anger" {AT}/>').aus(1.0)
+    emotion = play(f'<own:expression id="e" name="anger" {AT}/>').aus(1.0)
+    assert set(template) == {"4L", "4R"}
+    assert set(template) < set(emotion)
+
+
+@pytest.mark.parametrize(
+    "name", ["TEMPLATE:Ironic_Smile", "template:ironic-smile", "template: ironic  smile"]
+)
+def test_a_name_may_be_written_in_several_ways(play, name: str) -> None:
+    assert set(play(f'<own:expression id="e" name="{name}" {AT}/>').aus(1.0)) == {"10L", "10R", "12L", "12R"}
+
+
+@pytest.mark.parametrize("template", templates().values(), ids=lambda t: t.name)
+def test_a_template_lasts_as_long_as_it_was_seen_within_what_is_probable(play, template) -> None:
+    times = play(f'<own:expression id="e" name="template:{template.name}"/>').times("e")
+    half = (times["attackPeak"] - times["start"]) / 2, (times["end"] - times["relax"]) / 2
+    evident = (times["end"] - half[1]) - (times["start"] + half[0])
+    if template.probable:
+        assert template.probable[0] <= evident <= template.probable[1] + 1e-9
+    if not template.probable or template.probable[0] <= template.evident <= template.probable[1]:
+        assert evident == pytest.approx(template.evident)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("template:astonishmant", "wanted template:astonishment;"),
+        ("smiel", "SMILE"),
+        ("zzz", "template:grief"),
+    ],
+)
+def test_an_unknown_name_is_dropped_and_the_near_ones_are_named(play, name: str, meant: str) -> None:
+    played = play(f'<own:expression id="e" name="{name}"/><head id="h" lexeme="NOD"/>')
+    assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
+    assert meant in played.told
+    assert played.times("h")

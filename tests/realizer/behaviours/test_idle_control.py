@@ -1,0 +1,77 @@
+"""How many blinks and how much motion an idle face keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.animation.targets import AU_NAMES
+
+LONG = '<wait id="w" duration="60"/>'
+LID = AU_NAMES().index("45L")
+MOVING = [AU_NAMES().index(str(number)) for number in (51, 52, 53, 54, 55, 56, 61, 62, 63, 64)]
+
+
+def aus(play, body: str) -> np.ndarray:
+    return play(body + LONG, idle=True).realization.aus.aus
+
+
+def blinks(frames: np.ndarray) -> list[int]:
+    """Frames at which a lid begins to close."""
+    lid = frames[:, LID] > 0
+    return np.flatnonzero(lid[1:] & ~lid[:-1]).tolist()
+
+
+def test_a_face_without_blinks_and_motion_is_still(play) -> None:
+    still = aus(play, '<own:idle id="i" blinks="0" motion="0" start="0" end="0.1"/>')
+    assert not still[10:].any()
+    assert aus(play, "")[10:].any()
+
+
+def test_motion_shrinks_evenly_and_blinks_stay(play) -> None:
+    usual = aus(play, "")
+    less = aus(play, '<own:idle id="i" motion="0.25" start="0" end="0.1"/>')
+    np.testing.assert_allclose(less[10:, MOVING], usual[10:, MOVING] * 0.25, atol=1e-6)
+    np.testing.assert_array_equal(less[:, LID], usual[:, LID])
+
+
+def test_fewer_blinks_are_some_of_the_usual_ones_and_shut_the_eyes(play) -> None:
+    usual, fewer = aus(play, ""), aus(play, '<own:idle id="i" blinks="0.5" start="0" end="0.1"/>')
+    assert set(blinks(fewer)) < set(blinks(usual))
+    assert 0.2 < len(blinks(fewer)) / len(blinks(usual)) < 0.8
+    for begin in blinks(fewer):
+        np.testing.assert_array_equal(fewer[begin : begin + 31, LID], usual[begin : begin + 31, LID])
+
+
+def test_half_of_the_half_is_among_the_half(play) -> None:
+    some = [
+        set(blinks(aus(play, f'<own:idle id="i" blinks="{part}" start="0" end="0.1"/>')))
+        for part in (0.25, 0.5, 1)
+    ]
+    assert some[0] <= some[1] <= some[2]
+
+
+def test_a_later_one_gives_back_what_was_taken(play) -> None:
+    usual = aus(play, "")
+    back = aus(
+        play,
+        '<own:idle id="i" blinks="0" motion="0" start="0" end="0.1"/>'
+        '<own:idle id="j" start="20" end="20.5"/>',
+    )
+    assert not back[10:2000].any()
+    np.testing.assert_allclose(back[2100:], usual[2100:], atol=1e-6)
+
+
+def test_motion_goes_away_smoothly_and_no_lid_jumps(play) -> None:
+    usual = aus(play, "")
+    begin = blinks(usual)[3] / 100 + 0.05  # while the lids close
+    control = f'<own:idle id="i" blinks="0" motion="0" start="{begin}" end="{begin + 0.1}"/>'
+    frames = aus(play, control)
+    steps = np.abs(np.diff(frames, axis=0)).max(axis=0)
+    assert np.all(steps <= np.abs(np.diff(usual, axis=0)).max(axis=0) + 0.02)
+    np.testing.assert_array_equal(frames[: blinks(usual)[3] + 31, LID], usual[: blinks(usual)[3] + 31, LID])
+    assert not frames[blinks(usual)[3] + 31 :, LID].any()
+
+
+def test_blinks_that_are_asked_for_come_all_the_same(play) -> None:
+    frames = aus(play, '<own:idle id="i" blinks="0" start="0" end="0.1"/><own:blink id="k" start="5"/>')
+    assert blinks(frames) == [500]

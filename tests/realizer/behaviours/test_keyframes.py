@@ -1,0 +1,86 @@
+"""Face animations by keys."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+
+def keyframe(type: str, parts: str, keys: str, sync: str = "") -> str:
+    return (
+        f'<bmlt:facekeyframe id="k" type="{type}" {sync}>'
+        f'<bmlt:FaceInterpolator parts="{parts}">{keys}</bmlt:FaceInterpolator></bmlt:facekeyframe>'
+    )
+
+
+KEYS = "\n0 0 0\n0.5 100 -50\n2 0 0\n"
+
+
+def test_faps_go_through_their_keys(play) -> None:
+    played = play(keyframe("FAPS", "31 5", KEYS, 'start="1"'))
+    assert played.warnings == []
+    assert played.times("k") == {"start": 1, "end": 3}
+    assert [played.fap(31, t) for t in (1, 1.25, 1.5, 2.25, 3)] == pytest.approx([0, 50, 100, 50, 0])
+    assert [played.fap(5, t) for t in (1, 1.25, 1.5, 2.25, 3)] == pytest.approx([0, -25, -50, -25, 0])
+
+
+def test_the_first_key_is_at_start_whatever_its_time_and_all_stretch_to_end(play) -> None:
+    played = play(keyframe("FAPS", "31", "10 0\n11 100\n12 0", 'start="1" end="5"'))
+    assert [played.fap(31, t) for t in (1, 2, 3, 4, 5)] == pytest.approx([0, 50, 100, 50, 0])
+
+
+def test_action_units_by_side_go_through_their_keys(play) -> None:
+    played = play(keyframe("FACS", "1.BOTH 12.LEFT 26 4.right", "0 0 0 0 0\n1 0.5 1 0.25 0.75\n2 0 0 0 0"))
+    assert played.warnings == []
+    assert played.aus(1.0) == {"1L": 0.5, "1R": 0.5, "4R": 0.75, "12L": 1.0, "26": 0.25}
+    assert played.aus(0.5)["12L"] == pytest.approx(0.5)
+    assert played.aus(2.0) == {}
+
+
+def test_keys_that_do_not_begin_or_end_at_rest_are_reached_without_a_jump(play) -> None:
+    played = play(keyframe("FACS", "12.BOTH", "0 1\n2 1"))
+    course = [played.aus(t / 100).get("12L", 0) for t in range(201)]
+    assert course[0] == course[-1] == 0
+    assert max(abs(b - a) for a, b in pairwise(course)) < 0.1
+    assert course[20:180] == [1] * 160
+
+
+@pytest.mark.parametrize(
+    ("element", "says"),
+    [
+        (keyframe("MORPH", "smile", "0 0\n1 1"), "wanted FAPS or FACS"),
+        ('<bmlt:facekeyframe id="k"/>', "wanted FAPS or FACS"),
+        ('<bmlt:facekeyframe id="k" type="FAPS"/>', "FaceInterpolator"),
+        (keyframe("FAPS", "31 99", KEYS), "FAP numbers 3..68 such as"),
+        (keyframe("FAPS", "1 31", KEYS), "got '1'"),
+        (keyframe("FAPS", "31.BOTH", "0 0\n1 1"), "got '31.BOTH'"),
+        (keyframe("FACS", "3", "0 0\n1 1"), "action units such as"),
+        (keyframe("FACS", "12.UP", "0 0\n1 1"), "got '12.UP'"),
+        (keyframe("FACS", "12 12.BOTH", KEYS), "got '12.BOTH' twice"),
+        (
+            keyframe("FAPS", "31 5", "\n0 0 0\n\n1 100\n"),
+            "line 4 of the keys: wanted a time and 2 values, got '1 100'",
+        ),
+        (
+            keyframe("FAPS", "31", "0 0\n1 nan\n"),
+            "line 2 of the keys: wanted a time and 1 value, got '1 nan'",
+        ),
+        (keyframe("FAPS", "31", "0 0\n1 1e9\n"), "line 2 of the keys: wanted numbers within a million"),
+        (keyframe("FAPS", "31", "0 0\n1 5\n1 7\n"), "line 3 of the keys: wanted a time after 1, got 1"),
+        (keyframe("FACS", "12", "0 0\n1 100\n"), "line 2 of the keys: wanted action units 0..1, got '1 100'"),
+        (keyframe("FAPS", "31", "0 5"), "wanted at least two lines, got 1"),
+        (keyframe("FAPS", "31", ""), "wanted at least two lines, got 0"),
+    ],
+)
+def test_what_is_no_animation_is_dropped_and_the_rest_plays(play, element: str, says: str) -> None:
+    played = play(element + '<head id="h" lexeme="NOD"/>')
+    assert played.warnings == [("b:k", "CANNOT_CREATE_BEHAVIOR")]
+    assert says in played.told
+    assert played.times("h")
+
+
+def test_a_fap_beyond_its_range_is_said_and_limited(play) -> None:
+    played = play(keyframe("FAPS", "19", "0 0\n1 3000\n2 0"))
+    assert played.warnings == [("b:k", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
+    assert played.fap(19, 1.0) == 1080

@@ -1,0 +1,123 @@
+"""Names in documents lead into the media folder, and nowhere else."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.behaviours import media as files
+from realizer.behaviours.kind import World
+from realizer.behaviours.media import MediaError, faults, load, media_file
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("hello.wav", "hello.wav"),
+        (" hello.wav ", "hello.wav"),
+        ("./hello.wav", "hello.wav"),
+        ("sounds/bell.wav", "sounds/bell.wav"),
+        ("sounds\\bell.wav", "sounds/bell.wav"),
+        ("C:\\projects\\demo\\sounds\\bell.wav", "sounds/bell.wav"),
+        ("file:///C:/projects/demo/sounds/bell.wav", "sounds/bell.wav"),
+        ("file:hello.wav", "hello.wav"),
+        ("file:///home/somebody/hello%2Ewav", "hello.wav"),
+    ],
+)
+def test_a_name_is_found_in_the_folder(media: Path, name: str, found: str) -> None:
+    assert media_file(name, World(media=media)) == (media / found).resolve()
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("/etc/passwd", "relative to the media folder"),
+        ("../secret.wav", 'without ".."'),
+        ("sounds/../../secret.wav", 'without ".."'),
+        ("..\\secret.wav", 'without ".."'),
+        ("file:///a/../../secret.wav", 'without ".."'),
+        ("file:///a/%2e%2e/secret.wav", 'without ".."'),
+        ("http://example.org/x.wav", "got an address"),
+        ("out.wav", "a link that leads out"),
+        ("away/secret.wav", "a link that leads out"),
+        ("sounds", "wanted a file of the media folder"),
+        (".", "wanted the name of a file"),
+        ("helo.wav", 'did you mean "hello.wav"?'),
+        ("sounds/BELL.WAV", 'did you mean "sounds/bell.wav"?'),
+        ("nothing.like.it", "wanted a file of the media folder"),
+        ("a\0b.wav", "wanted a file of the media folder"),
+        ("x" * 5000, "wanted a file of the media folder"),
+        ("circle/x.wav", "wanted a file of the media folder"),
+    ],
+)
+def test_a_name_that_leads_elsewhere_is_refused_in_words(media: Path, name: str, says: str) -> None:
+    secret = media.parent / "secret.wav"
+    secret.write_bytes(b"secret")
+    (media / "out.wav").symlink_to(secret)
+    (media / "away").symlink_to(media.parent)
+    (media / "circle").symlink_to(media / "circle")
+    with pytest.raises(MediaError) as error:
+        media_file(name, World(media=media))
+    assert says in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+@given(st.text(st.sampled_from("ab./\\:%2eE~") | st.characters(exclude_categories=["Cs"]), max_size=30))
+def test_no_name_at_all_leads_out(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
+    folder = tmp_path_factory.getbasetemp() / "media"
+    folder.mkdir(exist_ok=True)
+    (folder / "a").write_bytes(b"inside")
+    (folder.parent / "b").write_bytes(b"outside")
+    try:
+        path = media_file(name, World(media=folder))
+    except MediaError:
+        return
+    assert path.is_relative_to(folder.resolve())
+
+
+def test_a_link_inside_the_folder_is_followed(media: Path) -> None:
+    (media / "same.wav").symlink_to("sounds/bell.wav")
+    assert media_file("same.wav", World(media=media)) == (media / "sounds/bell.wav").resolve()
+
+
+def test_without_a_folder_the_fault_says_how_to_name_one(play) -> None:
+    played = play('<bmlt:audiofile id="a" fileName="hello.wav"/><own:fapFile id="f" fileName="smile.fap"/>')
+    assert played.warnings == [("b:a", "CANNOT_CREATE_BEHAVIOR"), ("b:f", "CANNOT_CREATE_BEHAVIOR")]
+    assert all("--media DIR" in warning.text for warning in played.realization.warnings)
+
+
+def test_a_file_that_is_too_large_is_not_read(media: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with (media / "large.wav").open("wb") as file:
+        file.truncate(files.MOST_BYTES + 1)  # sparse: it takes no place
+
+    def read(content: bytes) -> bytes:
+        raise AssertionError("it was read")
+
+    (fault,) = faults("large.wav", World(media=media), read)
+    assert fault.fatal
+    assert "wanted at most 64 MiB" in fault.text
+
+
+def test_a_file_is_read_once_and_again_when_it_has_changed(media: Path) -> None:
+    world, reads = World(media=media), []
+
+    def read(content: bytes) -> int:
+        reads.append(len(content))
+        return len(content)
+
+    (media / "x").write_bytes(b"1")
+    assert faults("x", world, read) == ()
+    assert [load("x", world, read) for _ in range(3)] == [1, 1, 1]
+    assert reads == [1]
+    (media / "x").write_bytes(b"12")
+    os.utime(media / "x", ns=(1, 1))
+    assert faults("x", world, read) == ()
+    assert load("x", world, read) == 2
+    # What plays goes on where the file vanishes; a new behaviour finds it gone.
+    (media / "x").unlink()
+    assert load("x", world, read) == 2
+    assert faults("x", world, read)
