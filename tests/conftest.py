@@ -19,3 +19,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden anew, then review the diff"
     )
+    parser.addoption("--documents", type=int, help="how many random documents test_grammar plays")
+    parser.addoption("--mutants", type=int, default=10_000, help="how many broken documents test_fuzz reads")
+    parser.addoption("--seed", type=int, default=0, help="of the mutants of test_fuzz")

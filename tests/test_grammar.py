@@ -1,0 +1,191 @@
+"""Random valid documents, written as text: all parse, schedule and play to their end, well told of."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from bml_schema import (
+    VOCABULARY,
+    Block,
+    BlockProgress,
+    Feedback,
+    Interrupt,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+    read,
+    write,
+)
+from realizer.animation.fap import to_fap
+from realizer.pipeline import speak
+from realizer.player import Player
+from realizer.scheduling.timing import Schedule
+from realizer.speech import SilentVoice
+from tests.grammar import KINDS, texts
+
+DOCUMENTS = 2000
+LATEST = 600.0  # s; no document of the grammar takes so long
+APART = 0.3  # s between the documents of a text
+
+
+def test_random_valid_documents_play_to_their_end_and_are_well_told_of(pytestconfig: pytest.Config) -> None:
+    wanted = pytestconfig.getoption("documents") or max(DOCUMENTS, 10 * settings().max_examples)
+
+    @settings(max_examples=wanted, suppress_health_check=list(HealthCheck))
+    @given(texts())
+    def holds(text: str) -> None:
+        plays(text)
+
+    holds()
+
+
+def test_the_grammar_writes_every_behaviour_there_is() -> None:
+    assert KINDS.keys() == {tag.rpartition("}")[2] for tag in VOCABULARY}
+
+
+SOUND = """<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" start="n:end" duration="1"/>
+<faceLexeme id="x" lexeme="NOPE"/></bml>"""
+
+
+def feedback_of(text: str) -> tuple[Block, Schedule, list[Feedback]]:
+    player = Player(idle=False)
+    (block,) = read(text)
+    assert isinstance(block, Block)
+    schedule = player.submit(block, 0.0)
+    return block, schedule, run(player, LATEST)
+
+
+def test_sound_feedback_passes() -> None:
+    well_told(*feedback_of(SOUND), calm=True)
+
+
+def test_feedback_that_lacks_a_message_or_tells_it_twice_or_too_late_is_noticed() -> None:
+    block, schedule, told = feedback_of(SOUND)
+    for n, message in enumerate(told):
+        if isinstance(message, PredictionFeedback):
+            continue  # there may be several, whenever the plan changes
+        rest = told[:n] + told[n + 1 :]
+        last = n + 1 == len(told)
+        for wrong in (rest, [*rest, message, message], [message, *rest] if last else [*rest, message]):
+            with pytest.raises(AssertionError):
+                well_told(block, schedule, wrong, calm=True)
+
+
+def plays(text: str) -> None:
+    """Read, submit, play to the end; all that must hold of any valid text."""
+    player = Player(idle=False)
+    blocks: list[Block] = []
+    schedules: list[Schedule] = []
+    told: list[Feedback] = []
+    now = 0.0
+    for item in read(text, VOCABULARY):
+        assert isinstance(item, Block), item
+        assert item.problems == (), item.problems
+        assert list(read(write(item), VOCABULARY)) == [item], "written back, it means the same"
+        told += run(player, now)
+        blocks.append(item)
+        schedules.append(player.submit(item, now, speak(player.wants(item), SilentVoice())))
+        now += APART
+    assert blocks
+    faces(player)
+    told += run(player, LATEST)
+    calm = not any(map(ends_or_withholds, blocks))
+    for block, schedule in zip(blocks, schedules, strict=True):
+        well_told(block, schedule, told, calm)
+    progress = [f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)]
+    assert progress == sorted(progress)
+
+
+def ends_or_withholds(block: Block) -> bool:
+    """It may end blocks before their time, or not start on its own."""
+    interrupts = block.interrupt or any(isinstance(node, Interrupt) for node in block.behaviours)
+    return bool(interrupts) or block.composition == "REPLACE" or block.preplan
+
+
+def run(player: Player, until: float) -> list[Feedback]:
+    """Everything that comes due up to `until`, asked for at each deadline."""
+    told: list[Feedback] = []
+    for _ in range(10_000):
+        deadline = player.next_deadline()
+        if deadline is None or deadline > until:
+            return told
+        told += player.due(max(deadline, 0.0))
+    raise AssertionError("it goes on for ever")
+
+
+def faces(player: Player) -> None:
+    """At a few instants every face is one that can be shown."""
+    times = np.linspace(0, max(player.end, 0.1), 4)
+    for character in range(len(player.characters)):
+        frames = player.frames(times, character)
+        assert np.isfinite(frames.values).all()
+        assert frames.aus.min() >= 0
+        assert frames.aus.max() <= 1
+        assert np.isfinite(to_fap(frames).values).all()
+
+
+def well_told(block: Block, schedule: Schedule, told: list[Feedback], calm: bool) -> None:
+    """The feedback of one block: what is there, once, in order.
+
+    Args:
+        calm: nothing in the text ends or withholds blocks before their time.
+    """
+    own = [f for f in told if block.id in ids(f)]
+    starts = [n for n, f in enumerate(own) if isinstance(f, BlockProgress) and f.id == f"{block.id}:start"]
+    ends = [n for n, f in enumerate(own) if isinstance(f, BlockProgress) and f.id == f"{block.id}:end"]
+    points = [(n, f) for n, f in enumerate(own) if isinstance(f, SyncPointProgress)]
+    warnings = Counter(f.id for f in own if isinstance(f, WarningFeedback))
+    if schedule.failed:
+        assert warnings[block.id] == 1
+        assert not starts
+        assert not points
+        return
+    predictions = [n for n, f in enumerate(own) if isinstance(f, PredictionFeedback)]
+    assert predictions, "a block is acknowledged by a prediction"
+    assert len(starts) <= 1
+    assert len(ends) <= 1
+    end = own[ends[0]] if ends else None
+    done = isinstance(end, BlockProgress) and end.status == "DONE"
+    if calm:
+        assert done or warnings[block.id] == 1, "a block is played to its end, or says why not"
+    if not starts:
+        assert not points
+        return
+    (start,) = starts
+    first = own[start]
+    assert isinstance(first, BlockProgress)
+    assert predictions[0] < start
+    assert all(n > start for n, _ in points)
+    assert all(n < ends[0] for n, _ in points for _ in ends)
+    assert len({f.id for _, f in points}) == len(points), "each once"
+    times = [f.time for _, f in points]
+    assert times == sorted(times)
+    for _, f in points:
+        assert math.isclose(f.global_time, first.global_time + f.time, abs_tol=1e-6)
+    order = {f"{block.id}:{b}:{p}": n for b, names in schedule.points.items() for n, p in enumerate(names)}
+    per: dict[str, list[int]] = {}
+    for _, f in points:
+        per.setdefault(f.id.split(":")[1], []).append(order[f.id])
+    for behaviour, told_points in per.items():
+        assert told_points == sorted(told_points)
+        if calm and done:
+            assert told_points == list(range(len(schedule.points[behaviour])))
+    dropped = {node.id for node in block.behaviours} - schedule.times.keys()
+    for behaviour in dropped:
+        assert warnings[f"{block.id}:{behaviour}"] == 1, f"{behaviour} is dropped with one warning"
+    if calm and done:
+        assert per.keys() == schedule.times.keys()
+    last = ends[0] if ends else len(own)
+    assert all(n < last for n, f in enumerate(own) if isinstance(f, WarningFeedback))
+
+
+def ids(feedback: Feedback) -> set[str]:
+    """Ids of the blocks that a message speaks of."""
+    if isinstance(feedback, PredictionFeedback):
+        return {block.id for block in feedback.blocks}
+    return {feedback.id.split(":")[0]}
