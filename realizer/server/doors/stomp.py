@@ -7,7 +7,7 @@ import contextlib
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -165,10 +165,11 @@ class StompDoor:
                 settings.stomp_password,
             )
             await link.settled.wait()
-        if not link.connected:
+            if link.connected:
+                await self._call(link.subscribe, [seat.dialect.topic for seat in self._seats])
+                await link.reading.wait()
+        if not link.connected or link.lost.is_set():
             raise RealizerError(link.fault or "it closes the connection")
-        for number, seat in enumerate(self._seats):
-            await self._call(link.subscribe, seat.dialect.topic, number)
         self._link = link
         for seat in self._seats:
             for message in reversed(seat.dialect.hello()):
@@ -263,6 +264,7 @@ class _Link:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[_Link, int, bytes], None]) -> None:
         self.settled = asyncio.Event()  # connected, or not
+        self.reading = asyncio.Event()  # all topics are subscribed to; or lost
         self.lost = asyncio.Event()
         self.connected = False
         self.fault = ""
@@ -298,8 +300,11 @@ class _Link:
         except StompException as error:
             raise RealizerError(str(error) or "nobody answers") from None
 
-    def subscribe(self, topic: str, number: int) -> None:
-        self._guarded(self._stomp.subscribe, topic, id=str(number))
+    def subscribe(self, topics: Sequence[str]) -> None:
+        for number, topic in enumerate(topics):
+            # The broker takes one after the other: its word on the last one is enough.
+            receipt = {"receipt": "reading"} if number == len(topics) - 1 else {}
+            self._guarded(self._stomp.subscribe, topic, id=str(number), headers=receipt)
 
     def send(self, message: Message) -> None:
         self._guarded(self._stomp.send, message.topic, message.body, headers=dict(message.headers))
@@ -329,6 +334,10 @@ class _Link:
     def on_connected(self, frame: Any) -> None:
         self._in_loop(self._settle, True, "")
 
+    def on_receipt(self, frame: Any) -> None:
+        if frame.headers.get("receipt-id") == "reading":
+            self._in_loop(self.reading.set)
+
     def on_error(self, frame: Any) -> None:
         said = frame.headers.get("message", "") or bytes(frame.body or b"").decode("utf-8", "replace")
         self._in_loop(self._settle, False, " ".join(said.split())[:200])
@@ -336,6 +345,7 @@ class _Link:
     def on_disconnected(self) -> None:
         self._in_loop(self._settle, False, "")
         self._in_loop(self.lost.set)
+        self._in_loop(self.reading.set)
 
     def on_message(self, frame: Any) -> None:
         self._ahead.acquire()
