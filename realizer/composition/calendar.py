@@ -15,17 +15,20 @@ class Calendar:
     """Events that have not happened."""
 
     def __init__(self) -> None:
-        self._events: list[Event] = []
+        self._events: list[tuple[Event, int]] = []
+        # Number of a block -> which of its entries count: dropping them is a new edition, not a search.
+        self._edition: dict[int, int] = {}
 
     @property
     def next(self) -> float | None:
         """When the first is due; None where there is none."""
-        return self._events[0].time if self._events else None
+        self._skip()
+        return self._events[0][0].time if self._events else None
 
     def due(self, now: float) -> Iterator[Event]:
         """Take what is due out, in order; what is put in meanwhile comes in its turn."""
-        while self._events and self._events[0].time <= now:
-            yield heapq.heappop(self._events)
+        while (first := self.next) is not None and first <= now:
+            yield heapq.heappop(self._events)[0]
 
     def put(self, playing: Playing, only: Collection[tuple[str, str]] | None = None) -> None:
         """Put in what is still to happen in a block; of its sync points all, or `only` (behaviour, sync)."""
@@ -37,12 +40,31 @@ class Calendar:
         if playing.state is not State.SUBSIDING and playing.subsides < playing.end:
             due.append(Event(playing.subsides, number, Phase.SUBSIDES))
         due.append(Event(playing.end, number, Phase.END))
+        edition = self._edition.setdefault(number, 0)
         for event in due:
-            heapq.heappush(self._events, event)
+            heapq.heappush(self._events, (event, edition))
 
-    def take(self, playing: Playing) -> list[Event]:
+    def pending(self, playing: Playing) -> set[tuple[str, str]]:
+        """The sync points of a block that have not passed, as (behaviour, sync)."""
+        return {
+            (event.name, event.sync)
+            for event, edition in self._events
+            if event.block == playing.number and edition == self._edition[event.block] and event.name
+        }
+
+    def drop(self, playing: Playing) -> None:
         """Take out all that is still to happen in a block."""
-        gone = [e for e in self._events if e.block == playing.number]
-        self._events = [e for e in self._events if e.block != playing.number]
+        if playing.number in self._edition:
+            self._edition[playing.number] += 1
+
+    def forget(self, playing: Playing) -> None:
+        """Nothing will happen in a block any more."""
+        self.drop(playing)
+        self._events = [entry for entry in self._events if entry[0].block != playing.number]
         heapq.heapify(self._events)
-        return gone
+        self._edition.pop(playing.number, None)
+
+    def _skip(self) -> None:
+        """Take what was dropped off the top."""
+        while self._events and self._events[0][1] != self._edition[self._events[0][0].block]:
+            heapq.heappop(self._events)

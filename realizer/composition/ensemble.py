@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from bml_schema import Block, Feedback, SyncRef, WarningFeedback
+from bml_schema import Block, Feedback, WarningFeedback
 from realizer.behaviours.kind import Act, Kind, World
+from realizer.composition import relations
 from realizer.composition.acts import ActFault, perform
 from realizer.composition.calendar import Calendar
 from realizer.composition.character import Character
-from realizer.composition.claims import Claim
 from realizer.composition.expected import Expected
 from realizer.composition.playing import Playing, Wait
 from realizer.composition.references import references
@@ -23,7 +24,7 @@ from realizer.composition.reporting import (
     progress,
     sync_progress,
 )
-from realizer.planning import plan
+from realizer.planning import Plan, plan
 from realizer.scheduling.timing import Schedule, Warning
 
 __all__ = ["Ensemble"]
@@ -49,6 +50,7 @@ class Ensemble:
         self.characters = characters
         self.revision = 0
         self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
+        self._alive: dict[str, Playing] = {}  # by id; those that are not done
         self._past: dict[str, Schedule] = {}
         self._expected = Expected()
         self._outbox: list[Feedback] = []
@@ -64,7 +66,7 @@ class Ensemble:
 
     def alive(self) -> list[Playing]:
         """The blocks that play or wait, in order of acceptance."""
-        return [p for p in self._playing.values() if not p.done]
+        return list(self._alive.values())
 
     # blocks in ----------------------------------------------------------------------------------
 
@@ -85,48 +87,38 @@ class Ensemble:
         """Plan a block and take it in, or refuse it."""
         self.advance(now)
         self.announce(block, character, now)
-        waits = self._waits(block, character)
+        try:
+            if self._in_use(block):
+                text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
+                raise _Refused(Warning(block.id, "PARSING_FAILURE", text))
+            waits, behind = self._links(block, character)
+        except _Refused as refused:
+            self._expected.arrive(block)
+            return self._refuse(block, refused.warning, now)
         fate = self._expected.arrive(block)
         if fate.revoked:
             return Schedule(block.id, {}, {}, start=now, failed=True)
-        if self._in_use(block):
-            text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
-            return self._refused(block, Warning(block.id, "PARSING_FAILURE", text), now)
-        followers = self._followers(block)
-        if isinstance(followers, Warning):
-            return self._refused(block, followers, now)
-        if any(w.block is f or w.block.awaits(f) for w in waits for f, _ in followers):
-            text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
-            return self._refused(block, Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text), now)
-        ended = self._ended_by(block, character)
+        ended = relations.ended(block, character, self.alive())
         # While it is not known when it starts, it is planned as if that were now.
         start = max([now, *(w.until for w in waits if w.until < FOREVER)])
-        planned = plan(
-            block,
-            self.kinds,
-            world,
-            start=start,
-            outside=lambda ref: self._outside(ref, start),
-            held=self._held(character, without=ended),
-        )
+        planned = self._plan(block, character, world, start, without=ended)
         if planned.schedule.failed:
-            return self._refused(block, planned.schedule.warnings[0], now)
+            return self._refuse(block, planned.schedule.warnings[0], now)
         for earlier in ended:
             self.stop(earlier, now)
-        for id in block.interrupt:
-            self.revoke(id, now)
+        for name in block.interrupt:
+            self.revoke(name, now)
         state = State.PENDING if block.preplan and not fate.activated else State.LURKING
         playing = Playing(planned, self.kinds, world, character, self._number, now, waits, state)
         playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
-        self._playing[self._number] = playing
+        self._playing[self._number] = self._alive[block.id] = playing
         self._number += 1
         self._set_out(playing)
-        for follower, wait in followers:
-            follower.waits.append(Wait(playing, wait))
-        for ids, subsiding in _before(block):
-            for id in ids:
-                if (coming := self._expected.fate(id)) is not None:
-                    coming.waits.append(Wait(playing, subsiding))
+        for follower, subsiding in behind:
+            follower.await_too(Wait(playing, subsiding))
+        for name, subsiding in relations.followers(block):
+            if (coming := self._expected.fate(name)) is not None:
+                coming.waits.append(Wait(playing, subsiding))
         self._predict(playing, now)
         for warning in planned.schedule.warnings:
             self._warn(block, warning)
@@ -162,6 +154,7 @@ class Ensemble:
         for playing in gone:
             self._past[playing.block.id] = playing.schedule
             del self._playing[playing.number]
+            self._calendar.forget(playing)
         while len(self._past) > PAST:
             del self._past[next(iter(self._past))]
         return bool(gone)
@@ -171,6 +164,7 @@ class Ensemble:
         match event.phase:
             case Phase.START:
                 playing.state = State.IN_EXEC
+                playing.waits.clear()
                 self.tell(progress(block, "start", time, playing.state))
                 self.tell(prediction(block, playing.schedule, playing.state))
                 for id in block.on_start:
@@ -188,6 +182,7 @@ class Ensemble:
                 self.tell(prediction(block, playing.schedule, playing.state))
             case Phase.END:
                 playing.state = State.DONE
+                del self._alive[block.id]
                 self.tell(progress(block, "end", time, playing.state))
 
     def _act(self, playing: Playing, behaviour: str, act: Act, now: float) -> None:
@@ -207,7 +202,7 @@ class Ensemble:
 
     def find(self, id: str) -> Playing | None:
         """The block of this id that plays or waits."""
-        return next((p for p in self.alive() if p.block.id == id), None)
+        return self._alive.get(id)
 
     def known(self, id: str) -> bool:
         """Whether there is or was such a block."""
@@ -234,18 +229,20 @@ class Ensemble:
 
     def stop(self, playing: Playing, now: float) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
-        self._calendar.take(playing)
+        self._calendar.drop(playing)
         state = State.INTERRUPTED if playing.begun else State.REVOKED
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         playing.cut(list(playing.schedule.times), now, ends=True)
         playing.stopped, playing.state = now, state
+        del self._alive[playing.block.id]
         self.tell(progress(playing.block, "end", now, state))
         self.changed()
         self._moved(playing, now)
 
     def cut(self, playing: Playing, behaviours: Collection[str], now: float) -> None:
         """End some behaviours of a block; the block ends with the last of the others."""
-        pending = {(e.name, e.sync) for e in self._calendar.take(playing)}
+        pending = self._calendar.pending(playing)
+        self._calendar.drop(playing)
         self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
         playing.cut(behaviours, now)
         self._calendar.put(playing, pending)
@@ -265,83 +262,61 @@ class Ensemble:
         if playing.state is not State.PENDING:
             return False
         playing.state, playing.floor = State.LURKING, now
-        self._move(playing, now)
+        if self._move(playing, now):
+            self._moved(playing, now)
         return True
 
     # starts -------------------------------------------------------------------------------------
 
+    def _links(self, block: Block, character: int) -> tuple[list[Wait], list[tuple[Playing, bool]]]:
+        """What a block waits for, and the blocks that are to wait for it.
+
+        Raises:
+            _Refused: one of those has started, or is waited for itself.
+        """
+        waits = self._waits(block, character)
+        behind: list[tuple[Playing, bool]] = []
+        for name, subsiding in relations.followers(block):
+            playing = self.find(name)
+            if playing is not None and playing.waiting:
+                behind.append((playing, subsiding))
+            elif playing is not None or name not in self._expected:
+                text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
+                raise _Refused(Warning(block.id, "TargetBlockAlreadyStartedException", text))
+        if behind and any(id(playing) in relations.before(waits) for playing, _ in behind):
+            text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
+            raise _Refused(Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
+        return waits, behind
+
     def _waits(self, block: Block, character: int) -> list[Wait]:
-        """What a block waits for: BML 1.0's APPEND, all of its character that is known now; BMLA's lists."""
-        alive = self.alive()
-        waits = [
-            Wait(p)
-            for p in alive
-            if p.block.id in block.append_after
-            or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
-        ]
-        waits += [Wait(p, subsiding=True) for p in alive if p.block.id in block.chunk_after]
         fate = self._expected.fate(block.id)
-        return waits + [w for w in (fate.waits if fate else ()) if not w.block.done]
-
-    def _followers(self, block: Block) -> list[tuple[Playing, bool]] | Warning:
-        """The blocks that are to wait for this one, and whether only for its subsiding."""
-        found: list[tuple[Playing, bool]] = []
-        for ids, subsiding in _before(block):
-            for id in ids:
-                playing = self.find(id)
-                if playing is not None and playing.waiting:
-                    found.append((playing, subsiding))
-                elif playing is not None or id not in self._expected:
-                    text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {id!r}"
-                    return Warning(block.id, "TargetBlockAlreadyStartedException", text)
-        return found
-
-    def _ended_by(self, block: Block, character: int) -> list[Playing]:
-        """The blocks that this one ends when it is taken in."""
-        replaced = block.composition == "REPLACE"
-        return [
-            p
-            for p in self.alive()
-            if p.block.id in block.interrupt or (replaced and p.character == character)
-        ]
-
-    def _held(self, character: int, without: Iterable[Playing] = ()) -> list[Claim]:
-        gone = {id(p) for p in without}
-        return [
-            claim
-            for p in self.alive()
-            if p.character == character and p.start < FOREVER and id(p) not in gone
-            for claim in p.plan.claims
-        ]
+        ahead = [w for w in fate.waits if not w.block.done] if fate is not None else []
+        return relations.awaited(block, character, self.alive()) + ahead
 
     def _moved(self, playing: Playing, now: float) -> None:
-        """A block's times have changed: those that wait for it may start at another time."""
-        for other in self.alive():
-            if other.waiting and any(wait.block is playing for wait in other.waits):
-                self._move(other, now)
+        """A block's times have changed: those that wait for it, and for them, may start at another time."""
+        moved = deque([playing])
+        while moved:
+            for other in list(moved.popleft().followers):
+                if other.waiting and self._move(other, now):
+                    moved.append(other)
 
-    def _move(self, playing: Playing, now: float) -> None:
-        """Let a waiting block start when it now may."""
+    def _move(self, playing: Playing, now: float) -> bool:
+        """Let a waiting block start when it now may; False where that is when it was to."""
         start = playing.earliest
         if start == playing.start:
-            return
-        self._calendar.take(playing)
+            return False
+        self._calendar.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         planned = playing.plan
-        if start < FOREVER and (playing.start == FOREVER or _refers_outside(playing.block)):
+        refers = any(ref.block is not None for ref in references(playing.block))
+        if start < FOREVER and (playing.start == FOREVER or refers):
             # Its claims were never compared, or its references have other times from the new start.
-            planned = plan(
-                playing.block,
-                self.kinds,
-                playing.world,
-                start=start,
-                outside=lambda ref: self._outside(ref, start),
-                held=self._held(playing.character, without=[playing]),
-            )
+            planned = self._plan(playing.block, playing.character, playing.world, start, without=[playing])
             if planned.schedule.failed:
                 self._warn(playing.block, planned.schedule.warnings[0])
                 self.stop(playing, now)
-                return
+                return False
             told = {w.id for w in playing.schedule.warnings}
             for warning in planned.schedule.warnings:
                 if warning.id not in told:
@@ -349,24 +324,25 @@ class Ensemble:
         playing.lay(planned, start)
         self._set_out(playing)
         self._predict(playing, now)
-        self._moved(playing, now)
+        return True
 
-    def _outside(self, ref: SyncRef, start: float) -> float | None:
-        """Seconds from `start` of a sync point of another block; None where it is not known."""
-        newest = reversed(self._playing.values())
-        schedule = next((p.schedule for p in newest if p.block.id == ref.block), None)
-        schedule = schedule or self._past.get(ref.block or "")
-        if schedule is None or schedule.start == FOREVER:
-            return None
-        if ref.behaviour == "bml":
-            time = {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
-        else:
-            sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
-            try:
-                time = schedule.at(ref.behaviour or "", sync or "")
-            except KeyError:
-                time = None
-        return None if time is None else schedule.start + time + ref.offset - start
+    def _plan(
+        self, block: Block, character: int, world: World, start: float, without: Collection[Playing]
+    ) -> Plan:
+        """The plan of a block beside those that are alive, `without` some of them."""
+        return plan(
+            block,
+            self.kinds,
+            world,
+            start=start,
+            outside=relations.instants(self._schedule_of, start),
+            held=relations.held(character, self.alive(), without),
+        )
+
+    def _schedule_of(self, id: str) -> Schedule | None:
+        """Of the newest block of an id."""
+        newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
+        return self._past.get(id) if newest is None else newest.schedule
 
     # events and feedback ------------------------------------------------------------------------
 
@@ -407,15 +383,14 @@ class Ensemble:
             )
         )
 
-    def _refused(self, block: Block, warning: Warning, now: float) -> Schedule:
+    def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
         self._warn(block, warning)
         return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
 
 
-def _before(block: Block) -> tuple[tuple[tuple[str, ...], bool], ...]:
-    """The blocks that are to follow this one: when it is done, and when it subsides."""
-    return (block.prepend_before, False), (block.chunk_before, True)
+class _Refused(Exception):
+    """A block cannot be taken in, and why."""
 
-
-def _refers_outside(block: Block) -> bool:
-    return any(ref.block is not None for ref in references(block))
+    def __init__(self, warning: Warning) -> None:
+        super().__init__(warning.text)
+        self.warning = warning

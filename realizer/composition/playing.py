@@ -56,7 +56,8 @@ class Playing:
         character: whose face it moves.
         number: order of acceptance.
         floor: it does not start sooner, seconds on the session clock.
-        waits: nor before these.
+        waits: nor before these; empty once it has started.
+        followers: the blocks that wait for it.
         stopped: when it was cut off.
         first: its schedule as it was when the block was accepted.
         channels, shifts, speech: by behaviour, on the session clock; empty while the start is not known.
@@ -74,10 +75,13 @@ class Playing:
     channels: dict[str, tuple[Channel, ...]] = field(default_factory=dict)
     shifts: dict[str, Shift] = field(default_factory=dict)
     speech: dict[str, Speaking] = field(default_factory=dict)
+    followers: list[Playing] = field(default_factory=list)
     first: Schedule = field(init=False)
 
     def __post_init__(self) -> None:
         self.first = self.plan.schedule
+        for wait in self.waits:
+            wait.block.followers.append(self)
 
     @property
     def block(self) -> Block:
@@ -132,9 +136,10 @@ class Playing:
             return float("inf")
         return max([self.floor, *(wait.until for wait in self.waits)])
 
-    def awaits(self, other: Playing) -> bool:
-        """Whether it cannot start before another one, by any chain of waits."""
-        return any(wait.block is other or wait.block.awaits(other) for wait in self.waits)
+    def await_too(self, wait: Wait) -> None:
+        """Wait for one more block."""
+        self.waits.append(wait)
+        wait.block.followers.append(self)
 
     def lay(self, plan: Plan, start: float) -> None:
         """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""

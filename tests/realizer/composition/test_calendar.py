@@ -43,17 +43,34 @@ def test_what_is_put_in_while_events_happen_comes_in_its_turn() -> None:
     assert (0.25, 1) in seen
 
 
-def test_a_block_taken_out_gives_what_had_not_happened() -> None:
+def test_of_a_block_that_is_dropped_nothing_more_comes_and_the_others_go_on() -> None:
     calendar = Calendar()
     first, second = playing(0, 0.0), playing(1, 0.0)
     calendar.put(first)
     calendar.put(second)
     list(calendar.due(1.0))
-    assert sorted({(e.name, e.sync) for e in calendar.take(first) if e.name}) == [
-        ("s", "end"),
-        ("s", "relax"),
-    ]
+    assert calendar.pending(first) == {("s", "relax"), ("s", "end")}
+    calendar.drop(first)
+    assert calendar.pending(first) == set()
     assert {e.block for e in calendar.due(10.0)} == {1}
+    assert calendar.next is None
+
+
+def test_a_block_that_is_put_in_again_comes_once() -> None:
+    calendar = Calendar()
+    block = playing(0, 0.0)
+    calendar.put(block)
+    calendar.drop(block)
+    calendar.put(block)
+    assert [e.phase for e in calendar.due(10.0)].count(Phase.END) == 1
+
+
+def test_a_block_that_is_forgotten_leaves_nothing() -> None:
+    calendar = Calendar()
+    block = playing(0, 0.0)
+    calendar.put(block)
+    calendar.forget(block)
+    assert calendar.next is None
 
 
 def test_a_block_that_plays_does_not_start_or_subside_again() -> None:

@@ -340,3 +340,13 @@ def test_an_id_in_use_is_refused(stage: Stage) -> None:
     assert stage.send("a", smile(), at=1.0).failed
     stage.send("a", smile(), at=2.0)
     assert stage.progress().count("a:end DONE 4") == 1
+
+
+def test_a_thousand_appended_blocks_follow_one_another_and_move_together(stage: Stage) -> None:
+    for n in range(1000):
+        stage.send(f"b{n}", wait(1), composition="APPEND")
+    stage.player.stop(0.5, ["b0"])
+    stage.until(0.5)
+    ends = [line for line in stage.progress() if ":end" in line]
+    assert ends[:2] == ["b0:end INTERRUPTED 0.5", "b1:end DONE 1.5"]
+    assert ends[-1] == "b999:end DONE 999.5"

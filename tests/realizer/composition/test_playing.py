@@ -81,10 +81,10 @@ def test_gains_go_to_what_is_shown_and_volume_to_what_sounds() -> None:
     assert not made.speech
 
 
-def test_a_block_awaits_by_any_chain() -> None:
-    first, second, third = playing(), playing(), playing()
-    second.waits.append(Wait(first))
-    third.waits.append(Wait(second, subsiding=True))
-    assert third.awaits(first)
-    assert not first.awaits(third)
-    assert (second.earliest, third.earliest) == (13.0, 12.0)
+def test_a_block_starts_when_all_that_it_waits_for_is_over() -> None:
+    first, second = playing(), playing()
+    second.await_too(Wait(first, subsiding=True))
+    assert second.earliest == 12.0
+    second.await_too(Wait(first))
+    assert second.earliest == 13.0
+    assert first.followers == [second, second]
