@@ -6,8 +6,10 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from realizer.animation.fap_clip import FAPClip
 from realizer.arrays import Bool
@@ -19,6 +21,7 @@ __all__ = ["read_fap"]
 FPS = 25.0  # where there is no header: the rate of Xface and Greta
 COLUMNS = (68, 69)  # Greta writes a null FAP 0 first
 WIDTHS = {1: (4, 1), 2: (6, 1)}  # numbers a compound FAP takes; Greta and Xface write one
+COMPOUND = {1: 69, 2: 73}  # the columns of their numbers, behind those of FAP 0 to 68
 INT32 = 2**31 - 1
 # Frame numbers may be absolute on a sender's clock, but a clip this sparse is damaged, not long.
 SPARSEST = 50
@@ -28,7 +31,8 @@ SPARSEST = 50
 class _Frame:
     number: int
     line: int
-    groups: dict[int, list[int]]
+    layout: _Layout
+    numbers: list[int]
 
 
 @dataclass
@@ -124,25 +128,45 @@ def _pairs(lines: list[Line]) -> Iterator[tuple[Line, Line]]:
 
 
 def _frame(mask: Line, values: Line, notes: _Notes) -> _Frame:
-    columns = mask[1]
-    first = 1
-    if len(columns) == 69:
+    if len(mask[1]) == 69:
         notes.add("the mask has 69 columns; the first is taken as a null FAP 0", mask[0])
-        first = 0
-    used = [fap for fap, bit in enumerate(columns, first) if _bit(bit)]
     line, words = values
-    number, numbers = _integer(words[0], notes, line), [_integer(w, notes, line) for w in words[1:]]
-    widths = _widths(used, len(numbers))
+    number, *numbers = _integers(words, notes, line)
+    layout = _layout(tuple(mask[1]), len(numbers))
+    if layout.says:
+        notes.add(layout.says, line)
+    return _Frame(number, line, layout, numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """Where the numbers of a frame go.
+
+    Attributes:
+        used: the FAPs that the mask gives.
+        columns: of each number: the FAP, behind them the four of FAP 1 and the six of FAP 2.
+        says: what is odd about it.
+    """
+
+    used: npt.NDArray[np.intp]
+    columns: npt.NDArray[np.intp]
+    says: str
+
+
+@lru_cache(maxsize=64)
+def _layout(mask: tuple[str, ...], available: int) -> _Layout:
+    """Nearly all frames of a file have one."""
+    used = [fap for fap, bit in enumerate(mask, 69 - len(mask)) if int(bit) != 0]
+    widths, says = _widths(used, available), ""
     if widths is None:
         widths = dict.fromkeys(used, 1)
-        notes.add(f"wanted {len(used)} values, got {len(numbers)}", line)
+        says = f"wanted {len(used)} values, got {available}"
     elif any(widths[fap] == 1 for fap in (1, 2) if fap in widths):
-        notes.add("a compound FAP as one number", line)
-    groups, at = {}, 0
+        says = "a compound FAP as one number"
+    columns: list[int] = []
     for fap in used:
-        groups[fap] = numbers[at : at + widths[fap]] or [0]
-        at += widths[fap]
-    return _Frame(number, line, groups)
+        columns += [fap] if fap not in COMPOUND else list(range(COMPOUND[fap], COMPOUND[fap] + widths[fap]))
+    return _Layout(np.array(used, np.intp), np.array(columns[:available], np.intp), says)
 
 
 def _widths(used: list[int], available: int) -> dict[int, int] | None:
@@ -158,25 +182,21 @@ def _widths(used: list[int], available: int) -> dict[int, int] | None:
 def _clip(name: str, fps: float, frames: list[_Frame], notes: _Notes) -> FAPClip:
     places = _places(frames, notes)
     count = max(places, default=-1) + 1
-    values = np.zeros((count, 69), np.int64)
-    compound = {1: np.zeros((count, 4), np.int32), 2: np.zeros((count, 6), np.int32)}
+    numbers = np.zeros((count, 79), np.int64)
     given = np.zeros((count, 69), bool)
     for frame, place in zip(frames, places, strict=True):
-        values[place], given[place] = 0, False
-        for fap, numbers in frame.groups.items():
-            given[place, fap] = True
-            if fap in compound:
-                compound[fap][place] = 0
-                compound[fap][place, : len(numbers)] = numbers
-            else:
-                values[place, fap] = numbers[0]
+        columns = frame.layout.columns
+        numbers[place], given[place] = 0, False
+        numbers[place, columns] = frame.numbers[: len(columns)]
+        given[place, frame.layout.used] = True
     seen = given[[*places]] if places else given
     if len(seen) and not (seen == seen[0]).all():
         notes.add("the mask varies; where a frame does not give a FAP it is neutral")
-    _note_ranges(values[:, 1:], notes)
+    values = numbers[:, 1:69]
+    _note_ranges(values, notes)
     used: Bool = np.asarray(given[:, 1:].any(axis=0))
-    integers = values[:, 1:].astype(np.int32)
-    return FAPClip(name, fps, integers, used, compound[1], compound[2], notes.sentences())
+    visemes, expressions = np.split(numbers[:, 69:].astype(np.int32), [4], axis=1)
+    return FAPClip(name, fps, values.astype(np.int32), used, visemes, expressions, notes.sentences())
 
 
 def _places(frames: list[_Frame], notes: _Notes) -> list[int]:
@@ -207,16 +227,11 @@ def _note_ranges(values: np.ndarray[tuple[int, ...], np.dtype[np.int64]], notes:
 
 
 def _is_mask(words: list[str]) -> bool:
-    return len(words) in COLUMNS and all(re.fullmatch(r"[+-]?\d+", word) for word in words) and _small(words)
-
-
-def _small(words: list[str]) -> bool:
     """Mask entries are 0 or 1 (not 0 counts as 1); a line of values has others."""
-    return sum(word not in ("0", "1") for word in words) <= 1
-
-
-def _bit(word: str) -> bool:
-    return int(word) != 0
+    if len(words) not in COLUMNS:
+        return False
+    others = [word for word in words if word not in ("0", "1")]
+    return len(others) <= 1 and all(re.fullmatch(r"[+-]?\d+", word) for word in others)
 
 
 def _number(word: str) -> float | None:
@@ -225,6 +240,16 @@ def _number(word: str) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) else None
+
+
+def _integers(words: list[str], notes: _Notes, line: int) -> list[int]:
+    try:
+        numbers = list(map(int, words))
+    except ValueError:
+        return [_integer(word, notes, line) for word in words]
+    if max(numbers) > INT32 or min(numbers) < -INT32:
+        return [max(-INT32, min(INT32, number)) for number in numbers]
+    return numbers
 
 
 def _integer(word: str, notes: _Notes, line: int) -> int:

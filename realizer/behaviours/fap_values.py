@@ -21,6 +21,7 @@ __all__ = ["KINDS"]
 
 # 1/s^2; a recording bends less than an expression with which it is tied, and more than what is said.
 RECORDED = 100.0
+MOST_BYTES = 8 * 2**20  # of text; about ten minutes, read in about a second
 
 
 def timing(node: Faps, world: World) -> Timing:
@@ -91,9 +92,13 @@ def read(content: bytes) -> FAPClip:
     """The clip of a file.
 
     Raises:
-        MediaError: fewer than two frames.
+        MediaError: fewer than two frames, or too much text.
         RealizerError: no FAP text.
     """
+    if len(content) > MOST_BYTES:
+        raise media.MediaError(
+            f"wanted at most {MOST_BYTES // 2**20} MiB of FAP text, got {len(content)} bytes"
+        )
     clip = read_fap(content)
     if len(clip.values) < 2:
         raise media.MediaError(f"wanted at least two frames, got {len(clip.values)}")

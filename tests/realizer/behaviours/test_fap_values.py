@@ -107,6 +107,7 @@ def test_compound_faps_of_a_file_are_said_to_be_left_out(play, media: Path) -> N
         ("hello", "wanted a header"),
         ("2.1 x 25 1\n" + "0 " * 68 + "\n0\n", "wanted at least two frames, got 1"),
         ("3.1 x 25 1\n", "body animation"),
+        ("#" * (8 * 2**20 + 1), "wanted at most 8 MiB of FAP text"),
     ],
 )
 def test_a_file_that_is_none_is_dropped_and_the_rest_plays(
