@@ -153,6 +153,22 @@ def test_a_document_of_a_day_says_what_is_too_much() -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_files_that_documents_name_are_found_in_the_media_folder(tmp_path: Path) -> None:
+    mask = " ".join("1" if fap == 31 else "0" for fap in range(1, 69))
+    frames = "\n".join(f"{mask}\n{k} {value}" for k, value in enumerate((0, 80, 0)))
+    (tmp_path / "brow.fap").write_text(f"2.1 brow 25 3\n{frames}\n")
+    document = '<bml id="b" xmlns:o="urn:bml-realizer:1"><o:fapFile id="f" fileName="brow.fap"/></bml>'
+    for command in (["schedule"], ["realize", "--no-idle"], ["check"]):
+        without = run(*command, "-", stdin=document)
+        assert "--media DIR" in without.stdout + without.stderr
+        there = run(*command, "-", "--media", str(tmp_path), stdin=document)
+        assert there.returncode == 0
+        assert "--media" not in there.stdout + there.stderr
+        if command[0] == "realize":
+            assert [row[30] for row in json.loads(there.stdout)["fap"]["values"]] == [0, 80, 0]
+    assert run("realize", "-", "--media", str(tmp_path / "none"), stdin=document).returncode == 2
+
+
 def test_a_port_in_use_is_said_in_a_sentence() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
+from realizer.animation.idle import Blink
 from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
 
 ONE = np.array([0.0])
@@ -116,6 +117,34 @@ def test_a_gaze_of_the_eyes_leaves_the_head_where_it_was_turned() -> None:
     turned = au(51)[0]
     look = [still(GAZE, 0.2, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
     assert value_of([still(turned, 0.4, Layer.BASE), *look], turned) == pytest.approx(0.4)
+
+
+def test_what_takes_idle_motion_leaves_what_is_asked_for() -> None:
+    motion = still(presence("motion"), 0.75, Layer.BASE)
+    face = [still(NOD, 0.4, Layer.IDLE), still(NOD, 0.2, Layer.HEAD), motion]
+    assert value_of(face, NOD) == pytest.approx(0.4 * 0.25 + 0.2)
+
+
+def blink(draw: float) -> Blink:
+    times, values = np.array([1.0, 1.1, 1.2, 1.3]), np.array([0.0, 1.0, 1.0, 0.0])
+    return Blink(au(45)[0], times, values, layer=Layer.IDLE, draw=draw)
+
+
+@pytest.mark.parametrize(("taken", "comes"), [(0.0, True), (0.25, True), (0.5, False), (1.0, False)])
+def test_a_blink_comes_whole_or_not_at_all(taken: float, comes: bool) -> None:
+    face = [blink(0.6), still(presence("blinks"), taken, Layer.BASE)]
+    assert value_of(face, au(45)[0], 1.15) == comes
+
+
+def test_a_blink_that_has_begun_ends_as_it_was_whatever_window_is_looked_at() -> None:
+    lid = au(45)[0]
+    soon = Channel(
+        presence("blinks"), np.array([1.05, 1.1]), np.array([0.0, 1.0]), layer=Layer.BASE, holds=True
+    )
+    assert value_of([blink(0.0), soon], lid, 1.15) == 1
+    # What took it when it began has gone before this window, and counts.
+    gone = still(presence("blinks"), 1.0, Layer.BASE).faded(1.02, 1.1)
+    assert value_of([blink(0.0), gone], lid, 1.15) == 0
 
 
 def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:

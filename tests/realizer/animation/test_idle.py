@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from realizer.animation.blend import blend
 from realizer.animation.channel import Layer
 from realizer.animation.fap import to_fap
-from realizer.animation.idle import idle_channels
+from realizer.animation.idle import Blink, idle_channels
 from realizer.animation.targets import au
 from realizer.arrays import Float32, Float64
 
@@ -83,6 +83,20 @@ def test_eyes_stay_on_their_point_while_the_head_sways() -> None:
     gaze = np.degrees((faps[:, 22] + faps[:, 48]) * 1e-5)
     still = np.abs(np.diff(gaze)) < 1e-3
     assert still.mean() > 0.9
+
+
+def draws(begin: float, end: float, seed: int) -> dict[float, float]:
+    """Onset -> draw of every blink."""
+    return {float(c.times[0]): c.draw for c in idle_channels(begin, end, seed) if isinstance(c, Blink)}
+
+
+@given(st.integers(0, 2**40))
+def test_each_blink_has_a_draw_of_its_own_in_any_window_evenly_spread(seed: int) -> None:
+    whole = draws(0, 600, seed)
+    assert draws(290, 310, seed).items() <= whole.items()
+    assert min(whole.values()) >= 0
+    assert max(whole.values()) < 1
+    assert 0.35 < np.mean(list(whole.values())) < 0.65
 
 
 def test_it_stands_in_its_layer() -> None:

@@ -38,6 +38,8 @@ def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
         (fap(19), "face"),
         (presence("eyes"), "eyes"),
         (presence("lips"), "face"),
+        (presence("blinks"), "idle"),
+        (presence("motion"), "idle"),
     ],
 )
 def test_a_target_belongs_to_a_region(target: object, wanted: str) -> None:
