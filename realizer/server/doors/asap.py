@@ -13,6 +13,7 @@ import logging
 import re
 from collections import deque
 from collections.abc import Callable
+from typing import cast
 
 from bml_schema import WarningFeedback
 from realizer.server.doors.assembler import Assembler, Fault
@@ -177,7 +178,7 @@ class CallBack(asyncio.Protocol):
             pause = min(2 * pause, LAST_RETRY)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
+        transport = cast(asyncio.Transport, transport)  # uvloop's is one in all but name
         self._lost.clear()
         if transport.get_extra_info("sockname") == transport.get_extra_info("peername"):
             transport.abort()  # nobody listened, and TCP has met itself on the way

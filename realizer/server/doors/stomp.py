@@ -339,8 +339,11 @@ class _Link:
             self._in_loop(self.reading.set)
 
     def on_error(self, frame: Any) -> None:
-        said = frame.headers.get("message", "") or bytes(frame.body or b"").decode("utf-8", "replace")
-        self._in_loop(self._settle, False, " ".join(said.split())[:200])
+        said = frame.headers.get("message", "")
+        why, *_ = bytes(frame.body or b"").decode("utf-8", "replace").strip().splitlines() or [""]
+        if said not in why:  # some brokers say it again at the head of a long trace
+            said = f"{said}: {why}".removesuffix(": ")
+        self._in_loop(self._settle, False, " ".join((said or why).split())[:200])
 
     def on_disconnected(self) -> None:
         self._in_loop(self._settle, False, "")

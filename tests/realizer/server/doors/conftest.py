@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import socket
 import subprocess
 from collections.abc import Iterator
@@ -12,6 +14,7 @@ from threading import Event, Thread
 import pytest
 
 JARS = Path("/usr/share/activemq/lib")  # where Debian's package has them
+RABBIT = Path("/usr/lib/rabbitmq/bin/rabbitmq-server")  # the one on the PATH becomes another user
 LIMIT = 60  # s; a hung start ends
 
 CONFIGURATION = """<beans xmlns="http://www.springframework.org/schema/beans"
@@ -36,16 +39,56 @@ log4j.appender.out.layout.ConversionPattern=%m%n
 """
 
 
+def free_port() -> int:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        return taken.getsockname()[1]
+
+
+class Process:
+    """A program that runs until it is killed; `start` returns once it has said `ready`."""
+
+    def __init__(self, command: list[str], ready: str, folder: Path, **variables: str) -> None:
+        self._process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env={**os.environ, **variables},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self._ready = Event()
+        self._lines: list[str] = []
+        self._reader = Thread(target=self._read, args=(ready,), daemon=True)
+        self._reader.start()
+        assert self._ready.wait(LIMIT), "".join(self._lines)
+        assert any(ready in line for line in self._lines), "".join(self._lines)
+
+    def _read(self, ready: str) -> None:
+        """What it says, up to its end, so that it never waits for a reader."""
+        assert self._process.stdout is not None
+        with self._process.stdout as said:
+            for line in said:
+                self._lines.append(line)
+                if ready in line:
+                    self._ready.set()
+        self._ready.set()
+
+    def kill(self, pid: int | None = None) -> None:
+        """End it as a power cut would; with `pid` the child that ends it by its own end."""
+        os.kill(pid or self._process.pid, signal.SIGKILL)
+        self._process.wait(LIMIT)
+        self._reader.join(LIMIT)
+
+
 class Broker:
     """ActiveMQ in a process of its own; `start` returns once it listens at `port`."""
 
     def __init__(self, folder: Path, plugins: str = "") -> None:
-        with socket.socket() as taken:
-            taken.bind(("127.0.0.1", 0))
-            self.port = taken.getsockname()[1]
+        self.port = free_port()
         self.address = f"127.0.0.1:{self.port}"
         self._folder = folder
-        self._process: subprocess.Popen[str] | None = None
+        self._process: Process | None = None
         text = CONFIGURATION.format(folder=folder, port=self.port, plugins=plugins)
         (folder / "broker.xml").write_text(text)
         (folder / "log4j.properties").write_text(LOGGING)
@@ -67,32 +110,52 @@ class Broker:
             "start",
             f"xbean:file:{folder}/broker.xml",
         ]
-        self._process = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
-        listening = Event()
-        lines: list[str] = []
-        Thread(target=self._read, args=(self._process, listening, lines), daemon=True).start()
-        assert listening.wait(LIMIT), "".join(lines)
-        assert any("Connector stomp started" in line for line in lines), "".join(lines)
-
-    @staticmethod
-    def _read(process: subprocess.Popen[str], listening: Event, lines: list[str]) -> None:
-        """What it says, up to its end, so that it never waits for a reader."""
-        assert process.stdout is not None
-        with process.stdout:
-            for line in process.stdout:
-                lines.append(line)
-                if "Connector stomp started" in line:
-                    listening.set()
-        listening.set()
+        self._process = Process(command, "Connector stomp started", folder)
 
     def kill(self) -> None:
         """End it as a power cut would."""
         if self._process is not None:
             self._process.kill()
-            self._process.wait(LIMIT)
             self._process = None
+
+
+class Rabbit:
+    """RabbitMQ with its STOMP plugin; `start` returns once it listens at `port`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.port = free_port()
+        self.address = f"127.0.0.1:{self.port}"
+        self._folder = folder
+        (folder / "rabbitmq.conf").write_text(
+            f"listeners.tcp = none\nstomp.listeners.tcp.1 = 127.0.0.1:{self.port}\n"
+        )
+        (folder / "enabled_plugins").write_text("[rabbitmq_stomp].\n")
+
+    def start(self) -> None:
+        folder = str(self._folder)
+        names = str(free_port())
+        # The name server of its runtime: otherwise it starts one that outlives it.
+        self._names = Process(["epmd", "-d", "-port", names, "-address", "127.0.0.1"], "epmd", self._folder)
+        self._process = Process(
+            [str(RABBIT)],
+            "Server startup complete",
+            self._folder,
+            HOME=folder,
+            ERL_EPMD_PORT=names,
+            RABBITMQ_DIST_PORT=str(free_port()),
+            RABBITMQ_NODENAME="test@localhost",
+            RABBITMQ_MNESIA_BASE=folder,
+            RABBITMQ_LOG_BASE=folder,
+            RABBITMQ_LOGS="-",
+            RABBITMQ_CONFIG_FILE=f"{folder}/rabbitmq.conf",
+            RABBITMQ_ENABLED_PLUGINS_FILE=f"{folder}/enabled_plugins",
+            RABBITMQ_PID_FILE=f"{folder}/pid",
+            RABBITMQ_SERVER_ADDITIONAL_ERL_ARGS="-kernel inet_dist_use_interface {127,0,0,1}",
+        )
+
+    def kill(self) -> None:
+        self._process.kill(int((self._folder / "pid").read_text()))
+        self._names.kill()
 
 
 def _installed() -> None:
@@ -127,3 +190,14 @@ def guarded_broker(tmp_path: Path) -> Iterator[Broker]:
     broker.start()
     yield broker
     broker.kill()
+
+
+@pytest.fixture(scope="session")
+def rabbit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rabbit]:
+    """The other broker that laboratories run."""
+    if not RABBIT.is_file() or shutil.which("epmd") is None:
+        pytest.skip("needs RabbitMQ: apt-get install rabbitmq-server")
+    rabbit = Rabbit(tmp_path_factory.mktemp("rabbit"))
+    rabbit.start()
+    yield rabbit
+    rabbit.kill()

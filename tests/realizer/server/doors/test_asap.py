@@ -117,7 +117,7 @@ class Client:
             await self._news.wait()
 
 
-def serving(test: Callable[[Server, int, int], Awaitable[None]], **settings) -> None:
+def serving(test: Callable[[Server, int, int], Awaitable[None]], loop=None, **settings) -> None:
     """Run a test against a service of its own: server, BML port, feedback port."""
 
     async def run() -> None:
@@ -127,7 +127,8 @@ def serving(test: Callable[[Server, int, int], Awaitable[None]], **settings) -> 
             (door,) = [d for d in server.doors if isinstance(d, AsapDoor)]
             await test(server, door.port, feedback)
 
-    asyncio.run(run())
+    with asyncio.Runner(loop_factory=loop) as runner:
+        runner.run(run())
 
 
 async def until_played(server: Server) -> None:
@@ -167,6 +168,22 @@ def test_each_element_of_feedback_ends_with_a_line_feed_and_declares_its_namespa
             assert b"><" not in client.raw.replace(b"><sync", b"")
 
     serving(test)
+
+
+def test_the_faster_event_loop_serves_as_well() -> None:
+    uvloop = pytest.importorskip("uvloop", reason="needs the fast extra")
+
+    async def test(server: Server, bml: int, port: int) -> None:
+        async with Client(bml, port) as client:
+            client.send(WAIT.format("b", 0))
+            await client.until("b:end")
+            client.called_back.clear()
+            client.hang_up()
+            await client.called_back.wait()
+            client.send(WAIT.format("c", 0))
+            await client.until("c:end")
+
+    serving(test, uvloop.new_event_loop)
 
 
 def test_feedback_waits_for_a_client_that_listens_late() -> None:

@@ -27,14 +27,16 @@ WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
 class Peer(stomp.ConnectionListener):
     """A client of the broker: what comes from each topic queues in the event loop."""
 
-    def __init__(self, port: int, *topics: str, login: tuple[str, str] | None = None) -> None:
+    def __init__(
+        self, port: int, *topics: str, login: tuple[str, str] | None = None, host: str | None = None
+    ) -> None:
         self.queue: asyncio.Queue[tuple[str, dict[str, str], str]] = asyncio.Queue()
         self._loop = asyncio.get_running_loop()
         self._topics = topics
         self._login = login or (None, None)
         self._reading = asyncio.Event()
         self._gone = asyncio.Event()
-        self._stomp = stomp.Connection12([("127.0.0.1", port)], auto_content_length=False)
+        self._stomp = stomp.Connection12([("127.0.0.1", port)], auto_content_length=False, vhost=host)
         self._stomp.set_listener("peer", self)
 
     async def __aenter__(self) -> Peer:
@@ -354,6 +356,28 @@ def test_a_broker_that_asks_who_is_there_is_told(guarded_broker, caplog) -> None
         serving(refused, guarded_broker.address, ready=False, stomp_login="face", stomp_password="wrong")
     assert "no broker at" in caplog.messages[0]
     assert "password" in caplog.messages[0]
+
+
+def test_rabbitmq_serves_as_well_and_says_what_it_misses(rabbit, caplog) -> None:
+    guest = {"stomp_login": "guest", "stomp_password": "guest"}
+
+    async def test(server: Server) -> None:
+        topics = ("/topic/bmlFeedback", "/topic/DEFAULT_SCOPE")
+        async with Peer(rabbit.port, *topics, login=("guest", "guest"), host="/") as peer:
+            peer.ask(WAIT.format("b", 0))
+            await peer.feedback("b:end")
+            peer.say("vrSpeak Brad ALL m1 <bml/>")
+            await peer.heard("vrSpoke Brad ALL m1")
+
+    serving(test, rabbit.address, stomp_host="/", **guest)
+
+    async def refused(server: Server) -> None:
+        while not caplog.messages:
+            await asyncio.sleep(0)
+
+    with caplog.at_level(logging.WARNING):
+        serving(refused, rabbit.address, ready=False, **guest)
+    assert "Virtual host '127.0.0.1' access denied" in caplog.messages[0]
 
 
 def test_a_port_that_says_nothing_is_no_broker(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
