@@ -1,0 +1,167 @@
+"""A case of the corpus in; what was told, shown and heard while it played out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from bml_schema import Block, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
+from realizer.animation.fap import to_fap
+from realizer.animation.targets import AU_NAMES
+from realizer.behaviours import VOCABULARY
+from realizer.pipeline import speak, warning_of
+from realizer.player import Player, Speaking
+from realizer.scheduling.timing import Schedule
+from realizer.speech import SilentVoice
+from realizer.tables import faps
+from tests.cases import CORPUS, Case, Instant, Told, told
+
+__all__ = ["Played", "play"]
+
+MEDIA = CORPUS / "media"  # the files that documents name
+EPOCH = 1_700_000_000.0  # some day on which a session opened
+MOST_STEPS = 10_000  # deadlines of one case
+
+
+@dataclass
+class Played:
+    """What playing came to.
+
+    Attributes:
+        blocks: those that were read, in order; an id may be used again.
+        schedules: block id -> what `submit` returned, the last of that id.
+        feedback: as a client gets it: written as XML and read again.
+        faces: instant -> name of AU or FAP -> value, looked at when it was there.
+        film: the same, looked over when all had played.
+        speaking: what sounded, or would have with a voice, in order.
+    """
+
+    blocks: list[Block] = field(default_factory=list)
+    schedules: dict[str, Schedule] = field(default_factory=dict)
+    feedback: list[Feedback] = field(default_factory=list)
+    faces: dict[Instant, dict[str, float]] = field(default_factory=dict)
+    film: dict[Instant, dict[str, float]] = field(default_factory=dict)
+    speaking: tuple[Speaking, ...] = ()
+
+    @cached_property
+    def log(self) -> list[Told]:
+        return [line for feedback in self.feedback for line in told(feedback)]
+
+    @property
+    def warnings(self) -> list[WarningFeedback]:
+        return [f for f in self.feedback if isinstance(f, WarningFeedback)]
+
+    @property
+    def end(self) -> float:
+        """When the last thing was told."""
+        return max((t for line in self.log for t in line.times), default=0.0)
+
+    def time(self, point: str) -> float:
+        """Seconds from block start of "behaviour:sync" of the first block, or of "block:behaviour:sync"."""
+        first = next(iter(self.schedules.values()))
+        behaviour, _, sync = point.partition(":")
+        if behaviour in first.times:
+            return first.at(behaviour, sync)
+        block, behaviour, sync = point.split(":", 2)
+        return self.schedules[block].at(behaviour, sync)
+
+    def predicted(self, point: str) -> float:
+        """Seconds from block start, as the last prediction that names the behaviour has it."""
+        name, _, sync = point.rpartition(":")
+        for feedback in reversed(self.feedback):
+            if isinstance(feedback, PredictionFeedback):
+                for node in feedback.behaviours:
+                    if node.id == name and sync in node.syncs:
+                        return node.syncs[sync].offset
+                    text = getattr(node, "text", None)
+                    for part in getattr(text, "parts", ()):
+                        if node.id == name and getattr(part, "id", "") == sync and part.ref is not None:
+                            return float(part.ref.offset)
+        raise KeyError(point)
+
+
+def play(
+    case: Case,
+    document: bytes | None = None,
+    *,
+    looks: Sequence[Instant] = (),
+    watches: Sequence[Instant] = (),
+    punctual: bool = True,
+) -> Played:
+    """Play a case.
+
+    Args:
+        document: another one in its place.
+        looks: when to look at a face that plays.
+        watches: what to look over when all has played.
+        punctual: the player hears of each deadline when it is there; otherwise only when a document is sent
+            or a face is looked at.
+    """
+    wanted = case.wanted
+    scene = {name: (x, y, z) for name, (x, y, z) in wanted.get("scene", {}).items()}
+    player = Player(
+        scene=scene if "scene" in wanted else None,
+        idle=wanted.get("idle", False),
+        media=MEDIA,
+        history=math.inf,
+    )
+    items = list(read(case.document if document is None else document, VOCABULARY))
+    sent = [float(time) for time in wanted.get("sent", ())]
+    sent += [max([0.0, *sent])] * (len(items) - len(sent))
+    script: list[tuple[float, int, Any]] = [(t, 0, item) for t, item in zip(sent, items, strict=True)]
+    script += [(instant.time, 1, instant) for instant in looks]
+    played, voice, now = Played(), SilentVoice(), 0.0
+    for time, _, item in sorted(script, key=lambda entry: entry[:2]):
+        hear(player, played, now, time, punctual)
+        now = time
+        if isinstance(item, Instant):
+            played.faces |= shown(player, [item])
+        elif isinstance(item, Block):
+            played.blocks.append(item)
+            played.schedules[item.id] = player.submit(item, time, speak(player.wants(item), voice))
+        else:
+            player.refuse(warning_of(item), time)
+    hear(player, played, now, math.inf, punctual)
+    played.film = shown(player, watches)
+    played.speaking = player.speech()
+    return played
+
+
+def hear(player: Player, played: Played, now: float, until: float, punctual: bool) -> None:
+    """Let the time pass, in the steps in which there is something to tell."""
+    for _ in range(MOST_STEPS):
+        deadline = player.next_deadline()
+        if not punctual or deadline is None or deadline > until:
+            break
+        now = max(now, deadline)
+        collect(player, played, now)
+    else:
+        raise AssertionError("it goes on for ever")
+    collect(player, played, until)
+
+
+def collect(player: Player, played: Played, now: float) -> None:
+    for feedback in player.due(now):
+        text = feedback.to_xml(len(played.feedback) + 1, EPOCH)
+        played.feedback.append(parse_feedback(text, VOCABULARY))
+
+
+def shown(player: Player, instants: Iterable[Instant]) -> dict[Instant, dict[str, float]]:
+    """Name of AU ("12" where both sides are equal, "12L", "12R") or FAP -> value, at each instant."""
+    out: dict[Instant, dict[str, float]] = {}
+    by_character: dict[str | None, list[Instant]] = {}
+    for instant in sorted(set(instants), key=lambda i: i.time):
+        by_character.setdefault(instant.character, []).append(instant)
+    for character, own in by_character.items():
+        index = player.character_index(character) if character else 0
+        frames = player.frames(np.array([instant.time for instant in own]), index)
+        for instant, aus, values in zip(own, frames.aus, to_fap(frames).values, strict=True):
+            face = dict(zip(AU_NAMES(), map(float, aus), strict=True))
+            face |= {n[:-1]: v for n, v in face.items() if n[-1] == "L" and v == face[f"{n[:-1]}R"]}
+            out[instant] = face | {row.name: float(v) for row, v in zip(faps(), values, strict=True)}
+    return out
