@@ -1,0 +1,99 @@
+"""CONFORMANCE.md is current, and what the cases claim to prove they do have in their documents."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lxml import etree
+
+from bml_schema import EXTENSIONS, VOCABULARY
+from bml_schema.nodes import core
+from tests.cases import CASES, Case
+from tests.conformance import FILE, Rule, elsewhere, gaps, proofs, render, rules
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_the_file_is_current() -> None:
+    assert FILE.read_text("utf-8") == render(), "run: python -m tests.conformance"
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+def test_a_case_says_which_known_rules_it_proves(case: Case) -> None:
+    assert case.proves, "a case names the rules that it proves"
+    assert len(set(case.proves)) == len(case.proves)
+    assert set(case.proves) <= rules().keys()
+
+
+def test_nothing_is_unproved_without_a_reason() -> None:
+    proved = proofs().keys() | elsewhere().keys()
+    assert not rules().keys() - proved - gaps().keys()
+
+
+def test_gaps_and_tests_elsewhere_are_of_known_rules_and_not_of_proved_ones() -> None:
+    assert gaps().keys() | elsewhere().keys() <= rules().keys()
+    assert not gaps().keys() & (proofs().keys() | elsewhere().keys())
+    assert all(gaps().values()), "a gap has a reason"
+
+
+@pytest.mark.parametrize("rule", sorted(elsewhere()))
+def test_a_test_elsewhere_is_there(rule: str) -> None:
+    path, _, test = elsewhere()[rule].partition("::")
+    assert f"def {test}(" in (ROOT / path).read_text("utf-8")
+
+
+CLAIMS = [
+    (case, rules()[id]) for case in CASES for id in case.proves if id in rules() and rules()[id].element
+]
+
+
+@pytest.mark.parametrize(("case", "rule"), CLAIMS, ids=[f"{case.name}-{rule.id}" for case, rule in CLAIMS])
+def test_what_a_case_claims_of_an_element_is_in_its_document(case: Case, rule: Rule) -> None:
+    found = elements(case, rule.element)
+    assert found, f"no <{rule.element.tag}>"
+    expectations = case.path.read_text("utf-8")
+    ids = [e.get("id", "") for e in found]
+    match rule.kind:
+        case "attribute":
+            assert any(rule.name in e.attrib for e in found)
+        case "value":
+            assert any(e.get(rule.name, "").strip() == rule.value for e in found)
+        case "default":
+            assert any(rule.name not in e.attrib for e in found)
+            assert {"as_if", "face", "reads", "at", "lasts", "log"} & case.wanted.keys()
+        case "required":
+            assert any(rule.name not in e.attrib for e in found)
+            assert case.wanted.get("refused") or case.wanted.get("warnings")
+        case "sync point":
+            placed = [e.get("id", "") for e in found if rule.name in e.attrib]
+            assert any(f"{id}:{rule.name}" in expectations for id in placed)
+        case "reference":
+            values = [str(v) for e in root(case).iter("*") for v in e.attrib.values()]
+            assert any(
+                re.search(rf"(^|[:\s]){re.escape(f'{id}:{rule.name}')}\b", v) for id in ids for v in values
+            )
+
+
+def root(case: Case) -> Any:
+    """All documents of a case under one element; what is not well-formed is mended somehow."""
+    text = re.sub(rb"<\?xml[^>]*\?>|<!DOCTYPE[^>]*>", b"", case.document)
+    return etree.fromstring(b"<all>" + text + b"</all>", etree.XMLParser(recover=True, remove_comments=True))
+
+
+def elements(case: Case, cls: type[Any] | None) -> list[Any]:
+    """The elements of a class in the documents of a case, with a namespace or without.
+
+    What every behaviour has, any behaviour shows.
+    """
+    assert cls is not None
+    tag = getattr(cls, "tag", None)
+    everything = list(root(case).iter("*"))
+    if tag is None:
+        known = {name.rpartition("}")[2] for name in VOCABULARY}
+        return [e for e in everything if str(e.tag).rpartition("}")[2] in known]
+    space, _, name = tag[1:].rpartition("}")
+    names = {tag, name} if tag == core(name) or space == EXTENSIONS else {tag}
+    return [e for e in everything if e.tag in names]
