@@ -32,14 +32,14 @@ class Calendar:
 
     def put(self, playing: Playing, only: Collection[tuple[str, str]] | None = None) -> None:
         """Put in what is still to happen in a block; of its sync points all, or `only` (behaviour, sync)."""
-        number = playing.number
-        due = events(playing.block, playing.schedule, number)
+        number, order = playing.number, playing.order
+        due = events(playing.block, playing.schedule, order, number)
         due = [e for e in due if only is None or (e.name, e.sync) in only]
         if playing.waiting:
-            due.append(Event(playing.start, number, Phase.START))
+            due.append(Event(playing.start, order, Phase.START, block=number))
         if playing.state is not State.SUBSIDING and playing.subsides < playing.end:
-            due.append(Event(playing.subsides, number, Phase.SUBSIDES))
-        due.append(Event(playing.end, number, Phase.END))
+            due.append(Event(playing.subsides, order, Phase.SUBSIDES, block=number))
+        due.append(Event(playing.end, order, Phase.END, block=number))
         edition = self._edition.setdefault(number, 0)
         for event in due:
             heapq.heappush(self._events, (event, edition))

@@ -56,6 +56,7 @@ class Ensemble:
         self._outbox: list[Feedback] = []
         self._calendar = Calendar()
         self._number = 0
+        self._order = 0
 
     def all(self) -> list[Playing]:
         """Every block that can still be seen or heard, in order of acceptance."""
@@ -116,6 +117,7 @@ class Ensemble:
         self._set_out(playing)
         for follower, subsiding in behind:
             follower.await_too(Wait(playing, subsiding))
+            self._line_up(follower)
         for name, subsiding in relations.followers(block):
             if (coming := self._expected.fate(name)) is not None:
                 coming.waits.append(Wait(playing, subsiding))
@@ -301,6 +303,18 @@ class Ensemble:
                 if other.waiting and self._move(other, now):
                     moved.append(other)
 
+    def _line_up(self, playing: Playing) -> None:
+        """Let a waiting block, and those that follow it, report after all others at one instant."""
+        line = deque([playing])
+        while line:
+            first = line.popleft()
+            line += [other for other in first.followers if other.waiting]
+            first.order = self._order
+            self._order += 1
+            if first.start < FOREVER:
+                self._calendar.drop(first)
+                self._calendar.put(first)
+
     def _move(self, playing: Playing, now: float) -> bool:
         """Let a waiting block start when it now may; False where that is when it was to."""
         start = playing.earliest
@@ -356,6 +370,8 @@ class Ensemble:
     def _set_out(self, playing: Playing) -> None:
         """A block has a new start: it shifts base states then, and its events are due."""
         self.characters[playing.character].shift(playing.shifts.values())
+        playing.order = self._order
+        self._order += 1
         if playing.start < FOREVER:
             self._calendar.put(playing)
             self.changed()

@@ -55,6 +55,7 @@ class Playing:
         world: what it was planned with.
         character: whose face it moves.
         number: order of acceptance.
+        order: at one instant it reports before blocks of a higher one.
         floor: it does not start sooner, seconds on the session clock.
         waits: nor before these; empty once it has started.
         followers: the blocks that wait for it.
@@ -76,6 +77,7 @@ class Playing:
     shifts: dict[str, Shift] = field(default_factory=dict)
     speech: dict[str, Speaking] = field(default_factory=dict)
     followers: list[Playing] = field(default_factory=list)
+    order: int = 0
     first: Schedule = field(init=False)
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
@@ -44,21 +44,23 @@ class Phase(IntEnum):
 class Event(NamedTuple):
     """Something that is due at a time; the order of the fields is the order of report.
 
-    At one instant earlier blocks report before later ones, so that what an APPEND waited for, or a REPLACE
-    ended, has ended before it starts; within a block start, sync points by behaviour, end.
+    At one instant a block reports before those that follow it, so that what an APPEND waited for, or a
+    REPLACE ended, has ended before it starts; within a block start, sync points by behaviour, end.
 
     Attributes:
         time: seconds on the session clock.
-        block: number of the block, in order of acceptance.
+        order: place of the block among those that report at one instant.
         behaviour, point: places of a sync point in the block and in its behaviour.
+        block: number of the block.
         name, sync: what it is called: behaviour id and sync point.
     """
 
     time: float
-    block: int
+    order: int
     phase: Phase
     behaviour: int = 0
     point: int = 0
+    block: int = 0
     name: str = ""
     sync: str = ""
 
@@ -104,17 +106,12 @@ def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: f
     )
 
 
-def events(block: Block, schedule: Schedule, number: int, of: Iterable[str] | None = None) -> list[Event]:
-    """Every sync point of a block, or of some of its behaviours, when it is due.
-
-    Args:
-        number: order of acceptance, for blocks that report at one instant.
-    """
-    wanted = schedule.times.keys() if of is None else set(of)
+def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Event]:
+    """Every sync point of a block, when it is due; `order` and `number` as of the Event."""
     return [
-        Event(schedule.start + float(time), number, Phase.SYNC, order, index, node.id, sync)
-        for order, node in enumerate(block.behaviours)
-        if node.id in wanted and node.id in schedule.times
+        Event(schedule.start + float(time), order, Phase.SYNC, place, index, number, node.id, sync)
+        for place, node in enumerate(block.behaviours)
+        if node.id in schedule.times
         for index, (sync, time) in enumerate(
             zip(schedule.points[node.id], schedule.times[node.id], strict=True)
         )

@@ -17,6 +17,7 @@ def playing(number: int, start: float) -> Playing:
     planned = plan(parse(f'<bml id="a">{FACE}</bml>'), KINDS, World(), start=start)
     made = Playing(planned, KINDS, World(), character=0, number=number, floor=start)
     made.lay(planned, start)
+    made.order = number
     return made
 
 

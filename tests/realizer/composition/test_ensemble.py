@@ -141,6 +141,15 @@ def test_prepend_before_lets_a_waiting_block_wait_longer_and_says_so(stage: Stag
     assert "c:start IN_EXEC 3" in stage.progress()
 
 
+def test_what_is_put_before_a_block_ends_before_that_starts_and_so_on_down_the_line(stage: Stage) -> None:
+    stage.send("a", wait(4))
+    stage.send("c", composition="APPEND")
+    stage.send("e", composition="APPEND")
+    stage.send("d", wait(4), prependBefore="c")
+    told = ["d:end DONE 4", "c:start IN_EXEC 4", "c:end DONE 4", "e:start IN_EXEC 4", "e:end DONE 4"]
+    assert stage.progress()[-5:] == told
+
+
 def test_chunk_before_lets_it_wait_for_the_subsiding_only(stage: Stage) -> None:
     stage.send("a", wait(1))
     stage.send("c", wait(1), composition="APPEND")

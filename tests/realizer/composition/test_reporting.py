@@ -27,13 +27,9 @@ SCHEDULE = Schedule(
 
 
 def test_sync_points_come_in_the_order_of_time_then_of_the_document() -> None:
-    due = sorted(events(BLOCK, SCHEDULE, 0))
+    due = sorted(events(BLOCK, SCHEDULE, 0, 7))
     assert [f"{e.name}:{e.sync}" for e in due] == ["g:start", "h:start", "h:stroke", "g:end", "h:end"]
     assert [e.time for e in due] == [10.0, 10.0, 10.5, 11.0, 11.0]
-
-
-def test_some_behaviours_alone_keep_their_places() -> None:
-    assert events(BLOCK, SCHEDULE, 0, of=["h"]) == [e for e in events(BLOCK, SCHEDULE, 0) if e.name == "h"]
 
 
 def test_a_sync_point_is_told_on_both_clocks() -> None:
@@ -42,8 +38,8 @@ def test_a_sync_point_is_told_on_both_clocks() -> None:
 
 
 def test_at_one_instant_the_earlier_block_ends_before_the_later_one_starts() -> None:
-    due = [Event(11.0, 1, Phase.START), Event(11.0, 0, Phase.END), *events(BLOCK, SCHEDULE, 0)]
-    assert [(e.block, e.phase) for e in sorted(due)[-2:]] == [(0, Phase.END), (1, Phase.START)]
+    due = [Event(11.0, 1, Phase.START), Event(11.0, 0, Phase.END), *events(BLOCK, SCHEDULE, 0, 7)]
+    assert [(e.order, e.phase) for e in sorted(due)[-2:]] == [(0, Phase.END), (1, Phase.START)]
 
 
 def test_feedback_reads_back_as_it_was_written() -> None:
