@@ -11,7 +11,7 @@ import numpy as np
 from realizer.animation.targets import Target
 from realizer.arrays import Float64
 
-__all__ = ["Channel", "Gain", "Layer"]
+__all__ = ["Channel", "Gain", "Joint", "Layer"]
 
 
 class Layer(IntEnum):
@@ -39,6 +39,21 @@ class Gain(NamedTuple):
         return self._replace(begin=self.begin + seconds, end=self.end + seconds)
 
 
+class Joint(NamedTuple):
+    """How a channel goes on from the one before it: by what it differs at `at`, which `length` seconds heal.
+
+    `value` and `slope` are what was shown at that time less what this channel would show, and a second of it.
+    """
+
+    at: float
+    value: float
+    slope: float
+    length: float
+
+    def shifted(self, seconds: float) -> Joint:
+        return self._replace(at=self.at + seconds)
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One target over time.
@@ -54,6 +69,8 @@ class Channel:
         gains: what it is multiplied with, 1 before the first: where a behaviour is cut off, a base state is
             replaced or an amount changes. Each goes on from what those before it have reached, so that
             nothing jumps.
+        until: it shows nothing from then on: another channel goes on in its place.
+        joint: it is such a channel, and shows nothing before `joint.at`.
         source: "block:behaviour" that made it, for messages.
     """
 
@@ -64,6 +81,8 @@ class Channel:
     layer: Layer = Layer.EXPRESSION
     holds: bool = False
     gains: tuple[Gain, ...] = ()
+    until: float = float("inf")
+    joint: Joint | None = None
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -77,7 +96,8 @@ class Channel:
     def shifted(self, seconds: float) -> Channel:
         """The same channel, later by `seconds`."""
         gains = tuple(gain.shifted(seconds) for gain in self.gains)
-        return replace(self, times=self.times + seconds, gains=gains)
+        joint = None if self.joint is None else self.joint.shifted(seconds)
+        return replace(self, times=self.times + seconds, gains=gains, joint=joint, until=self.until + seconds)
 
     def faded(self, begin: float, end: float) -> Channel:
         """The same channel faded out from `begin` to `end`; an earlier fade stays as it is."""
@@ -99,4 +119,7 @@ class Channel:
     def span(self) -> tuple[float, float]:
         """(first, last) seconds at which it may be other than 0; last is infinite where it holds."""
         last = float("inf") if self.holds else float(self.times[-1])
-        return float(self.times[0]), min(last, self.gone)
+        first = float(self.times[0])
+        if self.joint is not None:
+            first, last = self.joint.at, max(last, self.joint.at + self.joint.length)
+        return first, min(last, self.gone, self.until)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from realizer.animation.channel import Channel, Gain
+from realizer.animation.channel import Channel, Gain, Joint
 from realizer.arrays import Float64
 
 __all__ = ["CURVES", "gain_at", "sample", "smooth", "weights"]
@@ -66,6 +66,9 @@ def sample(channels: Sequence[Channel], times: Float64) -> Float64:
     for i, channel in enumerate(channels):
         if channel.gains:
             values[i] *= gain_at(channel.gains, times)
+        if channel.joint is not None:
+            values[i] += _healing(channel.joint, times)
+        _window(values[i], channel, times)
     if order is not None:
         values[:, order] = values.copy()
     return values
@@ -83,6 +86,7 @@ def weights(channels: Sequence[Channel], times: Float64) -> Float64:
     for i, channel in enumerate(channels):
         if channel.gains:
             there[i] *= gain_at(channel.gains, times)
+        _window(there[i], channel, times)
     return there
 
 
@@ -118,6 +122,21 @@ def _fill(
     row = np.repeat(np.asarray(rows), counts)
     u = (times[frame] - keys[segment]) / gap[segment]
     values[row[segment], frame] = value[segment] + step[segment] * shape(u)
+
+
+def _healing(joint: Joint, times: Float64) -> Float64:
+    """(n,) what is added so that value and slope go on at the joint; 0 when it has healed."""
+    passed = times - joint.at
+    left = 1.0 - smooth(np.clip(passed / joint.length, 0.0, 1.0))
+    return (joint.value + joint.slope * passed) * left
+
+
+def _window(row: Float64, channel: Channel, times: Float64) -> None:
+    """Take away, in place, what another channel shows."""
+    if channel.until < np.inf:
+        row[times >= channel.until] = 0.0
+    if channel.joint is not None:
+        row[times < channel.joint.at] = 0.0
 
 
 def gain_at(gains: Sequence[Gain], times: Float64) -> Float64:

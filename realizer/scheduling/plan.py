@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from realizer.arrays import Float64
 from realizer.scheduling.explain import choose, fault_warning, refusal, warning_of
-from realizer.scheduling.problem import Part, Problem, problem_of
+from realizer.scheduling.problem import Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 if TYPE_CHECKING:
     from bml_schema import Block, SyncRef
 
-__all__ = ["schedule_block"]
+__all__ = ["schedule_block", "schedule_together"]
 
 
 def schedule_block(
@@ -41,29 +42,55 @@ def schedule_block(
     Returns:
         The schedule; `failed`, without times, where required things clash.
     """
-    problem = problem_of(block, timings, earliest=earliest, outside=outside, priorities=priorities)
+    member = Member(block, timings, earliest=earliest, priorities=priorities or {})
+    return schedule_together([member], outside=outside)[0]
+
+
+def schedule_together(
+    members: Sequence[Member], *, outside: Callable[[SyncRef], float | None] = lambda ref: None
+) -> list[Schedule]:
+    """The sync times of a new block and of blocks that play, solved as one.
+
+    Args:
+        members: the new block first; what has passed of the others stays, all else may move.
+        outside: a reference into a block that is no member -> seconds on the members' clock.
+
+    Returns:
+        A schedule for each member, from its own start. Where the new block fails, the first alone, failed.
+    """
+    new = members[0].block
+    problem = problem_of(members, outside)
     warnings: list[Warning] = []
     while True:
-        found = _attempt(problem, block.id)
+        found = _attempt(problem, new.id)
         if isinstance(found, Solution):
             break
         if isinstance(found, Warning):
-            return Schedule(block.id, {}, {}, warnings=(found,), failed=True, character=block.character_id)
+            return [Schedule(new.id, {}, {}, warnings=(found,), failed=True, character=new.character_id)]
         warnings += (warning for _, warning in found)
         problem = problem.without(part for part, _ in found)
-    found.time.setflags(write=False)
-    names = [part.name for part in problem.behaviours]
-    return Schedule(
-        block.id,
-        {name: timing.points for name, timing in zip(names, problem.timings, strict=True)},
-        {
-            name: found.time[first : first + len(timing.points)]
-            for name, first, timing in zip(names, problem.first, problem.timings, strict=True)
-        },
-        warnings=tuple(warnings),
-        cost=found.cost,
-        character=block.character_id,
-    )
+    number = {part.id: n for n, part in enumerate(problem.behaviours)}
+    schedules = []
+    for member in members:
+        times: dict[str, Float64] = {}
+        for node in member.block.behaviours:
+            n = number.get(f"{member.block.id}:{node.id}")
+            if n is not None and node.id not in times:
+                first, k = problem.first[n], len(problem.timings[n].points)
+                times[node.id] = found.time[first : first + k] - member.start
+                times[node.id].setflags(write=False)
+        schedules.append(
+            Schedule(
+                member.block.id,
+                {name: member.timings[name].points for name in times},
+                times,
+                start=member.start,
+                warnings=tuple(warnings) if member is members[0] else (),
+                cost=found.cost,
+                character=member.block.character_id,
+            )
+        )
+    return schedules
 
 
 def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warning]] | Warning:

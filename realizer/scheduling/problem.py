@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +14,7 @@ from realizer.scheduling.timing import Timing
 if TYPE_CHECKING:
     from bml_schema import Behaviour, Block, Constraint, SyncRef
 
-__all__ = ["ORIGIN", "Part", "Problem", "Relation", "problem_of"]
+__all__ = ["ORIGIN", "Member", "Part", "Problem", "Relation", "problem_of"]
 
 # The point that stands for the block's start; it is at 0 and every number is tied to it.
 ORIGIN = 0
@@ -29,7 +29,7 @@ class Part:
         name: as sentences name it, "nod1"; "" for a constraint without an id.
         order: place in the document, among its own kind.
         line: where it stands, None where the document does not say.
-        names: ids of the behaviours that a constraint names; it goes with any of them.
+        names: the behaviours that a constraint names, as "block:behaviour"; it goes with any of them.
     """
 
     id: str
@@ -53,6 +53,30 @@ class Relation(NamedTuple):
     seconds: float
     part: Part
     says: tuple[object, str, object]
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A block that is solved together with others, all on one clock: seconds from the new block's start.
+
+    Attributes:
+        timings: behaviour id -> what it wants of time; a behaviour that is not in it is absent, and what
+            refers to it vanishes.
+        start: of the block.
+        earliest: no behaviour starts sooner.
+        passed: behaviour id -> sync point -> when it was; what has passed stays. The points after these are
+            not before `earliest`.
+        firm: nothing of it is ever dropped, as it plays already.
+        priorities: behaviour id -> priority; 0 where absent, the lower goes first in a clash.
+    """
+
+    block: Block
+    timings: Mapping[str, Timing]
+    start: float = 0.0
+    earliest: float = 0.0
+    passed: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    firm: bool = False
+    priorities: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -101,8 +125,8 @@ class Problem:
 
     def without(self, dropped: Iterable[Part]) -> Problem:
         """The problem without some parts, and without what referred to them."""
-        gone = {id(part): part.name for part in dropped}
-        lost = {part.name for part in self.behaviours if id(part) in gone}
+        gone = {id(part): part.id for part in dropped}
+        lost = {part.id for part in self.behaviours if id(part) in gone}
         gone.update((id(r.part), "") for r in (*self.equalities, *self.orders) if r.part.names & lost)
         number = {ORIGIN: ORIGIN}
         smaller = Problem()
@@ -122,36 +146,43 @@ class Problem:
 
 
 def problem_of(
-    block: Block,
-    timings: Mapping[str, Timing],
-    *,
-    earliest: float = 0.0,
-    outside: Callable[[SyncRef], float | None] = lambda ref: None,
-    priorities: Mapping[str, float] | None = None,
+    members: Sequence[Member], outside: Callable[[SyncRef], float | None] = lambda ref: None
 ) -> Problem:
-    """The problem of one block.
+    """The problem of one or more blocks.
 
     Args:
-        timings: behaviour id -> what it wants of time; a behaviour that is not in it is absent, and what
-            refers to it vanishes.
-        earliest: seconds from block start, no behaviour starts sooner.
-        outside: a reference into another block, offset included -> seconds from this block's start, or None.
-        priorities: behaviour id -> priority; 0 where absent, the lower goes first in a clash.
+        members: the new block first; sentences name the behaviours of the others with their block.
+        outside: a reference into a block that is no member, offset included -> seconds on the members'
+            clock, or None.
     """
-    problem, filler = Problem(), _Filler(block, timings, outside)
-    required, places, weights = block.required, block.places, priorities or {}
-    present: list[tuple[Behaviour, Part, int]] = []
-    for order, node in enumerate(block.behaviours):
-        name = node.id
-        if name not in timings or name in filler.first:
-            continue
-        place = places.get(name)
-        line = place.line if place is not None else None
-        part = Part(f"{block.id}:{name}", name, name in required, weights.get(name, 0.0), order, line)
-        filler.first[name] = problem.add(part, timings[name], earliest)
-        present.append((node, part, filler.first[name]))
-    for node, part, first in present:
-        points = timings[node.id].points
+    problem, own = Problem(), members[0].block.id
+    first: dict[tuple[str, str], int] = {}
+    present: list[tuple[Member, Behaviour, Part]] = []
+    for member in members:
+        block, required, places = member.block, member.block.required, member.block.places
+        for order, node in enumerate(block.behaviours):
+            id = node.id
+            if id not in member.timings or (block.id, id) in first:
+                continue
+            place = places.get(id)
+            part = Part(
+                f"{block.id}:{id}",
+                id if block.id == own else f"{block.id}:{id}",
+                member.firm or id in required,
+                member.priorities.get(id, 0.0),
+                order,
+                place.line if place is not None else None,
+            )
+            # Of one that has begun, what is still to come is held by `_pass`.
+            earliest = -np.inf if id in member.passed else member.earliest
+            first[block.id, id] = problem.add(part, member.timings[id], earliest)
+            present.append((member, node, part))
+    fillers = {m.block.id: _Filler(m, {o.block.id: o for o in members}, first, outside) for m in members}
+    for member, node, part in present:
+        start, points = first[member.block.id, node.id], member.timings[node.id].points
+        if node.id in member.passed:
+            _pass(problem, member, part, start, points, member.passed[node.id])
+        filler = fillers[member.block.id]
         for sync, ref in _references(node):
             try:
                 if (target := filler.point(ref)) is None:
@@ -161,11 +192,32 @@ def problem_of(
             except LookupError as fault:
                 problem.faults.append((part, str(fault)))
                 break
-            says = (f"{node.id}:{sync}", "=", ref)
-            problem.equalities.append(Relation(first + points.index(sync), *target, part, says))
-    for order, constraint in enumerate(block.constraints):
-        _add_constraint(problem, filler, constraint, order)
+            says = (f"{part.name}:{sync}", "=", ref)
+            problem.equalities.append(Relation(start + points.index(sync), *target, part, says))
+    for member in members:
+        for order, constraint in enumerate(member.block.constraints):
+            _add_constraint(problem, fillers[member.block.id], constraint, order)
     return problem
+
+
+def _pass(
+    problem: Problem,
+    member: Member,
+    part: Part,
+    first: int,
+    points: tuple[str, ...],
+    when: Mapping[str, float],
+) -> None:
+    """Hold what has passed where it was, and the next point to what is still to come."""
+    later = False
+    for i, sync in enumerate(points):
+        if sync in when:
+            says = (f"{part.name}:{sync}", "=", f"the time at which it passed, {when[sync]:.3f}")
+            problem.equalities.append(Relation(first + i, ORIGIN, when[sync], part, says))
+        elif not later:
+            later = True
+            says = (f"{part.name}:{sync}", "not before", "now")
+            problem.orders.append(Relation(ORIGIN, first + i, member.earliest, part, says))
 
 
 def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
@@ -178,21 +230,22 @@ def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
 
 
 def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, order: int) -> None:
-    block = filler.block
+    member = filler.member
+    block = member.block
     refs = [ref for piece in constraint.parts for ref in piece.refs]
     refs += [piece.ref for piece in constraint.parts if not isinstance(piece, Synchronize)]
-    names = {ref.behaviour for ref in refs if filler.is_own(ref)} - {None, "bml"}
-    if not names <= filler.first.keys():
+    named = {ref.behaviour for ref in refs if filler.is_own(ref)} - {None, "bml"}
+    if not all((block.id, name) in filler.first for name in named):
         return
     place = block.places.get(constraint.id) if constraint.id else constraint.place
     part = Part(
         constraint.id or block.id,
         constraint.id or "",
-        constraint.required,
+        constraint.required or member.firm,
         order=order,
         line=place.line if place is not None else None,
         is_constraint=True,
-        names=frozenset(name for name in names if name),
+        names=frozenset(f"{block.id}:{name}" for name in named),
     )
     try:
         for piece in constraint.parts:
@@ -213,16 +266,19 @@ def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, o
 
 
 class _Filler:
-    """Sync references of one block -> (point, seconds after it)."""
+    """Sync references of one member -> (point, seconds after it)."""
 
     def __init__(
-        self, block: Block, timings: Mapping[str, Timing], outside: Callable[[SyncRef], float | None]
+        self,
+        member: Member,
+        members: Mapping[str, Member],
+        first: Mapping[tuple[str, str], int],
+        outside: Callable[[SyncRef], float | None],
     ) -> None:
-        self.block, self.timings, self.outside = block, timings, outside
-        self.first: dict[str, int] = {}
+        self.member, self.members, self.first, self.outside = member, members, first, outside
 
     def is_own(self, ref: SyncRef) -> bool:
-        return ref.block is None or ref.block == self.block.id
+        return ref.block is None or ref.block == self.member.block.id
 
     def must(self, ref: SyncRef) -> tuple[int, float]:
         """As `point`, of a behaviour that is present."""
@@ -231,29 +287,34 @@ class _Filler:
             raise LookupError(f"{ref} is not known")
         return found
 
+    def elsewhere(self, ref: SyncRef) -> float:
+        """Seconds on the members' clock of a point that is solved by nobody here."""
+        time = self.outside(ref)
+        if time is None:
+            raise LookupError(f"{ref} is not known here, or its time is not known yet")
+        return float(time)
+
     def point(self, ref: SyncRef) -> tuple[int, float] | None:
         """None where the behaviour is absent.
 
         Raises:
             LookupError: there is no such sync point; the text says what there is.
         """
-        if not self.is_own(ref):
-            time = self.outside(ref)
-            if time is None:
-                raise LookupError(f"{ref} is not known here, or its time is not known yet")
-            return ORIGIN, float(time)
+        there = self.member if ref.block is None else self.members.get(ref.block)
         name = ref.behaviour
+        if there is None or (name == "bml" and not self.is_own(ref)):
+            return ORIGIN, self.elsewhere(ref)
         if name is None:
-            return ORIGIN, ref.offset
+            return ORIGIN, there.start + ref.offset
         if name == "bml":
             if ref.sync != "start":
                 raise LookupError(f"{ref}: of its own block only bml:start can be referred to")
-            return ORIGIN, ref.offset
-        first = self.first.get(name)
+            return ORIGIN, there.start + ref.offset
+        first = self.first.get((there.block.id, name))
         if first is None:
-            return None
+            return None if self.is_own(ref) else (ORIGIN, self.elsewhere(ref))
         sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
-        points = self.timings[name].points
+        points = there.timings[name].points
         if sync not in points:
             raise LookupError(f"{ref}: {name} has no {sync}, only {', '.join(points)}")
         return first + points.index(sync), ref.offset

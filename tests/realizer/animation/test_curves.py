@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from realizer.animation.channel import Channel
+from realizer.animation.channel import Channel, Joint
 from realizer.animation.curves import CURVES, MANY_KEYS, sample, smooth, weights
 from realizer.animation.targets import au
 
@@ -105,3 +107,24 @@ def test_weights_say_how_much_of_a_channel_is_there() -> None:
     stays = Channel(TARGET, np.array([1.0]), np.array([0.0]), holds=True).faded(3.0, 4.0)
     times = np.array([0.9, 1.0, 2.0, 2.1, 3.5, 4.0])
     assert weights([ends, stays], times).tolist() == [[0, 1, 1, 0, 0, 0], [0, 1, 1, 1, 0.5, 0]]
+
+
+@given(at=st.floats(0.2, 1.8), later=st.floats(-0.15, 1.0), length=st.floats(0.1, 0.6))
+def test_a_channel_that_goes_on_in_anothers_place_joins_it_in_value_and_slope(
+    at: float, later: float, length: float
+) -> None:
+    old = Channel(TARGET, np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.8, 0.0]))
+    new = Channel(TARGET, np.array([0.0, 1.0 + later, 2.2 + later]), np.array([0.0, 0.8, 0.0]))
+    h = 1e-5
+    around = sample([old, new], np.array([at - h, at, at + h]))
+    value = around[0, 1] - around[1, 1]
+    slope = ((around[0, 2] - around[0, 0]) - (around[1, 2] - around[1, 0])) / (2 * h)
+    pair = [replace(old, until=at), replace(new, joint=Joint(at, value, slope, length))]
+    times = np.array([at - 2 * h, at - h, at, at + h, at + 2 * h])
+    shown = sample(pair, times).sum(axis=0)
+    assert np.abs(np.diff(shown)).max() < 5 * h, "no jump"
+    assert np.abs(np.diff(shown, 2)).max() < 100 * h * h, "and no kink"
+    healed = np.array([at + length, at + length + 0.1])
+    assert sample(pair, healed).sum(axis=0) == pytest.approx(sample([new], healed)[0])
+    before = np.linspace(0, at, 7)[:-1]
+    assert sample(pair, before).sum(axis=0) == pytest.approx(sample([old], before)[0])
