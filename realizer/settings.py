@@ -69,6 +69,13 @@ def _address(value: Any) -> str:
     return f"{host}:{int(port)}"
 
 
+def _folder(value: Any) -> Path:
+    path = Path(value)
+    if not path.is_dir():
+        raise ValueError("a folder that is there")
+    return path
+
+
 def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
     return lambda value: None if value is None or value == "" else read(value)
 
@@ -107,7 +114,7 @@ class Settings:
     language: str = _setting("en-US", _text, "BCP-47, of speech that names none")
     fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
     scene: Path | None = _setting(None, _optional(Path), "a file of targets every session starts with")
-    media: Path | None = _setting(None, _optional(Path), "the folder of the files that documents may name")
+    media: Path | None = _setting(None, _optional(_folder), "the folder of the files that documents may name")
     seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
     keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")

@@ -38,15 +38,10 @@ def expand(node: Expression, times: Float64, world: World) -> tuple[Channel, ...
 
 def check(node: Expression, world: World) -> tuple[Fault, ...]:
     """An unknown name is fatal."""
-    name = _key(node.name)
-    if name in library():
+    if _key(node.name) in library():
         return ()
-    own = PREFIX.lower()
-    if name.startswith(PREFIX):
-        fault = poses.unknown("name", name.removeprefix(PREFIX), [t.lower() for t in templates()], prefix=own)
-    else:
-        fault = poses.unknown("name", node.name, [*face_lexemes(), *(own + t.lower() for t in templates())])
-    return (fault,)
+    own = [(PREFIX + name).lower() for name in templates()]
+    return (poses.unknown("name", node.name, [*face_lexemes(), *own]),)
 
 
 @cache

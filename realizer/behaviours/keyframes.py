@@ -96,13 +96,13 @@ def _keys(node: FaceKeyframe) -> Keys:
 @lru_cache(maxsize=64)
 def _read(type: str, parts: str, text: str) -> Keys:
     found = _parts(type, parts)
-    lines = [(number, line.split()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [line.split() for line in text.splitlines() if line.strip()]
     if len(lines) < 2:
         raise Bad(f"keys: wanted at least two lines, got {len(lines)}")
     before = -np.inf
     rows = np.empty((len(lines), len(found) + 1))
-    for row, (number, words) in enumerate(lines):
-        place, said = f"line {number} of the keys", " ".join(words)[:60]
+    for row, words in enumerate(lines):
+        place, said = f"line {row + 1} of the keys", " ".join(words)[:60]
         wanted = f"wanted a time and {len(found)} value{'s' * (len(found) != 1)}"
         if len(words) != len(found) + 1 or not all(map(NUMBER.fullmatch, words)):
             raise Bad(f"{place}: {wanted}, got {said!r}")

@@ -44,13 +44,15 @@ def kept(values: Mapping[Target, float], times: Float64, source: str) -> tuple[C
     )
 
 
-def unknown(attribute: str, word: str, known: Iterable[str], *, prefix: str = "") -> Fault:
-    """The fault of a word that nobody knows, with those near it, or all if none is.
-
-    `prefix` stands before the word and before all that are known, and does not make them alike.
-    """
-    names = {name.upper(): prefix + name for name in known}
-    got = prefix + (word if len(word) <= 60 else word[:60] + "...")
-    near = difflib.get_close_matches(word[:60].upper(), list(names), n=3)
-    wanted = f"one of {', '.join(names.values())}" if not near else " or ".join(names[name] for name in near)
-    return Fault("CANNOT_CREATE_BEHAVIOR", f"{attribute}: wanted {wanted}; got {got!r}")
+def unknown(attribute: str, word: str, known: Iterable[str]) -> Fault:
+    """The fault of a word that is none of those known, with those near it."""
+    names = {name.upper(): name for name in known}
+    got = word if len(word) <= 60 else word[:60] + "..."
+    # Of names such as "template:grief" only the last part makes them alike.
+    family, _, part = got.upper().rpartition(":")
+    parts = {name.rpartition(":")[2]: name for name in names if name.rpartition(":")[0] == family}
+    near = difflib.get_close_matches(part, list(parts), n=3)
+    meant = " or ".join(names[parts[name]] for name in near)
+    hint = f", did you mean {meant}?" if near else ""
+    wanted = f"{attribute}: wanted one of {', '.join(names.values())}"
+    return Fault("CANNOT_CREATE_BEHAVIOR", f"{wanted}; got {got!r}{hint}")

@@ -56,8 +56,9 @@ def test_a_template_lasts_as_long_as_it_was_seen_within_what_is_probable(play, t
 @pytest.mark.parametrize(
     ("name", "meant"),
     [
-        ("template:astonishmant", "wanted template:astonishment;"),
-        ("smiel", "SMILE"),
+        ("template:astonishmant", "did you mean template:astonishment?"),
+        ("smiel", "did you mean SMILE"),
+        ("grieff", "template:grief"),
         ("zzz", "template:grief"),
     ],
 )

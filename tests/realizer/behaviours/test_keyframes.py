@@ -60,7 +60,7 @@ def test_keys_that_do_not_begin_or_end_at_rest_are_reached_without_a_jump(play) 
         (keyframe("FACS", "12 12.BOTH", KEYS), "got '12.BOTH' twice"),
         (
             keyframe("FAPS", "31 5", "\n0 0 0\n\n1 100\n"),
-            "line 4 of the keys: wanted a time and 2 values, got '1 100'",
+            "line 2 of the keys: wanted a time and 2 values, got '1 100'",
         ),
         (
             keyframe("FAPS", "31", "0 0\n1 nan\n"),
