@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 from lxml import etree
 
 from bml_schema.errors import Fault
@@ -64,5 +66,5 @@ def attributes(element: etree._Element) -> list[tuple[str, str]]:
     count = len(element.attrib)
     if count > MOST_ATTRIBUTES:
         raise Fault(f"wanted at most {MOST_ATTRIBUTES} attributes, got {count}", element)
-    items: list[tuple[str, str]] = list(element.items())  # type: ignore[arg-type]
-    return items
+    items: Any = element.items()
+    return cast("list[tuple[str, str]]", items)

@@ -14,6 +14,7 @@ from lxml import etree
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MOST_BEHAVIOURS, read_block
+from bml_schema.shape import local
 from bml_schema.vocabulary import VOCABULARY
 
 __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
@@ -37,6 +38,9 @@ _CLOSERS = {
     "<!DOCTYPE": re.compile(r"\]\s*>"),
 }
 _BLANKS = " \t\r\n\ufeff"
+# What may stand between documents; SmartBody wraps its own in <act>.
+_BETWEEN = re.compile(rf"(?:[{_BLANKS}]|</?act(?=[\s/>])[^<>]*>|</?participant(?=[\s/>])[^<>]*>)*+")
+_LONG_TAG = re.compile(rb"<([^\s<>/!?]++)[^<>\n]*+\n[^<>]*+>")
 _ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 # Some of Python's codecs are slow or strange enough to be an attack.
@@ -98,6 +102,15 @@ def read(
     Yields:
         A Block for each document, a BMLError for each stretch that gave none. Raises nothing.
     """
+    data, roots = _whole(text, most_bytes)
+    if 0 < len(roots) <= most_documents:
+        begins = _begins(data)
+        for root in roots:
+            try:
+                yield read_block(root, vocabulary, begins=begins, most_behaviours=most_behaviours)
+            except BMLError as wrong:
+                yield wrong
+        return
     try:
         text = _decoded(text) if isinstance(text, bytes) else text
     except BMLError as wrong:
@@ -142,6 +155,50 @@ def read(
         else:
             broken = False
             yield block
+
+
+def _whole(text: str | bytes, most_bytes: int) -> tuple[bytes, list[etree._Element]]:
+    """What lxml was given, and the documents in it, where the text is nothing but one sound document.
+
+    Nearly all texts are, and are read in one pass; no document sends a text the long way, which explains.
+    """
+    if len(text) > most_bytes:
+        return b"", []
+    if isinstance(text, str):
+        try:
+            data = text.encode()
+        except UnicodeEncodeError:
+            return b"", []
+    elif _ENCODING.match(text.removeprefix(codecs.BOM_UTF8).lstrip()):
+        return b"", []
+    else:
+        data = text
+    if len(data) > most_bytes or b"<!DOCTYPE" in data:
+        return data, []
+    try:
+        root = etree.fromstring(data, _PARSER)
+    except etree.XMLSyntaxError:
+        return data, []
+    name = local(str(root.tag))
+    if name == "bml":
+        return data, [root]
+    # SmartBody's messages: <act><participant/><bml>..</bml></act>.
+    return data, [child for child in root if local(str(child.tag)) == "bml"] if name == "act" else []
+
+
+def _begins(data: bytes) -> dict[tuple[int, str], int]:
+    """Where start tags of several lines begin: (line of its end, which is all lxml knows, name) -> line."""
+    begins: dict[tuple[int, str], int] = {}
+    if data.count(b"\n") == data.count(b">\n"):
+        return begins  # every line ends with a tag
+    line, counted = 1, 0
+    for found in _LONG_TAG.finditer(data):
+        start, end = found.span()
+        line += data.count(b"\n", counted, start)
+        counted = start
+        name = found[1].rpartition(b":")[2].decode(errors="replace")
+        begins.setdefault((line + data.count(b"\n", start, end), name), line)
+    return begins
 
 
 class _Stretch(NamedTuple):
@@ -219,8 +276,9 @@ def _stretches(text: str, first: int = 0, last: int | None = None) -> Iterator[_
     for n, mark in enumerate([*marks, _Mark("end", last, last)]):
         if mark.start < here:
             continue  # inside a document
-        if junk < 0 and (gap := text[here : mark.start].lstrip(_BLANKS)):
-            junk = mark.start - len(gap)
+        if junk < 0:
+            between = _BETWEEN.match(text, here, mark.start)
+            junk = between.end() if between and between.end() < mark.start else -1
         if junk < 0 and mark.kind == "close":
             junk = mark.start
         if doctype < 0 and mark.kind == "doctype":
@@ -264,7 +322,9 @@ def _block(
             f"wanted at most {most_bytes} bytes in a document, got {len(data)}", line=line, block=id
         )
     root = element(data, lines_before=line - 1, block=id)
-    return read_block(root, vocabulary, lines_before=line - 1, most_behaviours=most_behaviours)
+    return read_block(
+        root, vocabulary, lines_before=line - 1, begins=_begins(data), most_behaviours=most_behaviours
+    )
 
 
 _PARSER = etree.XMLParser(

@@ -7,11 +7,11 @@ decides what goes with it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, cast
 
 from lxml import etree
 
-from bml_schema.behaviours import Speech, Sync
+from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.canonical import attributes, canonical
 from bml_schema.errors import Fault, shown
 from bml_schema.escape import escape
@@ -24,13 +24,15 @@ from bml_schema.nodes import (
     After,
     Before,
     Behaviour,
+    Block,
     Constraint,
     Description,
+    Required,
     Synchronize,
     core,
     extension,
 )
-from bml_schema.shape import Shape, local, shape_of, sync_ref
+from bml_schema.shape import Attribute, Shape, local, shape_of
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
 from bml_schema.values import unwanted
 
@@ -45,10 +47,8 @@ _OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
 _KNOWN = (*_OURS, f"{{{BMLA}}}", f"{{{BMLT}}}", f"{{{OWN}}}")
 _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
-
-
-class _BadReference(Exception):
-    """A reference that is none or leads nowhere; its text is the whole sentence."""
+# Elements of the core that are no behaviours.
+_INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
 
 
 class Elements:
@@ -68,7 +68,9 @@ class Elements:
 
     def tag(self, element: etree._Element) -> str:
         """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
-        raw = str(element.tag)
+        raw: Any = element.tag
+        if raw in _INNER or raw in self.vocabulary:
+            return cast("str", raw)
         known = self._tags.get(raw)
         if known is None:
             space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
@@ -83,77 +85,70 @@ class Elements:
     def node(self, cls: type[Any], element: etree._Element, *, timed: bool = False) -> Any:
         """An element as its class says; timed: with an id and sync points of its own."""
         shape = shape_of(cls)
-        values = self.attributes(cls, shape, element, timed)
+        values = self.attributes(shape, element, timed)
         if shape.mixed:
             values[shape.mixed] = tuple(self.mixed(shape, element))
         elif shape.text:
             values[shape.text] = self.text(element)
         elif shape.children or len(element):
             self.children(shape, element, values)
-        elif element.text:
+        elif (loose := element.text) and not loose.isspace():
             self.no_text(element)
         node: Any = cls(**values)
-        if timed and (said := node.fault()):
+        if timed and shape.checked and (said := node.fault()):
             raise Fault(said, element)
         return node
 
-    def attributes(
-        self, cls: type[Any], shape: Shape, element: etree._Element, timed: bool
-    ) -> dict[str, Any]:
+    def attributes(self, shape: Shape, element: etree._Element, timed: bool) -> dict[str, Any]:
         """Values by field; one Fault names everything that is wrong with them."""
         values: dict[str, Any] = {}
         syncs: dict[str, SyncRef] = {}
         foreign: dict[str, str] = {}
         faults: list[str] = []
         known = shape.attributes
-        points = cls.sync_points if timed else ()
+        points = shape.points if timed else ()
         for name, text in attributes(element):
             spec = known.get(name)
             try:
-                if spec is not None:
-                    value = spec.value
-                    values[spec.field] = self.reference(text) if value is sync_ref else value.read(text)
-                elif name in points:
-                    syncs[name] = self.reference(text)
+                if spec is None:
+                    if name in points:
+                        syncs[name] = read_sync_ref(text, self.names)
+                    else:
+                        foreign[name] = text
+                elif spec.read is None:
+                    values[spec.field] = read_sync_ref(text, self.names)
                 else:
-                    foreign[name] = text
-            except _BadReference as wrong:
-                faults.append(f"{name}: {wrong}")
-            except ValueError:
-                wanted = spec.value.wanted if spec is not None else ""
-                faults.append(f"{name}: {unwanted(wanted, text, shown(text))}")
-        has_syncs = "syncs" in shape.names
-        for spec in shape.required:
-            if spec.field in values or spec.name in element.attrib:
-                continue
-            if spec.name == "id" and has_syncs and not timed:
+                    values[spec.field] = spec.read(text)
+            except ValueError as wrong:
+                # Who reads a reference says the whole sentence.
+                said = wrong if spec is None or spec.read is None else _unwanted(spec, text)
+                faults.append(f"{local(name)}: {said}")
+        if not shape.needed <= values.keys():
+            if shape.timed and not timed and "id" not in element.attrib:
                 values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
-            else:
-                faults.append(f"{spec.name}: wanted {spec.value.wanted}, got none")
+            missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
+            faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
         if faults:
             raise Fault("; ".join(faults), element)
-        if has_syncs:
+        if shape.timed:
             values["syncs"] = syncs
             values["foreign"] = foreign
         return values
-
-    def reference(self, text: str) -> SyncRef:
-        try:
-            return read_sync_ref(text, self.names)
-        except ValueError as wrong:
-            raise _BadReference(str(wrong)) from None
 
     def children(self, shape: Shape, element: etree._Element, values: dict[str, Any]) -> None:
         """Child elements into the fields of `values`."""
         found: dict[str, list[Any]] = {}
         descriptions: list[Description] = []
-        self.no_text(element)
+        others: list[str] = []
+        loose = element.text
         for child in element:
+            if not loose or loose.isspace():
+                loose = child.tail
             tag = self.tag(child)
-            if tag == _DESCRIPTION and "descriptions" in shape.names:
+            spec = shape.by_tag.get(tag)
+            if spec is None and tag == _DESCRIPTION and shape.timed:
                 descriptions.append(self.description(child))
                 continue
-            spec = shape.by_tag.get(tag)
             if spec is None and tag.startswith(_KNOWN):
                 # Documents leave an extension's children in the core namespace, in none, or in its sister's.
                 spec = shape.by_local.get(local(tag))
@@ -161,7 +156,10 @@ class Elements:
                 found.setdefault(spec[0].field, []).append(self.node(spec[1], child))
             elif tag.startswith(_OURS):
                 raise Fault(f"wanted {shape.listed}, got <{local(tag)}>", child)
-            # Others' elements, such as <bmlt:parameter>, are for others.
+            elif shape.timed:
+                others.append(canonical(child))
+        if loose and not loose.isspace():
+            self.no_text(element)
         for kind in shape.children:
             nodes = found.get(kind.field, [])
             if len(nodes) < kind.least:
@@ -174,6 +172,8 @@ class Elements:
                 values[kind.field] = nodes[0]
         if descriptions:
             values["descriptions"] = tuple(descriptions)
+        if others:
+            values["others"] = tuple(others)
 
     def no_text(self, element: etree._Element) -> None:
         loose = loose_text(element)
@@ -201,7 +201,7 @@ class Elements:
     # description := any XML
 
     def description(self, element: etree._Element) -> Description:
-        values = self.attributes(Description, shape_of(Description), element, False)
+        values = self.attributes(shape_of(Description), element, False)
         if values["type"] == _SSML:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
             if len(speak) != 1:
@@ -216,7 +216,7 @@ class Elements:
 
     def constraint(self, element: etree._Element) -> dict[str, Any]:
         """The id and parts of a constraint, by field."""
-        values = self.attributes(Constraint, shape_of(Constraint), element, False)
+        values = self.attributes(shape_of(Constraint), element, False)
         self.no_text(element)
         values["parts"] = tuple(self.constraint_part(child) for child in element)
         if not values["parts"]:
@@ -247,9 +247,13 @@ class Elements:
         if text is None:
             raise Fault("ref: wanted a sync reference, got none", element)
         try:
-            return self.reference(text)
-        except _BadReference as wrong:
+            return read_sync_ref(text, self.names)
+        except ValueError as wrong:
             raise Fault(f"ref: {wrong}", element) from None
+
+
+def _unwanted(spec: Attribute, text: str) -> str:
+    return unwanted(spec.value.wanted, text, shown(text))
 
 
 def loose_text(element: etree._Element) -> str:

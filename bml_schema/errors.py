@@ -24,7 +24,7 @@ CUSTOM_BEHAVIOR_NOT_SUPPORTED = "CUSTOM_BEHAVIOR_NOT_SUPPORTED"
 
 
 class Place(NamedTuple):
-    """Where something stands: 1-based line in the text (where its start tag ends), and element path."""
+    """Where something stands: 1-based line in the text (where its start tag begins), and element path."""
 
     line: int
     path: str

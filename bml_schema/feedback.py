@@ -185,12 +185,14 @@ def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behavi
     """A behaviour as predictionFeedback tells of it: id "block:behaviour", each sync point a plain number.
 
     Args:
-        node: as parsed; its descriptions, priority and foreign attributes stay out.
+        node: as parsed; its descriptions, its priority and what is others' stay out.
         block: id of its block.
         times: sync point -> seconds from block start. "stroke:n" has no attribute form and stays out.
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
-    node = replace(node, id=f"{block}:{node.id}", syncs=syncs, descriptions=(), foreign={}, priority=0.0)
+    node = replace(
+        node, id=f"{block}:{node.id}", syncs=syncs, descriptions=(), foreign={}, others=(), priority=0.0
+    )
     if isinstance(node, Speech) and node.text is not None:
         parts = tuple(
             p

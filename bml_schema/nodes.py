@@ -96,6 +96,8 @@ class Behaviour:
         priority: bmla:priority; of two that want the same thing the lower one is dropped.
         descriptions: in document order.
         foreign: attributes this class does not know, by Clark name, kept for others and for the round trip.
+        others: child elements of others, such as <bmlt:parameter>, kept likewise: each as XML text in
+            canonical form, with its own namespace declarations.
     """
 
     tag: ClassVar[str]
@@ -108,6 +110,7 @@ class Behaviour:
     syncs: Mapping[str, SyncRef] = field(default_factory=dict, hash=False)
     descriptions: tuple[Description, ...] = ()
     foreign: Mapping[str, str] = field(default_factory=dict, hash=False)
+    others: tuple[str, ...] = ()
 
     def fault(self) -> str:
         """What is wrong with the whole of it, beyond single attributes; "" if it is sound."""
@@ -209,24 +212,25 @@ class Block:
     behaviours: tuple[Behaviour, ...] = field(init=False, compare=False, repr=False)
     constraints: tuple[Constraint, ...] = field(init=False, compare=False, repr=False)
     required: frozenset[str] = field(init=False, compare=False, repr=False)
+    _by_id: Mapping[str, Behaviour] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         flat: list[Behaviour | Constraint] = []
-        required: set[str] = set()
+        required: list[str] = []
         for child in self.children:
             if isinstance(child, Required):
-                flat.extend(child.children)
-                required.update(c.id for c in child.children if isinstance(c, Behaviour))
+                flat += child.children
+                required += [c.id for c in child.children if isinstance(c, Behaviour)]
             else:
                 flat.append(child)
+        behaviours = tuple([c for c in flat if isinstance(c, Behaviour)])
         put = object.__setattr__
-        put(self, "behaviours", tuple(c for c in flat if isinstance(c, Behaviour)))
-        put(self, "constraints", tuple(c for c in flat if isinstance(c, Constraint)))
+        put(self, "behaviours", behaviours)
+        put(self, "constraints", tuple([c for c in flat if isinstance(c, Constraint)]))
         put(self, "required", frozenset(required))
+        # The first of two with the same id counts, as in documents.
+        put(self, "_by_id", {b.id: b for b in reversed(behaviours)})
 
     def __getitem__(self, id: str) -> Behaviour:
         """The behaviour with this id; KeyError if there is none."""
-        for behaviour in self.behaviours:
-            if behaviour.id == id:
-                return behaviour
-        raise KeyError(id)
+        return self._by_id[id]

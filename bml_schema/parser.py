@@ -8,13 +8,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from lxml import etree
 
 from bml_schema.behaviours import SpeechText, Sync
 from bml_schema.canonical import attributes
-from bml_schema.elements import Elements, Vocabulary, loose_text
+from bml_schema.elements import Elements, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
     CUSTOM_BEHAVIOR_NOT_SUPPORTED,
@@ -25,7 +26,7 @@ from bml_schema.errors import (
     shown,
 )
 from bml_schema.losses import Losses
-from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
+from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Description, Required
 from bml_schema.shape import local, shape_of
 from bml_schema.sync_refs import Names, Points
 from bml_schema.values import block_names, unwanted
@@ -45,6 +46,7 @@ def read_block(
     vocabulary: Vocabulary,
     *,
     lines_before: int = 0,
+    begins: Mapping[tuple[int, str], int] = MappingProxyType({}),
     most_behaviours: int = MOST_BEHAVIOURS,
 ) -> Block:
     """The block of a <bml> element.
@@ -53,13 +55,15 @@ def read_block(
         root: as lxml parsed it, without comments and processing instructions.
         vocabulary: Clark tag -> node class.
         lines_before: lines of the text in front of what lxml saw.
+        begins: (line where a start tag ends, its local name) -> line where it begins, if that is another.
         most_behaviours: more (constraints counted with them) are refused.
 
     Raises:
         BMLError: not a <bml>, no usable id, or too many behaviours.
     """
     elements = Elements(vocabulary)
-    line = _line(root) + lines_before
+    lines = _Lines(lines_before, begins)
+    line = lines.of(root)
     if elements.tag(root) != Block.tag:
         raise BMLError(f"wanted <bml> in namespace {CORE}, got {shown(str(root.tag))}", line=line)
     try:
@@ -67,7 +71,7 @@ def read_block(
     except Fault as wrong:
         raise BMLError(wrong.text, line=line, path="/bml") from None
     names = elements.names = Names(values["id"])
-    reader = _Reader(elements, names, lines_before)
+    reader = _Reader(elements, names, lines)
     tree = reader.entries(root, "/bml", required=False)
     entries = [e for item in tree for e in (item if isinstance(item, list) else (item,))]
     if len(entries) > most_behaviours:
@@ -75,11 +79,10 @@ def read_block(
         raise BMLError(said, line=line, path="/bml", block=names.block)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root)
-    for entry in entries:
-        reader.name(entry)
     nodes: dict[int, Behaviour | Constraint] = {}
     for n, entry in enumerate(entries):
-        node = reader.constraint(entry) if entry.tag == Constraint.tag else reader.behaviour(entry)
+        read = reader.constraint if entry.kind.tag == Constraint.tag else reader.behaviour
+        node = read(entry)
         if node is not None:
             nodes[n] = node
     reader.prune(nodes)
@@ -145,11 +148,51 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
     return values, "; ".join(faults)
 
 
+class _Lines(NamedTuple):
+    """Lines of the text where start tags begin; lxml knows where they end, in what it was given."""
+
+    before: int
+    begins: Mapping[tuple[int, str], int]
+
+    def of(self, element: etree._Element) -> int:
+        line: Any = element.sourceline
+        if self.begins:
+            line = self.begins.get((line, local(str(element.tag))), line)
+        return int(line or 1) + self.before
+
+
+class _Kind(NamedTuple):
+    """What children of the block of one tag have in common.
+
+    Attributes:
+        step: name in paths.
+        cls: None for a constraint and for what is unknown.
+        points: what references may name; None if that depends on the element, or nobody knows.
+    """
+
+    tag: str
+    step: str
+    cls: type[Behaviour] | None = None
+    points: Points | None = None
+
+
+def _kind_of(cls: type[Behaviour]) -> _Kind:
+    kind = _KINDS.get(cls)
+    if kind is None:
+        shape = shape_of(cls)
+        points = None if cls.marks or shape.strokes else Points(shape.points)
+        kind = _KINDS[cls] = _Kind(cls.tag, shape.name, cls, points)
+    return kind
+
+
+_KINDS: dict[type[Behaviour], _Kind] = {}
+
+
 class _Entry(NamedTuple):
     """A child of the block: a behaviour, a constraint, or unknown."""
 
     element: etree._Element
-    tag: str
+    kind: _Kind
     id: str
     path: str
     required: bool
@@ -158,16 +201,15 @@ class _Entry(NamedTuple):
 class _Reader:
     """What is known while one block is read."""
 
-    __slots__ = ("_points", "elements", "lines_before", "names", "owners", "places", "problems")
+    __slots__ = ("elements", "line", "names", "owners", "places", "problems")
 
-    def __init__(self, elements: Elements, names: Names, lines_before: int) -> None:
+    def __init__(self, elements: Elements, names: Names, lines: _Lines) -> None:
         self.elements = elements
         self.names = names
-        self.lines_before = lines_before
+        self.line = lines.of
         self.problems: list[Problem] = []
         self.places: dict[str, Place] = {}
         self.owners: dict[str, _Entry] = {}
-        self._points: dict[str, Points | None] = {}
 
     # bml := (behaviour | constraint | required)*
 
@@ -175,54 +217,64 @@ class _Reader:
         """What stands in a block, as a tree: a list for each <required>; one inside another adds nothing."""
         tree: list[_Entry | list[_Entry]] = []
         counts: dict[str, int] = {}
-        if loose := loose_text(parent):
-            # Nobody's text, so the block's problem.
-            fault = Fault(f"wanted elements, got the text {shown(loose)}", parent)
-            self.problem(self.names.block, fault, path, parent)
-        tag_of = self.elements.tag
+        loose = parent.text
+        known = self.elements.vocabulary.get
+        owners, points = self.owners, self.names.points
         for element in parent:
-            tag = tag_of(element)
-            step = local(tag)
+            raw: Any = element.tag
+            cls = known(raw)
+            kind = self.kind(element) if cls is None else _kind_of(cls)
+            step = kind.step
             counts[step] = n = counts.get(step, 0) + 1
             here = f"{path}/{step}[{n}]"
-            if tag != Required.tag:
-                tree.append(_Entry(element, tag, element.get("id", "").strip(), here, required))
+            if not loose or loose.isspace():
+                loose = element.tail
+            if kind.tag == Required.tag:
+                inside = self.entries(element, here, required=True)
+                tree.append([e for item in inside for e in (item if isinstance(item, list) else (item,))])
                 continue
-            inside = self.entries(element, here, required=True)
-            tree.append([e for item in inside for e in (item if isinstance(item, list) else (item,))])
+            id = element.get("id", "").strip()
+            entry = _Entry(element, kind, id, here, required)
+            tree.append(entry)
+            # What references may say of it, before any is read.
+            if id and id not in owners and kind.tag != Constraint.tag:
+                owners[id] = entry
+                points[id] = kind.points or self.points(element, kind)
+        if loose and not loose.isspace():
+            # Nobody's text, so the block's problem.
+            fault = Fault(f"wanted elements, got the text {shown(loose.strip())}", parent)
+            self.problem(self.names.block, fault, path, parent)
         return tree
 
-    def name(self, entry: _Entry) -> None:
-        """Note what references may say of an entry, before any reference is read."""
-        id = entry.id
-        if id and entry.tag != Constraint.tag and id not in self.owners:
-            self.owners[id] = entry
-            self.names.points[id] = self.points(entry)
+    def kind(self, element: etree._Element) -> _Kind:
+        """The kind of an element whose tag is not in the vocabulary as it stands."""
+        tag = self.elements.tag(element)
+        cls = self.elements.vocabulary.get(tag)
+        return _Kind(tag, local(tag)) if cls is None else _kind_of(cls)
 
-    def points(self, entry: _Entry) -> Points | None:
-        element, tag = entry.element, entry.tag
-        if tag not in self._points:
-            cls = self.elements.vocabulary.get(tag)
-            self._points[tag] = None if cls is None else Points(cls.sync_points)
-        points = self._points[tag]
-        if points is None:
+    def points(self, element: etree._Element, kind: _Kind) -> Points | None:
+        """What references may name of an element whose kind does not tell."""
+        if kind.cls is None:
             return None
-        if self.elements.vocabulary[tag].marks:
-            syncs = (s for child in element if self.elements.tag(child) == SpeechText.tag for s in child)
-            marks = [s.get("id", "").strip() for s in syncs if self.elements.tag(s) == Sync.tag]
-            # A description may name points that the core text leaves out.
-            marks += [m.get("name", "").strip() for m in element.iterdescendants("{*}mark")]
-            return Points((*points.names, *marks))
-        times = element.get("repetition")
-        if times is not None and "stroke" in points.names and times.isdecimal() and len(times) < 6:
-            return Points(points.names, int(times))
-        return points
+        names = shape_of(kind.cls).points
+        if not kind.cls.marks:
+            times = element.get("repetition", "1").strip()
+            return Points(names, int(times) if times.isdecimal() and len(times) < 6 else 1)
+        marks: list[str] = []
+        for child in element:
+            tag = self.elements.tag(child)
+            if tag == SpeechText.tag:
+                marks += [s.get("id", "").strip() for s in child if self.elements.tag(s) == Sync.tag]
+            elif tag == Description.tag:
+                # It may name points that the core text leaves out.
+                marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]
+        return Points(names.union(m for m in marks if ":" not in m) if marks else names)
 
     def behaviour(self, entry: _Entry) -> Behaviour | None:
         """The node of an entry; None, and a Problem, if it is dropped."""
         element = entry.element
         try:
-            cls = self.elements.vocabulary.get(entry.tag)
+            cls = entry.kind.cls
             if cls is None:
                 raise self.unknown(entry)
             owner = self.owners.get(entry.id, entry)
@@ -239,7 +291,7 @@ class _Reader:
         return node
 
     def unknown(self, entry: _Entry) -> Fault:
-        tag, element = entry.tag, entry.element
+        tag, element = entry.kind.tag, entry.element
         standard = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
         if not tag.startswith(standard):
             return Fault(f"no behaviour {shown(tag)} is known here", element, CUSTOM_BEHAVIOR_NOT_SUPPORTED)
@@ -298,14 +350,6 @@ class _Reader:
         self.problems.append(
             Problem(id=id, type=fault.type, text=fault.text, line=line, path=where, fatal=required)
         )
-
-    def line(self, element: etree._Element) -> int:
-        return _line(element) + self.lines_before
-
-
-def _line(element: etree._Element) -> int:
-    line: Any = element.sourceline
-    return int(line or 1)
 
 
 def _grouped(

@@ -15,7 +15,7 @@ descriptions, faults and round trip come with the base class.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, TypeVar, dataclass_transform
 
@@ -32,13 +32,17 @@ sync_ref = Value("a sync reference", lambda text: text, str, "syncReference")
 
 @dataclass(frozen=True, slots=True)
 class Attribute:
-    """One XML attribute: field it goes to, its name in XML, what it may hold."""
+    """One XML attribute: field it goes to, its name in XML, what it may hold.
+
+    `read` is that of its value, None for a sync reference, which cannot be read alone.
+    """
 
     field: str
     name: str
     value: Value
     required: bool
     default: Any = None
+    read: Callable[[str], Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +67,11 @@ class Shape:
         mixed: field of the mixed content (text and children in order), or "".
         text: field of the character data, or "".
         names: names of all fields.
+        name: local name of its element.
+        timed: it has sync points, and may hold descriptions and what is not ours.
+        points: its sync points; `strokes`: it may have several strokes, "stroke:n".
+        checked: its class has a `fault` of its own to ask.
+        needed: the fields of `required`.
     """
 
     attributes: Mapping[str, Attribute]
@@ -73,6 +82,12 @@ class Shape:
     mixed: str = ""
     text: str = ""
     names: frozenset[str] = frozenset()
+    name: str = ""
+    timed: bool = False
+    points: frozenset[str] = frozenset()
+    strokes: bool = False
+    checked: bool = False
+    needed: frozenset[str] = frozenset()
 
     @property
     def listed(self) -> str:
@@ -115,7 +130,44 @@ def text(*, default: Any = MISSING) -> Any:
 )
 def node(cls: type[_T]) -> type[_T]:
     """A frozen, slotted, keyword-only dataclass: a node class."""
-    return dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    made = dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    made.__init__ = _quick_init(made)  # type: ignore[method-assign]
+    return made
+
+
+_ABSENT: Any = object()
+
+
+def _quick_init(cls: type[Any]) -> Callable[..., None]:
+    """The `__init__` a dataclass has, in half the time: documents are made of thousands of nodes.
+
+    A frozen dataclass looks each slot up by its name to get past its own `__setattr__`; this knows the slots.
+    """
+    known: dict[str, Any] = {"absent": _ABSENT}
+    parameters: list[str] = []
+    lines: list[str] = []
+    for f in fields(cls):
+        if not f.init:
+            continue
+        known[f"set_{f.name}"] = getattr(cls, f.name).__set__
+        value = f.name
+        if f.default_factory is not MISSING:
+            known[f"make_{f.name}"] = f.default_factory
+            parameters.append(f"{f.name}=absent")
+            value = f"make_{f.name}() if {f.name} is absent else {f.name}"
+        elif f.default is not MISSING:
+            known[f"default_{f.name}"] = f.default
+            parameters.append(f"{f.name}=default_{f.name}")
+        else:
+            parameters.append(f.name)
+        lines.append(f"    set_{f.name}(self, {value})")
+    if hasattr(cls, "__post_init__"):
+        lines.append("    self.__post_init__()")
+    start = f"def __init__(self, *, {', '.join(parameters)}):" if parameters else "def __init__(self):"
+    exec("\n".join([start, *(lines or ["    pass"])]), known)
+    init: Callable[..., None] = known["__init__"]
+    init.__qualname__ = f"{cls.__qualname__}.__init__"
+    return init
 
 
 def local(tag: str) -> str:
@@ -152,20 +204,30 @@ def _shape(cls: type[Any]) -> Shape:
             optional = f.default is not MISSING or f.default_factory is not MISSING
             default = f.default if f.default is not MISSING else None
             xml = more or camel(f.name)
-            attributes[xml] = Attribute(f.name, xml, what, not optional, default)
+            read = None if what is sync_ref else what.read
+            attributes[xml] = Attribute(f.name, xml, what, not optional, default, read)
             continue
         if kind in content:
             content[kind] = f.name
         if kind != "text":
             kinds.append(Child(f.name, what, kind != "child", int(more)))
     by_tag = {c.tag: (k, c) for k in kinds for c in k.classes}
+    timed = hasattr(cls, "sync_points")
+    points = frozenset(cls.sync_points) if timed else frozenset()
+    required = tuple(a for a in attributes.values() if a.required)
     return Shape(
         attributes=attributes,
-        required=tuple(a for a in attributes.values() if a.required),
+        required=required,
         children=tuple(kinds),
         by_tag=by_tag,
         by_local={local(tag): found for tag, found in by_tag.items()},
         mixed=content["mixed"],
         text=content["text"],
         names=frozenset(f.name for f in fields(cls)),
+        needed=frozenset(a.field for a in required),
+        name=local(getattr(cls, "tag", "")),
+        timed=timed,
+        points=points,
+        strokes="stroke" in points and "repetition" in attributes,
+        checked=timed and "fault" in {name for base in cls.__mro__[:-2] for name in vars(base)},
     )

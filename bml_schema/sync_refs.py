@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from bml_schema.errors import did_you_mean, shown
+from bml_schema.shape import node
 from bml_schema.values import MOST_SECONDS, NUMBER, decimal, unwanted
 
 __all__ = ["SyncRef"]
@@ -17,12 +18,11 @@ _POINTS = frozenset({"start", "ready", "strokeStart", "stroke", "strokeEnd", "at
 _LONGEST = 1000  # characters of a reference: two ids of 256, a sync id, an offset
 _WANTED = 'a number of seconds or a reference such as "behaviour:sync + 0.5"'
 _UNSIGNED = re.compile(r"[0-9]+(?:\.[0-9]*)?|\.[0-9]+")
-# Nearly all references are such, and are read without further thought when their names exist.
-_PLAIN = re.compile(r"([^:+\-\s]+):([^:+\-\s]+)(?:\s*([+-])\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+))?")
+_PLAIN = re.compile(r"([^:+\-\s]+)\s*([+-])\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 _OFFSET_LIKE = re.compile(r".*[+-]\s*(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@node
 class SyncRef:
     """A point in time, as a document says it.
 
@@ -94,14 +94,14 @@ def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
 
     Source: BML 1.0, sync references.
     """
-    plain = _PLAIN.fullmatch(text)
-    if plain and names is not None:
-        behaviour, sync, sign, offset = plain.groups()
-        points = names.points.get(behaviour)
-        if points and sync in points.names and (sign is None or text.partition(":")[2] not in points.names):
-            return SyncRef(
-                behaviour=behaviour, sync=sync, offset=_seconds(sign + offset) if sign is not None else 0.0
-            )
+    source, colon, sync = text.partition(":")
+    if colon and names is not None and (points := names.points.get(source)):
+        # Nearly all references are such, and their names exist.
+        if sync in points.names:
+            return SyncRef(behaviour=source, sync=sync)
+        plain = _PLAIN.fullmatch(sync)
+        if plain and plain[1] in points.names:
+            return SyncRef(behaviour=source, sync=plain[1], offset=_seconds(plain[2] + plain[3]))
     text = text.strip()
     if NUMBER.fullmatch(text):
         return SyncRef(offset=_seconds(text))

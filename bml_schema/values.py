@@ -17,6 +17,7 @@ _MOST_NAME = 256  # characters; ids come back in feedback start tags, which clie
 
 # No exponent, NaN or infinity: the standard's numbers are plain decimals.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+_WHOLE = re.compile(r"[+-]?[0-9]+")
 _FANCY = re.compile(r"[+-]?(?:nan|inf|infinity|[0-9.]+e[+-]?[0-9]+)", re.IGNORECASE)
 
 
@@ -78,7 +79,7 @@ def integer(low: int, high: int) -> Value:
 
     def read(text: str) -> int:
         text = text.strip()
-        if len(text) > 20 or not re.fullmatch(r"[+-]?[0-9]+", text):
+        if len(text) > 20 or not _WHOLE.fullmatch(text):
             raise ValueError(text)
         value = int(text)
         if not low <= value <= high:
@@ -116,7 +117,7 @@ _NAME = re.compile(rf"[^\s:]{{1,{_MOST_NAME}}}")
 
 def _read_name(text: str) -> str:
     text = text.strip()
-    if text == "bml" or not _NAME.fullmatch(text):
+    if text == "bml" or not ((text.isalnum() and len(text) <= _MOST_NAME) or _NAME.fullmatch(text)):
         raise ValueError(text)
     return text
 

@@ -42,7 +42,7 @@ def write(block: Block) -> str:
 
     Raises:
         ValueError: a node made by hand holds what XML or BML cannot: a control character, NaN, or a
-            description that is not well-formed.
+            description or an element of others that is not well-formed.
     """
     return Writer().block(block) + "\n"
 
@@ -101,15 +101,13 @@ class Writer:
                 inner.append(self._element(child, indent + "  "))
         for description in getattr(node, "descriptions", ()):
             inner.append(f"{indent}  {self._description(description)}")
+        inner += [f"{indent}  {_checked(other)}" for other in getattr(node, "others", ())]
         if not inner:
             return f"{indent}{start}/>"
         return "\n".join((f"{indent}{start}>", *inner, f"{indent}</{name}>"))
 
     def _description(self, node: Description) -> str:
-        try:
-            inside = etree.fromstring(f"<x>{node.content}</x>".encode(), _PLAIN)
-        except (etree.XMLSyntaxError, UnicodeEncodeError) as wrong:
-            raise ValueError(f"description: wanted well-formed content, got {node.content[:60]!r}") from wrong
+        inside = _parsed(node.content, "description: wanted well-formed content")
         values = self._attributes(node)
         if any(not str(e.tag).startswith("{") for e in inside.iterdescendants()):
             # Elements without namespace must not fall into the core one.
@@ -149,6 +147,23 @@ class Writer:
 
 
 _PLAIN = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
+
+
+def _parsed(content: str, wanted: str) -> etree._Element:
+    """The content in an element around it; a ValueError if it is not well-formed."""
+    try:
+        return etree.fromstring(f"<x>{content}</x>".encode(), _PLAIN)
+    except (etree.XMLSyntaxError, UnicodeEncodeError) as wrong:
+        raise ValueError(f"{wanted}, got {content[:60]!r}") from wrong
+
+
+def _checked(other: str) -> str:
+    """Text of an element of others that stays one: in a namespace, so that nobody takes it for ours."""
+    wanted = "others: wanted one well-formed element in a namespace of its own"
+    inside = _parsed(other, wanted)
+    if len(inside) != 1 or not str(inside[0].tag).startswith("{") or inside.text or inside[0].tail:
+        raise ValueError(f"{wanted}, got {other[:60]!r}")
+    return other
 
 
 def _value(name: str, text: str) -> str:

@@ -109,6 +109,13 @@ def _references(draw: st.DrawFn, points: Mapping[str, list[tuple[str, int | None
     return SyncRef(behaviour=behaviour, sync=sync, index=index, offset=offset)
 
 
+# Elements of others, in canonical form.
+OTHERS = [
+    '<parameter xmlns="http://hmi.ewi.utwente.nl/bmlt" name="a" value="&lt;1"/>',
+    '<a xmlns="urn:x" xmlns:p1="urn:y" p1:b=""> x <b xmlns=""/>\n</a>',
+]
+
+
 def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
     """Values for the plain attributes of a class; optional ones sometimes left out."""
     values: dict[str, Any] = {}
@@ -153,7 +160,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     """Valid blocks: any behaviours, references that lead somewhere, constraints, required parts.
 
     Args:
-        foreign: also attributes nobody knows.
+        foreign: also attributes and elements nobody knows.
     """
     ids = draw(st.lists(names, max_size=6, unique=True))
     kinds = {id: draw(st.sampled_from(sorted(VOCABULARY.values(), key=lambda c: c.tag))) for id in ids}
@@ -187,6 +194,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
             syncs={p: draw(refs) for p in cls.sync_points if draw(st.integers(0, 2)) == 0},
             descriptions=tuple(draw(st.lists(descriptions(), max_size=1))),
             foreign=draw(others) if foreign else {},
+            others=tuple(draw(st.lists(st.sampled_from(OTHERS), max_size=2))) if foreign else (),
             **given[id],
         )
         nodes.append(node)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bml_schema import CORE, Block, BMLError, BMLSyntaxError, Speech, parse, read, write
+from bml_schema import CORE, Block, BMLError, BMLSyntaxError, Place, Speech, SyncRef, Wait, parse, read, write
 from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS
 from tests.strategies import blocks
 
@@ -314,3 +314,63 @@ def test_a_broken_stretch_is_told_of_once_and_hides_no_good_document(
     text: str, read_as: list[object]
 ) -> None:
     assert [x.id if isinstance(x, Block) else None for x in read(text)] == read_as
+
+
+def test_the_act_around_smartbodys_documents_is_not_seen() -> None:
+    inner = '<bml id="b"><q:head id="x"/>\n<wait id="w" start="1"/></bml>'
+    text = f'<?xml version="1.0"?>\n<act xmlns:q="{CORE}"><participant id="Brad" role="actor"/>{inner}</act>'
+    block = parse(text)
+    assert block.children == (Wait(id="w", syncs={"start": SyncRef(offset=1.0)}),)
+    assert [p.line for p in block.problems] == [2]
+    assert block.places["w"] == Place(3, "/bml/wait[1]")
+
+
+def test_an_act_may_hold_several_documents_and_so_may_a_text_several_acts() -> None:
+    assert told(f"<act>{A}{B}</act>") == ["a", "b"]
+    assert told(f"<act>{A}</act>\n<act><participant id='p'></participant>{B}</act>") == ["a", "b"]
+    assert told(f"<act>{A}<bml id='x'><head </bml></act>{B}")[0::2] == ["a", "b"]
+
+
+def test_an_act_hides_no_text_that_is_none() -> None:
+    assert told(f"<act>{A}</act>oops <active/>") == ["a", 'line 1: wanted <bml>, got "oops <active/>"']
+    assert told("<act/>") == []
+
+
+LONG = """<bml
+    id="b">
+  <head
+    id="h"
+    lexeme="NOD"
+  /><wait id="w"/>
+  <face id="f"><faceLexeme
+     lexeme="SMILE" amount="7"/></face>
+  <!-- <wait
+  --><gaze id="g"
+/>
+</bml>"""
+
+
+def test_the_line_of_an_element_is_that_where_its_tag_begins() -> None:
+    block = parse(LONG)
+    assert block.places == {"h": Place(3, "/bml/head[1]"), "w": Place(6, "/bml/wait[1]")}
+    assert [(p.id, p.line) for p in block.problems] == [("b:f", 7), ("b:g", 10)]
+    assert [p.line for p in list(read(f"\n{A}\n{LONG}"))[1].problems] == [9, 12]  # type: ignore[union-attr]
+
+
+def test_long_tags_without_end_cost_no_more_than_others() -> None:
+    text = (
+        f'<bml id="b"><speech id="s"><text><![CDATA[{"<a" * 90_000}{"<a" + chr(10)}]]></text></speech></bml>'
+    )
+    assert isinstance(parse(text)["s"], Speech)
+    text = text.replace("<a", "<a\n")
+    assert isinstance(parse(text)["s"], Speech)
+
+
+@given(blocks())
+def test_one_document_alone_is_read_as_among_others(block: Block) -> None:
+    text = write(block)
+    alone, *_ = read(text)
+    _, among = read(A + text)
+    assert isinstance(alone, Block)
+    assert isinstance(among, Block)
+    assert (alone, alone.places) == (among, among.places)

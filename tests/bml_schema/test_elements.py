@@ -137,3 +137,23 @@ def test_a_bad_constraint_goes_alone(inside: str, said: str, path: str) -> None:
 
 def test_a_bad_constraint_without_id_is_told_of_under_the_blocks() -> None:
     assert [p.id for p in only("<constraint/>").problems] == ["b"]
+
+
+def test_elements_of_others_inside_a_behaviour_are_kept_in_their_namespaces() -> None:
+    block = described(
+        "<q:parameter xmlns:q='urn:q' xmlns:z='urn:z' z:a='&lt;'> x <q:b/></q:parameter>\n<r xmlns='urn:r'/>"
+    )
+    assert block["h"].others == (
+        '<parameter xmlns="urn:q" xmlns:p1="urn:z" p1:a="&lt;"> x <b/></parameter>',
+        '<r xmlns="urn:r"/>',
+    )
+    assert not block.problems
+    assert parse(write(block)) == block
+
+
+def test_a_number_of_strokes_may_have_blanks_around_it() -> None:
+    block = only("<head id='h' lexeme='NOD' repetition=' 3 '/><wait id='w' start='h:stroke:3'/>")
+    assert not block.problems
+    # A gesture has one stroke, whatever its author hoped for.
+    block = only("<gesture id='g' lexeme='BEAT' repetition='3'/><wait id='w' start='g:stroke:3'/>")
+    assert [p.text for p in block.problems] == ['start: wanted stroke:1..1 of "g", got stroke:3']

@@ -246,7 +246,7 @@ def test_places_tell_line_and_path() -> None:
     block = only("<wait id='a'/>\n<wait\nid='c'/><head id='d' lexeme='NOD'/>")
     assert block.places == {
         "a": Place(1, "/bml/wait[1]"),
-        "c": Place(3, "/bml/wait[2]"),
+        "c": Place(2, "/bml/wait[2]"),
         "d": Place(3, "/bml/head[1]"),
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
@@ -135,6 +135,18 @@ def test_nodes_are_frozen_and_have_no_dict() -> None:
     with pytest.raises(FrozenInstanceError):
         wink.side = "RIGHT"  # type: ignore[misc]
     assert not hasattr(wink, "__dict__")
+
+
+def test_nodes_are_made_as_dataclasses_are() -> None:
+    assert Wink(id="w", side="LEFT") == replace(Wink(id="x", side="LEFT"), id="w")
+    one, two = Wink(id="a", side="LEFT"), Wink(id="b", side="LEFT")
+    assert one.syncs is not two.syncs, "each has a dict of its own"
+    with pytest.raises(TypeError, match="missing 1 required keyword-only argument: 'side'"):
+        Wink(id="w")  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="unexpected keyword argument 'sides'"):
+        Wink(id="w", side="LEFT", sides=1)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="positional"):
+        Wink("w")  # type: ignore[call-arg, misc]
 
 
 def test_the_shape_of_a_class_is_made_once() -> None:

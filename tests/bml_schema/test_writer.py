@@ -88,3 +88,11 @@ def test_a_description_cannot_break_out_of_its_element(content: str) -> None:
     node = Wait(id="w", descriptions=(Description(priority=1, type="x", content=content),))
     with pytest.raises(ValueError, match="wanted well-formed content"):
         write(Block(id="b", children=(node,)))
+
+
+@pytest.mark.parametrize(
+    "other", ["<a/>", "<a xmlns='urn:a'/>x", "<a xmlns='urn:a'", "", "<a xmlns='u'/><a xmlns='u'/>"]
+)
+def test_what_is_others_stays_one_element_in_a_namespace(other: str) -> None:
+    with pytest.raises(ValueError, match="wanted one well-formed element in a namespace of its own"):
+        write(Block(id="b", children=(Wait(id="w", others=(other,)),)))
