@@ -108,6 +108,7 @@ class WebSocketDoor:
             async for message in socket:
                 if not self._shell.receive(number, message):
                     break
+                await asyncio.sleep(0)  # messages that are there already must not hold up everybody else
         except ConnectionClosed:
             pass
         finally:

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import signal
+import socket
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 import pytest
 from websockets.asyncio.client import connect
@@ -14,6 +20,7 @@ from websockets.exceptions import InvalidStatus
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.server.serve import Server
+from realizer.server.session import Session
 from realizer.server.wire import FrameKind, unpack
 from realizer.settings import Settings
 
@@ -194,5 +201,79 @@ def test_an_address_in_use_is_an_os_error() -> None:
     async def test(server: Server) -> None:
         with pytest.raises(OSError, match="in use"):
             await Server(Settings(port=server.port)).start()
+
+    serving(test)
+
+
+def command(*arguments: str, **variables: str) -> subprocess.Popen[str]:
+    """`realizer serve` in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *arguments],
+        env={**os.environ, **variables},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_each_open_door_prints_a_line_and_a_broker_that_is_not_there_stops_none() -> None:
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))  # bound, but nobody listens
+        broker = f"127.0.0.1:{nobody.getsockname()[1]}"
+        with command("--asap-ports", "0", "7501", "--stomp", broker) as serving:
+            assert serving.stdout is not None
+            assert serving.stderr is not None
+            lines = [serving.stdout.readline() for _ in range(3)]
+            told = serving.stderr.readline()
+            serving.send_signal(signal.SIGTERM)
+            assert (serving.wait(LIMIT), serving.stdout.read()) == (0, "")
+    starts = ["listening on ws://127.0.0.1:", "page at http://127.0.0.1:", "asap: BML at 127.0.0.1:"]
+    assert all(line.startswith(start) for line, start in zip(lines, starts, strict=True))
+    assert told == f"realizer: stomp: no broker at {broker} (nobody answers); looking for it\n"
+
+
+def test_a_door_that_needs_something_names_it_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "stomp.py").write_text("raise ImportError")
+    with command("--stomp", "127.0.0.1:61613", PYTHONPATH=str(tmp_path)) as serving:
+        out, error = serving.communicate(timeout=LIMIT)
+    assert (serving.returncode, out) == (3, "")
+    assert error == "realizer: --stomp needs stomp.py: pip install 'bml-realizer[stomp]'\n"
+
+
+def test_a_session_that_fails_ends_alone(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
+    real = Session.receive
+
+    def broken(session: Session, connection: int, message: str | bytes, now: float) -> None:
+        if "boom" in str(message):
+            raise RuntimeError("boom")
+        real(session, connection, message, now)
+
+    monkeypatch.setattr(Session, "receive", broken)
+
+    async def test(server: Server) -> None:
+        async with connect(server.url) as other, connect(server.url) as failing:
+            await failing.send("<boom/>")
+            await failing.wait_closed()
+            assert failing.close_code == 1011
+            await other.send('<bml id="b"><wait id="w" duration="0.05"/></bml>')
+            await until(other, "b:end")
+
+    serving(test)
+    assert "it failed" in caplog.text
+
+
+def test_a_client_that_keeps_sending_does_not_keep_its_own_blocks_from_playing() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as client:
+            await client.send('<bml id="b"><wait id="w" duration="0.3"/></bml>')
+
+            async def flood() -> None:
+                while True:
+                    await client.send('{"type":"unsubscribe","stream":"fap"}')
+                    await asyncio.sleep(0)
+
+            flooding = asyncio.create_task(flood())
+            await until(client, "b:end")
+            flooding.cancel()
 
     serving(test)

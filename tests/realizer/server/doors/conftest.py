@@ -163,7 +163,7 @@ def _installed() -> None:
         pytest.skip("needs ActiveMQ: apt-get install activemq")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
     """A broker that all tests share; they must not end it."""
     _installed()
@@ -192,7 +192,7 @@ def guarded_broker(tmp_path: Path) -> Iterator[Broker]:
     broker.kill()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def rabbit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rabbit]:
     """The other broker that laboratories run."""
     if not RABBIT.is_file() or shutil.which("epmd") is None:
