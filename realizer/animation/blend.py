@@ -96,8 +96,9 @@ def _take_idle(sampled: Float64, alive: list[Channel], channels: list[Channel]) 
 
     A blink may have begun before the first frame: what is gone by then, among `channels`, counts for it.
     """
-    taking = [channel for channel in channels if channel.target == presence("blinks")]
-    motion = [i for i, channel in enumerate(alive) if channel.target == presence("motion")]
+    lids, moves = presence("blinks").column, presence("motion").column
+    taking = [channel for channel in channels if channel.target.column == lids]
+    motion = [i for i, channel in enumerate(alive) if channel.target.column == moves]
     if not taking and not motion:
         return
     blinks = [(i, channel) for i, channel in enumerate(alive) if isinstance(channel, Blink)]
