@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import logging
 import re
+import socket
 from collections import deque
 from collections.abc import Callable
 from typing import cast
@@ -82,6 +83,8 @@ class AsapDoor:
         task = asyncio.current_task()
         assert task is not None
         self._clients[task] = writer
+        # Nobody says good-bye, least of all a machine that loses its power.
+        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         host = writer.get_extra_info("peername")[0]
         link = CallBack(host, self._feedback_port, writer.transport.abort)
         try:

@@ -272,6 +272,7 @@ class _Link:
         self._take = take
         self._ahead = threading.BoundedSemaphore(AHEAD)
         self._stomp: Any = None
+        self._dropped = False
 
     # in the door's thread
 
@@ -283,6 +284,7 @@ class _Link:
 
         self._stomp = stomp.Connection12(
             [address],
+            try_loopback_connect=False,  # that address and no other
             reconnect_attempts_max=1,
             reconnect_sleep_initial=0,  # we wait ourselves
             reconnect_sleep_max=0,
@@ -299,6 +301,8 @@ class _Link:
             self._stomp.connect(login, password)
         except StompException as error:
             raise RealizerError(str(error) or "nobody answers") from None
+        if self._dropped:  # meanwhile; there was nothing to close yet
+            self.drop()
 
     def subscribe(self, topics: Sequence[str]) -> None:
         for number, topic in enumerate(topics):
@@ -324,7 +328,8 @@ class _Link:
     # in any thread
 
     def drop(self) -> None:
-        """Close the socket, if it is still open."""
+        """Close the socket, if it is still open or as soon as it is."""
+        self._dropped = True
         if self._stomp is not None:
             with contextlib.suppress(OSError, AttributeError):
                 self._stomp.transport.disconnect_socket()
@@ -349,6 +354,10 @@ class _Link:
         self._in_loop(self._settle, False, "")
         self._in_loop(self.lost.set)
         self._in_loop(self.reading.set)
+
+    def on_heartbeat_timeout(self) -> None:
+        self._in_loop(self._settle, False, "it has fallen silent")
+        self.on_disconnected()
 
     def on_message(self, frame: Any) -> None:
         self._ahead.acquire()

@@ -74,6 +74,9 @@ class Process:
                     self._ready.set()
         self._ready.set()
 
+    def send(self, signal: signal.Signals) -> None:
+        self._process.send_signal(signal)
+
     def kill(self, pid: int | None = None) -> None:
         """End it as a power cut would; with `pid` the child that ends it by its own end."""
         os.kill(pid or self._process.pid, signal.SIGKILL)
@@ -111,6 +114,15 @@ class Broker:
             f"xbean:file:{folder}/broker.xml",
         ]
         self._process = Process(command, "Connector stomp started", folder)
+
+    def freeze(self) -> None:
+        """Let it hold its connections and do nothing."""
+        assert self._process is not None
+        self._process.send(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        assert self._process is not None
+        self._process.send(signal.SIGCONT)
 
     def kill(self) -> None:
         """End it as a power cut would."""

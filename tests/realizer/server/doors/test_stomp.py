@@ -340,6 +340,27 @@ def test_a_broker_that_is_not_there_is_told_once_and_waited_for(own_broker, capl
     ]
 
 
+def test_a_broker_that_falls_silent_is_given_up_and_found_again(own_broker, monkeypatch, caplog) -> None:
+    monkeypatch.setattr("realizer.server.doors.stomp.HEARTBEAT", 200)
+    monkeypatch.setattr("realizer.server.doors.stomp.ATTEMPT", 1)
+
+    async def test(server: Server) -> None:
+        own_broker.freeze()
+        await gone(server)
+        door = door_of(server)
+        door._up.clear()
+        own_broker.thaw()
+        await door.ready()
+        async with Peer(own_broker.port, "/topic/bmlFeedback") as peer:
+            peer.ask(WAIT.format("b", 0))
+            await peer.feedback("b:end")
+
+    own_broker.start()
+    with caplog.at_level(logging.WARNING):
+        serving(test, own_broker.address)
+    assert f"the broker at {own_broker.address} is gone (it has fallen silent)" in caplog.text
+
+
 def test_a_broker_that_asks_who_is_there_is_told(guarded_broker, caplog) -> None:
     async def test(server: Server) -> None:
         async with Peer(guarded_broker.port, "/topic/bmlFeedback", login=("face", "secret")) as peer:
