@@ -7,6 +7,7 @@ corpus/rules.toml.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -99,7 +100,7 @@ def derived() -> Iterator[Rule]:
         name = prefixed(cls.tag)
         core = cls.tag.startswith((f"{{{CORE}}}", f"{{{EXTENSIONS}}}"))
         chapter = f"<{name}>"
-        says = (cls.__doc__ or "").partition("\n")[0]
+        says = re.sub(r"(<[\w:]+>)", r"`\1`", (cls.__doc__ or "").partition("\n")[0])
         yield Rule(name, chapter, "element", says, core, cls)
         timed = issubclass(cls, Behaviour)
         yield from _attributes(name, cls, chapter, core, own if timed else set())
@@ -221,7 +222,7 @@ def _rows(members: list[Rule]) -> Iterator[str]:
     """A row each; values and sync points that the same cases prove share one."""
 
     def alike(rule: Rule) -> tuple[str, str, str]:
-        shared = rule.kind in ("value", "sync point", "reference")
+        shared = rule.kind in ("value", "lexeme", "sync point", "reference")
         return rule.kind, _proof(rule), rule.name if rule.kind == "value" else "" if shared else rule.id
 
     for (kind, proof, _), same in groupby(sorted(members, key=_rank), key=alike):

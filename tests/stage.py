@@ -34,7 +34,7 @@ class Played:
 
     Attributes:
         blocks: those that were read, in order; an id may be used again.
-        schedules: block id -> what `submit` returned, the last of that id.
+        schedules: block id -> what became of the schedule of the last block of that id.
         feedback: as a client gets it: written as XML and read again.
         faces: instant -> name of AU or FAP -> value, looked at when it was there.
         film: the same, looked over when all had played.
@@ -127,6 +127,8 @@ def play(
         else:
             player.refuse(warning_of(item), time)
     hear(player, played, now, math.inf, punctual)
+    for id, schedule in played.schedules.items():
+        played.schedules[id] = player.latest(schedule)
     played.film = shown(player, watches)
     played.speaking = player.speech()
     return played

@@ -97,7 +97,7 @@ def check_faces(case: Case, played: Played) -> None:
             least, most = value if isinstance(value, list) else (value - 1e-4, value + 1e-4)
             assert least <= values[name] <= most, f"{name} at {face['at']}"
     for smooth in case.wanted.get("smooth", ()):
-        instants = [i for i in case.watches if i.character == smooth.get("character")]
+        instants = sorted({i for i in case.watches if i.character == smooth.get("character")})
         seen = [played.film[i] for i in instants if smooth["from"] <= i.time <= smooth["to"]]
         names = smooth.get("of") or [name for name in seen[0] if name[0].isdigit()]
         rows = np.array([[values[name] for name in names] for values in seen])
