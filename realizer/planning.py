@@ -9,7 +9,7 @@ from bml_schema import Block, Place, Problem, SyncRef, without
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import Kind, World
 from realizer.composition.claims import Claim, claims, losses
-from realizer.scheduling import schedule_block
+from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 __all__ = ["Plan", "plan"]
@@ -26,12 +26,16 @@ class Plan:
         schedule: `failed` when something required cannot be played; nothing else holds anything then.
         channels: behaviour id -> channels in seconds from block start.
         claims: what its behaviours need for themselves, on the clock of `schedule.start`.
+        timings: what its behaviours want of time.
+        moved: the schedules that others have beside it, each from its own start.
     """
 
     block: Block
     schedule: Schedule
     channels: Mapping[str, tuple[Channel, ...]] = field(default_factory=dict)
     claims: Sequence[Claim] = ()
+    timings: Mapping[str, Timing] = field(default_factory=dict)
+    moved: Sequence[Schedule] = ()
 
 
 def plan(
@@ -42,6 +46,7 @@ def plan(
     start: float = 0.0,
     outside: Callable[[SyncRef], float | None] = lambda ref: None,
     held: Iterable[Claim] = (),
+    others: Sequence[Member] = (),
 ) -> Plan:
     """Schedule a block and expand it; what cannot be played is dropped with one warning each.
 
@@ -50,12 +55,13 @@ def plan(
         start: when the block starts, seconds on the session clock.
         outside: sync points of other blocks -> seconds from this block's start, None where unknown.
         held: what behaviours of earlier blocks of this character need for themselves, on the session clock.
+        others: blocks that play and are tied to this one: solved with it, seconds from this block's start.
     """
     work = _Work(block, kinds, world)
     try:
         work.take_problems()
         work.check()
-        schedule = work.schedule(start, outside, tuple(held))
+        schedule, *moved = work.schedule(start, outside, tuple(held), others)
     except _Failed as failed:
         warning = replace(failed.warning, id=block.id)
         return Plan(block, Schedule(block.id, {}, {}, start=start, warnings=(warning,), failed=True))
@@ -64,7 +70,8 @@ def plan(
         for node in work.block.behaviours
         if node.id in schedule.times
     }
-    return Plan(work.block, schedule, channels, tuple(claims(work.block, schedule, kinds, world)))
+    own = tuple(claims(work.block, schedule, kinds, world))
+    return Plan(work.block, schedule, channels, own, work.timings, moved)
 
 
 class _Failed(Exception):
@@ -116,12 +123,17 @@ class _Work:
         self.drop(gone)
 
     def schedule(
-        self, start: float, outside: Callable[[SyncRef], float | None], held: Sequence[Claim]
-    ) -> Schedule:
-        """The times of what can be had together; solved again without what cannot."""
+        self,
+        start: float,
+        outside: Callable[[SyncRef], float | None],
+        held: Sequence[Claim],
+        others: Sequence[Member],
+    ) -> list[Schedule]:
+        """The times of what can be had together, and of the others; solved again without what cannot."""
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
-            found = schedule_block(self.block, self.timings, outside=outside, priorities=priorities)
+            own = Member(self.block, self.timings, priorities=priorities)
+            found, *moved = schedule_together([own, *others], outside=outside)
             warnings = [replace(w, text=self.at(self.behaviour(w), w.text)) for w in found.warnings]
             if found.failed:
                 raise _Failed(warnings[0])
@@ -131,7 +143,7 @@ class _Work:
             found = replace(found, start=start, character=self.block.character_id)
             lost = losses(claims(self.block, found, self.kinds, self.world), held, start)
             if not lost:
-                return replace(found, warnings=tuple(self.warnings))
+                return [replace(found, warnings=tuple(self.warnings)), *moved]
             self.drop(
                 (
                     loss.claim.behaviour,

@@ -64,7 +64,7 @@ MAY: dict[str, set[str]] = {
         "realizer.behaviours",
         "realizer.composition",
         "realizer.planning",
-        "realizer.scheduling.timing",
+        "realizer.scheduling",
         "realizer.speech.utterance",
     },
     "realizer.player": VALUES

@@ -45,6 +45,12 @@ class Character:
         """Take new base states, in order of their begin."""
         self.shifts = sorted([*self.shifts, *shifts], key=lambda s: (s.begin, s.end))
 
+    def exchange(self, old: Mapping[str, Shift], new: Mapping[str, Shift]) -> None:
+        """Put other shifts in the place of those of the same behaviour."""
+        heirs = {id(old[name]): shift for name, shift in new.items()}
+        shifts = [heirs.get(id(s), s) for s in self.shifts]
+        self.shifts = sorted(shifts, key=lambda s: (s.begin, s.end))
+
     def cancel(self, shifts: Collection[Shift], now: float) -> None:
         """Drop those of `shifts` that have not begun; one that has begun is carried through."""
         gone = {id(s) for s in shifts if s.begin >= now}

@@ -24,7 +24,9 @@ from realizer.composition.reporting import (
     progress,
     sync_progress,
 )
+from realizer.composition.retiming import member, touched
 from realizer.planning import Plan, plan
+from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Warning
 
 __all__ = ["Ensemble"]
@@ -102,7 +104,8 @@ class Ensemble:
         ended = relations.ended(block, character, self.alive())
         # While it is not known when it starts, it is planned as if that were now.
         start = max([now, *(w.until for w in waits if w.until < FOREVER)])
-        planned = self._plan(block, character, world, start, without=ended)
+        others = touched([block], [p for p in self.alive() if p not in ended], now)
+        planned = self._plan(block, character, world, start, ended, [member(p, start, now) for p in others])
         if planned.schedule.failed:
             return self._refuse(block, planned.schedule.warnings[0], now)
         for earlier in ended:
@@ -124,6 +127,7 @@ class Ensemble:
         self._predict(playing, now)
         for warning in planned.schedule.warnings:
             self._warn(block, warning)
+        self._retime(others, planned.moved, now)
         self._moved(playing, now)
         return planned.schedule
 
@@ -250,6 +254,7 @@ class Ensemble:
         self._calendar.put(playing, pending)
         self.changed()
         self._predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
+        self._follow(playing, now)
         self._moved(playing, now)
 
     def activate(self, id: str, now: float) -> bool:
@@ -326,7 +331,7 @@ class Ensemble:
         refers = any(ref.block is not None for ref in references(playing.block))
         if start < FOREVER and (playing.start == FOREVER or refers):
             # Its claims were never compared, or its references have other times from the new start.
-            planned = self._plan(playing.block, playing.character, playing.world, start, without=[playing])
+            planned = self._plan(playing.block, playing.character, playing.world, start, [playing])
             if planned.schedule.failed:
                 self._warn(playing.block, planned.schedule.warnings[0])
                 self.stop(playing, now)
@@ -341,9 +346,15 @@ class Ensemble:
         return True
 
     def _plan(
-        self, block: Block, character: int, world: World, start: float, without: Collection[Playing]
+        self,
+        block: Block,
+        character: int,
+        world: World,
+        start: float,
+        without: Collection[Playing],
+        others: Sequence[Member] = (),
     ) -> Plan:
-        """The plan of a block beside those that are alive, `without` some of them."""
+        """The plan of a block beside those that are alive, `without` some of them, solved with `others`."""
         return plan(
             block,
             self.kinds,
@@ -351,7 +362,41 @@ class Ensemble:
             start=start,
             outside=relations.instants(self._schedule_of, start),
             held=relations.held(character, self.alive(), without),
+            others=others,
         )
+
+    def _retime(self, blocks: Sequence[Playing], schedules: Sequence[Schedule], now: float) -> None:
+        """Give blocks other times, each from its own start; what follows them follows."""
+        for playing, schedule in zip(blocks, schedules, strict=True):
+            if playing.done:
+                continue
+            pending = self._calendar.pending(playing)
+            before = dict(playing.shifts)
+            changed = playing.retime(schedule, now)
+            if not changed:
+                continue
+            self.characters[playing.character].exchange(before, playing.shifts)
+            self._calendar.drop(playing)
+            self._calendar.put(playing, None if playing.waiting else pending)
+            self.changed()
+            self._predict(playing, now, changed)
+            self._moved(playing, now)
+
+    def _follow(self, playing: Playing, now: float) -> None:
+        """A block has other times than it had: solve those again that are tied to it."""
+        others = [p for p in touched([playing.block], self.alive(), now) if p is not playing]
+        if not others:
+            return
+        origin = playing.start
+        members = [member(p, origin, now) for p in (playing, *others)]
+        instants = relations.instants(self._schedule_of, origin)
+        found = schedule_together(members, outside=instants)
+        if found[0].failed:
+            for other in others:
+                text = f"stays as it was planned: {found[0].warnings[0].text}"
+                self._warn(other.block, Warning(other.block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
+            return
+        self._retime(others, found[1:], now)
 
     def _schedule_of(self, id: str) -> Schedule | None:
         """Of the newest block of an id."""

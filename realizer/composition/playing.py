@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bml_schema import Block
 from realizer.animation.channel import Channel, Gain, Layer
+from realizer.animation.joints import joined
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Kind, World
 from realizer.composition.character import RELAX, Shift
+from realizer.composition.claims import claims
 from realizer.composition.reporting import State
 from realizer.planning import Plan
 from realizer.scheduling.timing import Schedule
@@ -21,6 +23,8 @@ __all__ = ["Playing", "Speaking", "Wait"]
 
 # Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
 HUSH = 0.12  # s
+# Times that differ by less are the same, solved again.
+SAME = 1e-9  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +150,8 @@ class Playing:
     def lay(self, plan: Plan, start: float) -> None:
         """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
         late = start - plan.schedule.start
-        claims = tuple(replace(c, begin=c.begin + late, end=c.end + late) for c in plan.claims)
-        self.plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=claims)
+        held = tuple(replace(c, begin=c.begin + late, end=c.end + late) for c in plan.claims)
+        self.plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
         self.channels, self.shifts, self.speech = {}, {}, {}
         if start == float("inf"):
             return
@@ -155,8 +159,7 @@ class Playing:
         for behaviour, times in self.schedule.times.items():
             node = nodes[behaviour]
             kind = self.kinds[node.tag]
-            name = f"{self.block.id}:{behaviour}"
-            own = tuple(replace(c.shifted(start), source=name) for c in plan.channels.get(behaviour, ()))
+            own = self._placed(behaviour, plan.channels.get(behaviour, ()))
             begin, end = start + float(times[0]), start + float(times[-1])
             if kind.region is not None:
                 self.shifts[behaviour] = Shift.of(begin, end, kind.region, own)
@@ -172,6 +175,51 @@ class Playing:
     def unfinished(self, now: float) -> set[str]:
         """The behaviours whose end has not passed."""
         return {b for b, times in self.schedule.times.items() if self.start + float(times[-1]) > now}
+
+    def retime(self, schedule: Schedule, now: float) -> list[str]:
+        """Take other times for what has not passed; what is shown goes on without a jump.
+
+        Args:
+            schedule: of the same block from the same start; what passed before `now` is as it was.
+
+        Returns:
+            The behaviours whose times are others.
+        """
+        changed = [
+            b
+            for b, times in schedule.times.items()
+            if not np.allclose(times, self.schedule.times[b], rtol=0.0, atol=SAME)
+        ]
+        if not changed:
+            return []
+        times = {b: schedule.times[b] if b in changed else t for b, t in self.schedule.times.items()}
+        before = self.schedule
+        own = replace(before, times=times)
+        self.plan = replace(self.plan, schedule=own)
+        for behaviour in changed:
+            node = self.block[behaviour]
+            shown = self.kinds[node.tag].expand(node, times[behaviour], self.world)
+            new = self._placed(behaviour, shown)
+            begun = self.start + float(before.times[behaviour][0]) < now
+            region = self.kinds[node.tag].region
+            if region is not None:
+                old = self.shifts[behaviour].channels
+                begin, end = (self.start + float(times[behaviour][k]) for k in (0, -1))
+                self.shifts[behaviour] = Shift.of(begin, end, region, joined(old, new, now) if begun else new)
+            elif new:
+                old = self.channels.get(behaviour, ())
+                self.channels[behaviour] = joined(old, new, now) if begun else new
+            if behaviour in self.speech and not begun:
+                late = float(times[behaviour][0]) - float(before.times[behaviour][0])
+                heard = self.speech[behaviour]
+                self.speech[behaviour] = replace(heard, start=heard.start + late, until=heard.until + late)
+        self.plan = replace(self.plan, claims=tuple(claims(self.block, own, self.kinds, self.world)))
+        return changed
+
+    def _placed(self, behaviour: str, channels: Iterable[Channel]) -> tuple[Channel, ...]:
+        """Channels of a behaviour on the session clock."""
+        name = f"{self.block.id}:{behaviour}"
+        return tuple(replace(c.shifted(self.start), source=name) for c in channels)
 
     def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
         """End behaviours at `now`: what is shown relaxes without a jump, what has not begun never comes.
@@ -195,9 +243,10 @@ class Playing:
                 if behaviour in self.speech:
                     heard = self.speech[behaviour]
                     self.speech[behaviour] = replace(heard, until=min(heard.until, now))
-        claims = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
+        left = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
+        timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
         schedule = replace(self.schedule, points=points, times=times)
-        self.plan = replace(self.plan, schedule=schedule, claims=claims)
+        self.plan = replace(self.plan, schedule=schedule, claims=left, timings=timings)
 
     def _cut_times(
         self, behaviour: str, names: tuple[str, ...], at: Float64, local: float, ends: bool

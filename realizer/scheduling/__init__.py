@@ -1,6 +1,7 @@
 """Sync points by least squares: a block's timings in, its sync times out."""
 
-from realizer.scheduling.plan import schedule_block
+from realizer.scheduling.plan import schedule_block, schedule_together
+from realizer.scheduling.problem import Member
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
-__all__ = ["Schedule", "Timing", "Warning", "schedule_block"]
+__all__ = ["Member", "Schedule", "Timing", "Warning", "schedule_block", "schedule_together"]

@@ -192,6 +192,8 @@ def problem_of(
             except LookupError as fault:
                 problem.faults.append((part, str(fault)))
                 break
+            if target[0] == ORIGIN and sync in member.passed.get(node.id, ()):
+                continue  # what it was tied to may have moved since
             says = (f"{part.name}:{sync}", "=", ref)
             problem.equalities.append(Relation(start + points.index(sync), *target, part, says))
     for member in members:

@@ -1,0 +1,51 @@
+"""Channels that play and the channels they become in; both out, the second going on where the first stops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from realizer.animation.channel import Channel, Joint
+from realizer.animation.curves import sample
+
+__all__ = ["joined"]
+
+# s; a face is back on its new course after that: about the attack of an expression.
+HEALS = 0.3
+# s; over which a slope is measured.
+STEP = 1e-4
+
+
+def joined(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[Channel, ...]:
+    """What is shown passes from old channels to new ones at `now`, without a jump in value or velocity.
+
+    Args:
+        old: of one behaviour; those that others took the place of before stay as they are.
+        new: of the same behaviour at other times; they take over the gains of the old ones.
+    """
+    kept = tuple(c for c in old if c.until < float("inf"))
+    playing = [c for c in old if c.until == float("inf")]
+    pairs = [(c, _twin(c, n, playing, new)) for n, c in enumerate(playing)]
+    follow = [(c, replace(twin, gains=c.gains)) for c, twin in pairs if twin is not None]
+    lonely = [c.faded(now, now + HEALS) for c, twin in pairs if twin is None]
+    taken = {id(twin) for _, twin in pairs}
+    fresh = [c for c in new if id(c) not in taken]
+    if not follow:
+        return (*kept, *lonely, *fresh)
+    before, after = (list(side) for side in zip(*follow, strict=True))
+    shown = sample([*before, *after], np.array([now, now + STEP])).reshape(2, len(follow), 2)
+    value, ahead = (shown[0] - shown[1]).T
+    joints = [
+        replace(c, joint=Joint(now, float(v), float((a - v) / STEP), HEALS))
+        for c, v, a in zip(after, value, ahead, strict=True)
+    ]
+    return (*kept, *(replace(c, until=now) for c in before), *joints, *lonely, *fresh)
+
+
+def _twin(channel: Channel, n: int, old: Sequence[Channel], new: Sequence[Channel]) -> Channel | None:
+    """The new channel of the same target: the first for the first of its kind, and so on."""
+    place = sum(c.target == channel.target for c in old[:n])
+    same = [c for c in new if c.target == channel.target]
+    return same[place] if place < len(same) else None
