@@ -53,6 +53,7 @@ class Element:
         offset, end: of "<", and behind ">".
         attributes: name as written -> (offset, end) of its value without the quotes.
         parent: number of the element around it, -1 for none.
+        nth: which one of its name among the children of its parent, from 1.
         root: number of the nearest <bml> around it, itself included, -1 for none.
     """
 
@@ -60,6 +61,7 @@ class Element:
     offset: int
     end: int
     parent: int
+    nth: int = 1
     root: int = -1
     attributes: dict[str, tuple[int, int]] = field(default_factory=dict)
 
@@ -112,7 +114,7 @@ class Source:
         Args:
             path: of the element, such as "/bml/required[1]/head[2]".
             attribute: its name, with prefix, as a Clark name, or its local part.
-            line: where the element's start tag ends; tells documents of one text apart.
+            line: where the element's start tag begins; tells documents of one text apart.
             block: id of the document; likewise.
 
         Returns:
@@ -140,6 +142,11 @@ class Source:
         """The first element with an id; of several documents the one that fits line and block id best."""
         return self._best(self._ids.get(id, []), line, block)
 
+    def document(self, id: str) -> Element | None:
+        """The last <bml> with an id."""
+        roots = (self.elements[n] for n in reversed(self._roots))
+        return next((root for root in roots if self.id(root) == id), None)
+
     def inside(self, element: Element) -> Iterator[Element]:
         """The elements of the document that an element belongs to."""
         return (e for e in self.elements if e.root == element.root)
@@ -155,10 +162,10 @@ class Source:
             yield self.elements[number]
 
     def on_line(self, line: int) -> Iterator[Element]:
-        """The elements whose start tag ends on a line."""
-        first = bisect_right(self.elements, self._starts[line - 1] - 1, key=lambda e: e.end - 1)
+        """The elements whose start tag begins on a line."""
+        first = bisect_right(self.elements, self._starts[line - 1] - 1, key=lambda e: e.offset)
         for number in range(first, len(self.elements)):
-            if self.line_of(self.elements[number].end - 1) != line:
+            if self.line_of(self.elements[number].offset) != line:
                 return
             yield self.elements[number]
 
@@ -168,6 +175,14 @@ class Source:
 
     def id(self, element: Element) -> str:
         return self.value(element, "id").strip()
+
+    def path(self, element: Element) -> str:
+        """The path of an element from its <bml>."""
+        steps = ""
+        while element.parent >= 0 and element is not self.elements[element.root]:
+            steps = f"/{element.name.rpartition(':')[2]}[{element.nth}]{steps}"
+            element = self.elements[element.parent]
+        return f"/{_WHOLE_DOCUMENT}{steps}"
 
     def value(self, element: Element, attribute: str) -> str:
         """What an attribute holds; "" where there is none."""
@@ -221,9 +236,10 @@ class Source:
         return self.elements[here] if here is not None else None
 
     def _best(self, found: list[Element], line: int | None, block: str | None) -> Element | None:
-        def fits(element: Element) -> tuple[bool, bool]:
-            on_line = line is not None and self.line_of(element.end - 1) == line
-            return on_line, block is not None and self.block(element) == block
+        def fits(element: Element) -> tuple[bool, bool, bool]:
+            # Of a tag over several lines the parser may know its last one only.
+            begins, ends = (line == self.line_of(offset) for offset in (element.offset, element.end - 1))
+            return begins, ends, block is not None and self.block(element) == block
 
         return max(found, key=fits, default=None)
 
@@ -276,6 +292,7 @@ class _Scan:
             number if local == _WHOLE_DOCUMENT else source.elements[parent].root if self.open else -1
         )
         nth = self.counts[parent, local] = self.counts.get((parent, local), 0) + 1
+        element.nth = nth
         source.elements.append(element)
         source._children[parent, local, nth] = number
         while not (end := _TAG_END.match(self.text, here)):

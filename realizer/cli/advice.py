@@ -55,15 +55,19 @@ class _Advisor:
         self.file, self.source, self.block = file, source, block
 
     def attributes(self, node: Any, path: str, line: int | None) -> Iterator[Finding]:
-        """Attributes in no namespace that nobody knows, and that are nearly one that is known."""
+        """Attributes that nobody knows, in no or in a known namespace, and that are nearly a known one."""
         known = {*shape_of(type(node)).attributes, *getattr(node, "sync_points", ())}
-        free = {name for name in known if name not in getattr(node, "syncs", {}) and not name.startswith("{")}
+        free = known - set(getattr(node, "syncs", ()))
         for name in node.foreign:
-            meant = None if name.startswith("{") else near(name, free, 0.75)
-            element = self.source.find(path, line=line, block=self.block.id) if meant else None
-            if element is None or meant in element.attributes:
+            space = name.rpartition("}")[0]
+            if space and space[1:] not in KNOWN_SPACES:
                 continue
-            said = f"{name}: no attribute of <{local(node.tag)}>, so it does nothing"
+            choices = [local(other) for other in free if other.rpartition("}")[0] == space]
+            meant = near(local(name), choices, 0.75)
+            element = self.source.find(path, line=line, block=self.block.id) if meant else None
+            if element is None or meant is None or self.source.value_span(element, meant):
+                continue
+            said = f"{local(name)}: no attribute of <{local(node.tag)}>, so it does nothing"
             label = Label(self.source.attribute_spot(element, name), "does nothing")
             yield self.finding(node, path, said, label, f'help: did you mean "{meant}"?')
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+from bml_schema import Block
 from bml_schema.shape import Attribute, local, shape_of
 from bml_schema.source import Element, Source, Spot
 from realizer.cli.diagnostics import Finding, Label
@@ -20,6 +21,7 @@ _PLACED = re.compile(r"line (\d+)(?:, (/[^\s:]+))?: (.*)", re.DOTALL)
 _LOST = re.compile(r"(.*); with it went (.*)", re.DOTALL)
 _PIECE = re.compile(r"; (?=[A-Za-z][\w.:-]*: |\{[^}]*\}[\w.-]+: )")
 _ATTRIBUTE = re.compile(r"((?:\{[^}]*\})?[A-Za-z][\w.:-]*): (.*)", re.DOTALL)
+_ATTRIBUTES = re.compile(r"(\w+(?:, \w+)+): (.*)", re.DOTALL)
 _MEANT = re.compile(r"[,;]? ?did you mean (.*)\?\s*$", re.DOTALL)
 _LONG_LIST = re.compile(r"wanted one of ((?:[^,;]+, ){5,}[^,;]+); got ")
 _NO_POINT = re.compile(r'no sync point "?([^"]+?)"? on "?([^"]+?)"?$')
@@ -29,7 +31,13 @@ _TAKEN = re.compile(r"which line (\d+) has")
 _CLAUSE = re.compile(
     r"(\S+) (?:is )?(=|not before|not after) ([^,()]+?) \((?:(constraint)(?: ([^,)]+))?, )?line (\d+)\)"
 )
-_UNPLACED = re.compile(r"\S+ takes (?:at least|exactly) [\d.e+-]+ s from \S+(?: its start)? to [^\s,]+")
+_UNPLACED = re.compile(r"\S+ takes (?:at least|exactly) [\d.e+-]+ s from (?:its start|\S+) to [^\s,;]+")
+_CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
+_ASTRAY = re.compile(
+    r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
+)
+_REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
+_HELD = re.compile(r"but (\S+) has it from")
 _BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)$|(all of this is required)$")
 _UNKNOWN_PREFIX = re.compile(r"Namespace prefix (\S+)(?: for \S+)? on (\S+) is not defined")
 _MOST_LISTED = 12
@@ -52,7 +60,7 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
         file=file,
         type=warning.type,
         id=warning.id,
-        path=path or ("/bml" if words.placed else ""),
+        path=path or words.path,
         text=text,
         head=words.head or text,
         labels=tuple(words.labels),
@@ -82,7 +90,6 @@ class _Words:
         self.labels: list[Label] = []
         self.notes: list[str] = []
         self.head = ""
-        self.placed = False  # inside a document that could be read
         self.element = self.source.find(self.path, line=self.line, block=self.block) if self.path else None
         if self.element is None and ":" in self.id:
             self.element = self.source.named(self.id.partition(":")[2], line=self.line, block=self.block)
@@ -91,15 +98,27 @@ class _Words:
         lost = _LOST.fullmatch(text)
         if lost:
             text = lost[1]
-        if list(_CLAUSE.finditer(text)):
+        if _CLAUSE.search(text):
             self.clash(text)
-        elif self.element is None:
+        elif astray := _ASTRAY.fullmatch(text):
+            name, constraint, id, line, said = astray.groups()
+            self.astray(name, bool(constraint), id, int(line) if line else self.line, said)
+        else:
+            self.sentences(text)
+        if lost:
+            self.notes.append(f"note: with it went {lost[2]}")
+
+    def sentences(self, text: str) -> None:
+        """What is wrong with one element, or with a text that gave none."""
+        if self.element is None and self.line is None:
+            # A fault of the whole block; of several with one id, the last.
+            self.element = self.source.document(self.block)
+            self.path = "/bml" if self.element is not None else ""
+        if self.element is None:
             self.broken(text)
         else:
             pieces = [self.piece(piece, self.element) for piece in _PIECE.split(text)]
             self.head = "; ".join(pieces)
-        if lost:
-            self.notes.append(f"note: with it went {lost[2]}")
 
     # a document that gave no block
 
@@ -145,9 +164,14 @@ class _Words:
             text = f"{text[: listed.start()]}wanted one of those known, got {text[listed.end() :]}"
             self.notes.append(f"help: known are {listed[1]}")
         found = _ATTRIBUTE.fullmatch(text)
+        if several := _ATTRIBUTES.fullmatch(text):
+            given = [n for n in several[1].split(", ") if self.source.value_span(element, n)]
+            found = _ATTRIBUTE.fullmatch(f"{given[0]}: {several[2]}") if given else None
         cls = self.class_of(element)
         if found is None:
             self.labels.append(Label(self.source.name_spot(element), text))
+            if held := _HELD.search(text):
+                self.holder(held[1], element)
             self.unknown_element(text, element, bool(meant))
             return text
         name, said = found[1], found[2]
@@ -165,6 +189,13 @@ class _Words:
                 self.labels.append(Label(spot, "the first one is here", primary=False))
         self.hints(said, spec, self.source.value(element, name), element, bool(meant))
         return text
+
+    def holder(self, name: str, element: Element) -> None:
+        """Who has what a behaviour wanted: "behaviour", or "block:behaviour" of an earlier block."""
+        block, _, id = name.rpartition(":")
+        other = self.source.named(id, block=block or self.block)
+        if other is not None and other is not element:
+            self.labels.append(Label(self.source.name_spot(other), f"{name} is here", primary=False))
 
     def spot_in(self, span: tuple[int, int], said: str) -> Spot:
         """The part of a value that is meant: the name in a reference, else all of it."""
@@ -220,6 +251,8 @@ class _Words:
 
     def class_of(self, element: Element) -> type[Any] | None:
         name = element.name.rpartition(":")[2]
+        if name == local(Block.tag):
+            return Block
         return next((cls for tag, cls in self.vocabulary.items() if local(tag) == name), None)
 
     def points_of(self, id: str) -> list[str]:
@@ -235,7 +268,7 @@ class _Words:
 
     def clash(self, text: str) -> None:
         """Every line that has a part in it, and what the behaviours themselves need."""
-        self.placed = True
+        self.path = self.path or "/bml"
         for found in _CLAUSE.finditer(text):
             left, sign, right, constraint, id, line = found.groups()
             spot = (
@@ -244,13 +277,37 @@ class _Words:
                 else self.in_behaviour(left, int(line))
             )
             self.labels.append(Label(spot, f"{left} {sign} {right}"))
+            if constraint and id == self.id and (found_one := self.constraint(id, int(line))):
+                self.path = self.source.path(found_one)
         self.notes += [f"note: {found[0]}" for found in _UNPLACED.finditer(text)]
-        first = _CLAUSE.search(text)
-        self.head = text[: first.start()].rstrip(" :,") if first else text
-        if not self.head.endswith(("placed", "kept")):
-            self.head = "these cannot all hold"
+        cannot = _CANNOT.match(text)
+        self.head = cannot[0] if cannot else "these cannot all hold"
         if why := _BECAUSE.search(text):
             self.notes.append(f"note: {next(filter(None, why.groups()))}")
+
+    def astray(
+        self, name: str, is_constraint: bool, constraint: str | None, line: int | None, said: str
+    ) -> None:
+        """A reference that leads nowhere the scheduler knows."""
+        element = self.element
+        if element is None and is_constraint:
+            element = self.constraint(constraint, line)
+        elif element is None:
+            element = self.source.named(name, line=line, block=self.block)
+        self.path = self.source.path(element) if element is not None else self.path or "/bml"
+        self.head = said
+        if element is None:
+            if line is not None:
+                self.labels.append(Label(self.source.whole_line(line), said))
+            return
+        found = _REFERENCE.match(said)
+        wanted = "".join(found[1].split()) if found else ""
+        for one in (element, *self.source.below(element)):
+            for attribute in one.attributes:
+                if wanted and "".join(self.source.value(one, attribute).split()) == wanted:
+                    self.labels.append(Label(self.source.locate_in(one, attribute), said))
+                    return
+        self.labels.append(Label(self.source.name_spot(element), said))
 
     def in_behaviour(self, point: str, line: int) -> Spot:
         id, _, sync = point.partition(":")
@@ -263,18 +320,16 @@ class _Words:
                     return self.source.locate_in(mark, "ref")
         return self.source.locate_in(element, sync)
 
+    def constraint(self, id: str | None, line: int | None) -> Element | None:
+        """A constraint by its id, or the first one on a line."""
+        found = self.source.named(id, line=line) if id else None
+        if found is None and line is not None:
+            on = (e for e in self.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")
+            found = next(on, None)
+        return found
+
     def in_constraint(self, id: str | None, refs: tuple[str, ...], line: int) -> Spot:
-        source = self.source
-        found = source.named(id, line=line, block=self.block) if id else None
-        if found is None:
-            found = next(
-                (
-                    e
-                    for e in source.on_line(line)
-                    if e.name.rpartition(":")[2] == "constraint" and source.block(e) == self.block
-                ),
-                None,
-            )
+        source, found = self.source, self.constraint(id, line)
         if found is None:
             return source.whole_line(line)
         wanted = ["".join(str(ref).split()) for ref in refs]

@@ -33,8 +33,8 @@ def under(source: Source, spot: Spot) -> str:
     [
         ("/bml", "id", None, "a"),
         ("/bml/head[1]", "amount", None, "7"),
-        ("/bml/head[1]", "lexeme", 6, "NOD"),
-        ("/bml/head[1]", "nothing", 6, "head"),
+        ("/bml/head[1]", "lexeme", 4, "NOD"),
+        ("/bml/head[1]", "nothing", 4, "head"),
         ("/bml/head[2]", "id", 6, "m"),
         ("/bml/required[1]/head[1]", "{urn:x}priority", 8, "3"),
         ("/bml/required[1]/head[1]", "b:priority", 8, "3"),
@@ -104,7 +104,7 @@ def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
         element = source.find(place.path, line=place.line, block=parsed.id)
         assert element is not None
         assert source.id(element) == node.id
-        assert source.line_of(element.end - 1) == place.line
+        assert source.line_of(element.offset) == place.line
     assert not source.slips
 
 

@@ -116,6 +116,51 @@ def test_a_clash_of_a_constraint_marks_its_reference(tmp_path: Path) -> None:
     assert sorted(marked(block)) == ["1", "3"]
 
 
+ASTRAY = {
+    "behaviour": ('<wait id="w" start="b9:x:end + 1"/>', "b9:x:end + 1", "/bml/wait[1]"),
+    "required": (
+        '<required><wait id="w" start="b9:x:end"/></required>',
+        "b9:x:end",
+        "/bml/required[1]/wait[1]",
+    ),
+    "constraint": (
+        '<wait id="w"/><constraint><before ref="b9:x:end"><sync ref="w:end"/></before></constraint>',
+        "b9:x:end",
+        "/bml/constraint[1]",
+    ),
+    "text": (
+        '<speech id="s"><text>a <sync id="t" ref="b9:x:end"/></text></speech>',
+        "b9:x:end",
+        "/bml/speech[1]",
+    ),
+    "composition": ('<wait id="w" start="1" end="0.5" />', "0.5", "/bml/wait[1]"),
+}
+
+
+@pytest.mark.parametrize("case", ASTRAY)
+def test_a_reference_that_leads_nowhere_is_marked(case: str, tmp_path: Path) -> None:
+    text, under, path = ASTRAY[case]
+    (block,) = blocks(check(tmp_path, f"{HEAD}{text}</bml>", "--long"))
+    assert under in marked(block)
+    assert f"line 2, {path}: " in block[0]
+
+
+def test_whoever_has_what_a_behaviour_wanted_is_shown(tmp_path: Path) -> None:
+    text = '<gaze id="g" target="a"/>\n<gaze id="h" target="b"/>'
+    done = check(tmp_path, f"{HEAD}{text}</bml>", "--long")
+    (block,) = blocks(done)
+    assert block[0].split(" ")[2] == "b1:h:"
+    assert marked(block) == ["gaze", "gaze"]
+    assert "g is here" in done.stdout
+
+
+def test_a_fault_of_the_whole_block_is_marked_in_its_start_tag(tmp_path: Path) -> None:
+    text = '<bml id="c" composition="MRGE"/>'
+    (block,) = blocks(check(tmp_path, text, "--long"))
+    assert marked(block) == ["MRGE"]
+    assert 'did you mean "MERGE"?' in "\n".join(block)
+
+
 def test_faults_of_a_block_that_fails_are_told_all_the_same(tmp_path: Path) -> None:
     text = HEAD + (
         '<required><head id="a" lexeme="NOPE"/>\n<head id="b" amount="7" lexeme="NOD"/></required>\n'
@@ -194,6 +239,11 @@ def test_bytes_that_are_no_text_are_marked(tmp_path: Path) -> None:
 ADVICE = {
     "start": ('<head id="h" lexeme="NOD" strt="1"/>', "strt", 'mean "start"?'),
     "amount": ('<head id="h" lexeme="NOD" amont="0.7"/>', "amont", 'mean "amount"?'),
+    "bmla": (
+        '<head xmlns:a="http://www.asap-project.org/bmla" id="h" lexeme="NOD" a:piority="1"/>',
+        "piority",
+        'mean "priority"?',
+    ),
     "milliseconds": ('<head id="h" lexeme="NOD" start="1500"/>', "1500", "write 1.5"),
     "muscles": ('<head id="h" lexeme="NOD" strokeStart="1" stroke="1.045"/>', "1.045", "placed where"),
     "shift": (
