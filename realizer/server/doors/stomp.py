@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import socket
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -301,6 +302,9 @@ class _Link:
             self._stomp.connect(login, password)
         except StompException as error:
             raise RealizerError(str(error) or "nobody answers") from None
+        # Otherwise each message waits until the one before is acknowledged: 50 ms a block instead of 7.
+        with contextlib.suppress(OSError, AttributeError):
+            self._stomp.transport.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._dropped:  # meanwhile; there was nothing to close yet
             self.drop()
 

@@ -24,7 +24,9 @@ CONFIGURATION = """<beans xmlns="http://www.springframework.org/schema/beans"
  <broker xmlns="http://activemq.apache.org/schema/core" brokerName="test" persistent="false" useJmx="false"
    dataDirectory="{folder}">
   {plugins}
-  <transportConnectors><transportConnector name="stomp" uri="stomp://127.0.0.1:{port}"/></transportConnectors>
+  <transportConnectors>
+   <transportConnector name="stomp" uri="stomp://127.0.0.1:{port}?transport.tcpNoDelay=true"/>
+  </transportConnectors>
  </broker>
 </beans>
 """
