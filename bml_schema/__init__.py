@@ -1,5 +1,6 @@
 """The language BML 1.0: text in, typed nodes out, and back; feedback likewise."""
 
+from bml_schema.absolute import timed
 from bml_schema.asap import (
     Activate,
     AudioFile,
@@ -150,6 +151,7 @@ __all__ = [
     "string",
     "sync_ref",
     "text",
+    "timed",
     "without",
     "word",
     "write",

@@ -1,0 +1,168 @@
+"""A block that says its own times: nothing moves when it is scheduled again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bml_schema import (
+    BMLA,
+    Behaviour,
+    Block,
+    Constraint,
+    Speech,
+    Sync,
+    Synchronize,
+    SyncRef,
+    Wait,
+    parse,
+    read,
+    timed,
+    write,
+)
+from realizer import schedule
+from realizer.speech import SilentVoice
+from tests.strategies import blocks, numbers
+
+CORPUS = Path(__file__).parents[1] / "corpus"
+
+Times = Mapping[str, Mapping[str, float]]
+
+
+def points(node: Behaviour) -> list[str]:
+    """The sync points of a behaviour, strokes and syncs of speech with them."""
+    times = getattr(node, "repetition", 1)
+    strokes = [f"stroke:{n}" for n in range(1, min(times, 4) + 1)] if times > 1 else []
+    return [*node.sync_points, *strokes, *(node.marked if isinstance(node, Speech) else ())]
+
+
+@st.composite
+def scheduled(draw: st.DrawFn) -> tuple[Block, Times]:
+    """A block, and times for some of its behaviours."""
+    block = draw(blocks())
+    chosen = [b for b in block.behaviours if draw(st.integers(0, 4))]
+    return block, {b.id: {p: draw(numbers) for p in points(b)} for b in chosen}
+
+
+def told(block: Block) -> dict[str, dict[str, float]]:
+    """The times a block says as numbers, wherever it says them."""
+    found: dict[str, dict[str, float]] = {}
+    for node in block.behaviours:
+        syncs = dict(node.syncs)
+        if isinstance(node, Speech) and node.text is not None:
+            syncs |= {p.id: p.ref for p in node.text.parts if isinstance(p, Sync) and p.ref is not None}
+        assert all(ref.behaviour is None for ref in syncs.values())
+        found[node.id] = {p: ref.offset for p, ref in syncs.items()}
+    for part in (p for c in block.constraints for p in c.parts if isinstance(p, Synchronize)):
+        name, time = (*part.refs, None)[:2]
+        if name and time and name.index is not None and time.behaviour is None and name.block is None:
+            found[name.behaviour or ""].setdefault(f"{name.sync}:{name.index}", time.offset)
+    return found
+
+
+@given(scheduled())
+def test_every_time_of_every_behaviour_is_said_to_the_last_bit(given_: tuple[Block, Times]) -> None:
+    block, times = given_
+    result = timed(block, times)
+    back = parse(write(result))
+    assert not back.problems
+    assert back == result
+    assert [b.id for b in result.behaviours] == [b.id for b in block.behaviours if b.id in times]
+    for id, at in times.items():
+        assert {p: t for p, t in told(back)[id].items() if p in at and ":" not in p} == {
+            p: t for p, t in at.items() if ":" not in p
+        }
+
+
+@given(scheduled())
+def test_a_block_that_says_its_times_stays_as_it_is(given_: tuple[Block, Times]) -> None:
+    block, times = given_
+    once = timed(block, times)
+    assert timed(once, times) == once
+
+
+def test_a_block_with_its_times_reads_as_people_would_write_it() -> None:
+    block = parse(
+        f"<bml id='b' xmlns:a='{BMLA}' a:appendAfter='x'>"
+        "<speech id='s' start='gone:end'><text>a<sync id='m'/></text></speech>"
+        "<head id='h' lexeme='NOD' repetition='2' stroke='s:m'/><wait id='gone'/>"
+        "<constraint id='k'><before ref='h:end'><sync ref='s:end'/></before></constraint>"
+        "<constraint id='lost'><before ref='h:end'><sync ref='gone:end'/></before></constraint></bml>"
+    )
+    times = {
+        "s": {"start": 0.0, "m": 0.1 + 0.2, "end": 1.0},
+        "h": {"start": 0.0, "stroke:1": 0.25, "stroke:2": 0.5, "stroke": 0.5, "end": 1.5},
+    }
+    assert write(timed(block, times)) == (
+        '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" xmlns:bmla="http://www.asap-project.org/bmla"'
+        ' id="b" bmla:appendAfter="x">\n'
+        '  <speech id="s" start="0" end="1">\n'
+        '    <text>a<sync id="m" ref="0.30000000000000004"/></text>\n'
+        "  </speech>\n"
+        '  <head id="h" lexeme="NOD" repetition="2" start="0" stroke="0.5" end="1.5"/>\n'
+        '  <constraint id="k">\n'
+        '    <before ref="h:end">\n'
+        '      <sync ref="s:end"/>\n'
+        "    </before>\n"
+        "  </constraint>\n"
+        "  <constraint>\n"
+        "    <synchronize>\n"
+        '      <sync ref="h:stroke:1"/>\n'
+        '      <sync ref="0.25"/>\n'
+        "    </synchronize>\n"
+        "    <synchronize>\n"
+        '      <sync ref="h:stroke:2"/>\n'
+        '      <sync ref="0.5"/>\n'
+        "    </synchronize>\n"
+        "  </constraint>\n"
+        "</bml>\n"
+    )
+
+
+def test_a_mark_of_a_description_stands_in_a_constraint() -> None:
+    speak = "<speak xmlns='http://www.w3.org/2001/10/synthesis'>a<mark name='m'/>b</speak>"
+    inside = f"<description priority='1' type='application/ssml+xml'>{speak}</description>"
+    block = parse(f"<bml id='b'><speech id='s'>{inside}</speech></bml>")
+    result = timed(block, {"s": {"start": 0.0, "m": 0.5, "end": 1.0}})
+    refs = (SyncRef(behaviour="s", sync="m"), SyncRef(offset=0.5))
+    assert result.constraints == (Constraint(parts=(Synchronize(refs=refs),)),)
+    assert not parse(write(result)).problems
+
+
+@pytest.mark.parametrize("time", [math.nan, math.inf, 86401.0, -1e9])
+def test_a_time_no_document_can_say_is_a_value_error(time: float) -> None:
+    with pytest.raises(ValueError, match="w:end: wanted at most 86400 seconds, got"):
+        timed(Block(id="b", children=(Wait(id="w"),)), {"w": {"start": 0.0, "end": time}})
+
+
+def test_a_constraint_that_the_times_break_was_dropped_and_is_not_said_again() -> None:
+    block = parse(
+        "<bml id='b'><wait id='w'/>"
+        "<constraint id='k'><synchronize><sync ref='w:end'/><sync ref='2'/></synchronize></constraint>"
+        "<constraint id='l'><after ref='w:end'><sync ref='bml:start+2'/></after></constraint>"
+        "<constraint id='m'><before ref='x:w:end'><sync ref='w:start'/></before></constraint></bml>"
+    )
+    assert [c.id for c in timed(block, {"w": {"start": 0.0, "end": 1.0}}).constraints] == ["l", "m"]
+    assert [c.id for c in timed(block, {"w": {"start": 0.0, "end": 2.0}}).constraints] == ["k", "l", "m"]
+    assert [c.id for c in timed(block, {"w": {"start": 0.0, "end": 2.5}}).constraints] == ["m"]
+
+
+CASES = sorted(p for folder in ("core", "constraints", "ext") for p in (CORPUS / folder).glob("*.xml"))
+
+
+@pytest.mark.parametrize("case", CASES, ids=[f"{c.parent.name}/{c.stem}" for c in CASES])
+def test_scheduling_it_again_gives_the_same_times(case: Path) -> None:
+    for block in read(case.read_bytes()):
+        assert isinstance(block, Block)
+        first = schedule(write(block), voice=SilentVoice())
+        text = write(timed(block, first.behaviours))
+        again = schedule(text, voice=SilentVoice())
+        assert again.behaviours == {id: pytest.approx(at, abs=1e-9) for id, at in first.behaviours.items()}, (
+            text
+        )
+        assert {(w.id, w.type) for w in again.warnings} <= {(w.id, w.type) for w in first.warnings}
