@@ -39,13 +39,12 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
         times: (n,) seconds, any order.
     """
     times = np.asarray(times, np.float64)
-    channels = list(channels)
     alive = _alive(channels, times)
     # Only the columns that something moves are worked on; `place` says where each of them stands.
     columns = sorted({channel.target.column for channel in alive})
     place = {column: i for i, column in enumerate(columns)}
     sampled = sample(alive, times)
-    _take_idle(sampled, alive, channels)
+    _take_idle(sampled, alive)
     sums = _sums()[columns]
     shape = (len(columns), len(times))
     base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -91,23 +90,20 @@ def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
     return alive
 
 
-def _take_idle(sampled: Float64, alive: list[Channel], channels: list[Channel]) -> None:
-    """Take from the idle channels what the presences "motion" and "blinks" say, in place, of their rows.
-
-    A blink may have begun before the first frame: what is gone by then, among `channels`, counts for it.
-    """
+def _take_idle(sampled: Float64, channels: list[Channel]) -> None:
+    """Take from the idle channels what the presences "motion" and "blinks" say, in place, of their rows."""
     lids, moves = presence("blinks").column, presence("motion").column
     taking = [channel for channel in channels if channel.target.column == lids]
-    motion = [i for i, channel in enumerate(alive) if channel.target.column == moves]
+    motion = [i for i, channel in enumerate(channels) if channel.target.column == moves]
     if not taking and not motion:
         return
-    blinks = [(i, channel) for i, channel in enumerate(alive) if isinstance(channel, Blink)]
+    blinks = [(i, channel) for i, channel in enumerate(channels) if isinstance(channel, Blink)]
     begins = np.array([blink.times[0] for _, blink in blinks])
     kept = 1.0 - np.minimum(sample(taking, begins).sum(axis=0), 1.0)
     for (i, blink), part in zip(blinks, kept, strict=True):
         sampled[i] *= part > blink.draw
     still = 1.0 - np.minimum(sampled[motion].sum(axis=0), 1.0)
-    for i, channel in enumerate(alive):
+    for i, channel in enumerate(channels):
         if channel.layer is Layer.IDLE and not isinstance(channel, Blink):
             sampled[i] *= still
 

@@ -18,7 +18,7 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
 
-__all__ = ["Blink", "idle_channels"]
+__all__ = ["Blink", "Fewer", "idle_channels"]
 
 # s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
 BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
@@ -46,6 +46,16 @@ class Blink(Channel):
     """
 
     draw: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fewer(Channel):
+    """What is taken from the blinks; it counts for those that began before it had gone, until they end."""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        first, last = super().span
+        return first, last + BLINK_TIMES[-1]
 
 
 def idle_channels(start: float, end: float, seed: int) -> list[Channel]:

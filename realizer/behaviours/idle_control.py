@@ -6,6 +6,7 @@ import numpy as np
 
 from bml_schema import Idle
 from realizer.animation.channel import Channel, Layer
+from realizer.animation.idle import Fewer
 from realizer.animation.targets import presence
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Kind, World
@@ -25,10 +26,10 @@ def expand(node: Idle, times: Float64, world: World) -> tuple[Channel, ...]:
     Both channels are there even where nothing is taken: they replace what an earlier one took.
     """
     return tuple(
-        Channel(
+        channel(
             presence(name), times, np.array([0.0, 1.0 - part]), layer=Layer.BASE, holds=True, source=node.id
         )
-        for name, part in (("blinks", node.blinks), ("motion", node.motion))
+        for channel, name, part in ((Fewer, "blinks", node.blinks), (Channel, "motion", node.motion))
     )
 
 

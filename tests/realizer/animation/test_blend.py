@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.idle import Blink
+from realizer.animation.idle import Blink, Fewer
 from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
 
 ONE = np.array([0.0])
@@ -143,7 +143,7 @@ def test_a_blink_that_has_begun_ends_as_it_was_whatever_window_is_looked_at() ->
     )
     assert value_of([blink(0.0), soon], lid, 1.15) == 1
     # What took it when it began has gone before this window, and counts.
-    gone = still(presence("blinks"), 1.0, Layer.BASE).faded(1.02, 1.1)
+    gone = Fewer(presence("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, holds=True).faded(1.02, 1.1)
     assert value_of([blink(0.0), gone], lid, 1.15) == 0
 
 

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from bml_schema import parse
 from realizer.animation.targets import AU_NAMES
+from realizer.behaviours import VOCABULARY
+from realizer.player import Player
+from tests.realizer.behaviours.conftest import NAMESPACES
 
 LONG = '<wait id="w" duration="60"/>'
 LID = AU_NAMES().index("45L")
@@ -70,6 +75,21 @@ def test_motion_goes_away_smoothly_and_no_lid_jumps(play) -> None:
     assert np.all(steps <= np.abs(np.diff(usual, axis=0)).max(axis=0) + 0.02)
     np.testing.assert_array_equal(frames[: blinks(usual)[3] + 31, LID], usual[: blinks(usual)[3] + 31, LID])
     assert not frames[blinks(usual)[3] + 31 :, LID].any()
+
+
+@pytest.mark.parametrize("late", [-0.06, -0.02, 0.02, 0.1, 0.2])
+def test_live_frames_are_those_of_the_film_when_blinks_come_back_within_a_blink(late: float) -> None:
+    times = np.arange(0, 12, 0.04)
+    begins = times[blinks(Player().frames(times).aus)][1] + 0.04
+    body = '<own:idle id="i" blinks="0" start="0" end="0.1"/>'
+    body += f'<own:idle id="j" start="{begins + late}" end="{begins + late + 0.04}"/>'
+    player = Player(history=float("inf"))
+    player.submit(parse(f'<bml id="b" {NAMESPACES}>{body}</bml>', VOCABULARY), 0.0)
+    player.due(12)
+    film = player.frames(times).aus[:, LID]
+    live = np.concatenate([player.frames(times[k : k + 1]).aus[:, LID] for k in range(len(times))])
+    np.testing.assert_array_equal(live, film)
+    assert set(film[film > 0]) <= set(Player().frames(times).aus[:, LID])
 
 
 def test_blinks_that_are_asked_for_come_all_the_same(play) -> None:
