@@ -10,21 +10,14 @@ import html
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import NamedTuple
+
+from bml_schema.scan import DOCUMENT, Element, Slip, scan
 
 __all__: list[str] = []
 
-_OPENER = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|</|<(?=[^\s<>/='\"!?])")
-_CLOSER = {"<!--": "-->", "<![CDATA[": "]]>", "<?": "?>", "<!DOCTYPE": ">"}
-_NAME = re.compile(r"[^\s<>/='\"]+")
-_ATTRIBUTE = re.compile(r"""\s*([^\s<>/='"]+)\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
-_TAG_END = re.compile(r"\s*/?>")
-_SLIPPED = re.compile(r"\s*([^\s<>/='\"]+)(?:\s*=\s*([^\s<>]*))?")
-_BAD_ENTITY = re.compile(r"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s<>;\"'&]{0,30};?")
 _STEP = re.compile(r"([^/\[\]]+)(?:\[([0-9]{1,9})\])?")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
-_WHOLE_DOCUMENT = "bml"
 
 
 class Spot(NamedTuple):
@@ -33,37 +26,6 @@ class Spot(NamedTuple):
     line: int
     column: int
     length: int
-
-
-class Slip(NamedTuple):
-    """A place that no XML parser takes, what is wrong there, and the offset of what it does not fit or -1."""
-
-    offset: int
-    length: int
-    text: str
-    related: int = -1
-
-
-@dataclass(slots=True)
-class Element:
-    """A start tag.
-
-    Attributes:
-        name: as written, with its prefix.
-        offset, end: of "<", and behind ">".
-        attributes: name as written -> (offset, end) of its value without the quotes.
-        parent: number of the element around it, -1 for none.
-        nth: which one of its name among the children of its parent, from 1.
-        root: number of the nearest <bml> around it, itself included, -1 for none.
-    """
-
-    name: str
-    offset: int
-    end: int
-    parent: int
-    nth: int = 1
-    root: int = -1
-    attributes: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
 class Source:
@@ -80,14 +42,16 @@ class Source:
 
     def __init__(self, text: str | bytes) -> None:
         self.text = _decoded(text) if isinstance(text, bytes) else text
-        self.elements: list[Element] = []
-        self.slips: list[Slip] = []
+        self.elements, self.slips = scan(self.text)
         self._starts = [0, *(m.end() for m in re.finditer("\n", self.text))]
-        self._children: dict[tuple[int, str, int], int] = {}
-        self._roots: list[int] = []
+        self._children = {
+            (e.parent, e.name.rpartition(":")[2], e.nth): n for n, e in enumerate(self.elements)
+        }
+        self._roots = [n for n, e in enumerate(self.elements) if e.root == n]
         self._ids: dict[str, list[Element]] = {}
-        _Scan(self).run()
-        self.slips.sort()
+        for n, e in enumerate(self.elements):
+            if e.root not in (-1, n) and "id" in e.attributes:
+                self._ids.setdefault(self.id(e), []).append(e)
 
     def line(self, number: int) -> str:
         """The text of a line without its end; "" where there is no such line."""
@@ -133,7 +97,7 @@ class Source:
     def find(self, path: str, *, line: int | None = None, block: str | None = None) -> Element | None:
         """The element at a path; of several documents the one that fits line and id best."""
         steps = [(m[1], int(m[2] or 1)) for m in _STEP.finditer(path)]
-        if not steps or steps[0][0] != _WHOLE_DOCUMENT:
+        if not steps or steps[0][0] != DOCUMENT:
             return None
         found = [e for root in self._roots if (e := self._below(root, steps[1:])) is not None]
         return self._best(found, line, block)
@@ -182,7 +146,7 @@ class Source:
         while element.parent >= 0 and element is not self.elements[element.root]:
             steps = f"/{element.name.rpartition(':')[2]}[{element.nth}]{steps}"
             element = self.elements[element.parent]
-        return f"/{_WHOLE_DOCUMENT}{steps}"
+        return f"/{DOCUMENT}{steps}"
 
     def value(self, element: Element, attribute: str) -> str:
         """What an attribute holds; "" where there is none."""
@@ -242,130 +206,6 @@ class Source:
             return begins, ends, block is not None and self.block(element) == block
 
         return max(found, key=fits, default=None)
-
-
-class _Scan:
-    """One pass over the text of a source; linear in it, whatever it holds."""
-
-    def __init__(self, source: Source) -> None:
-        self.source = source
-        self.text = source.text
-        self.open: list[int] = []
-        self.names: dict[str, int] = {}  # how many of these are open
-        self.counts: dict[tuple[int, str], int] = {}
-        self.never: set[str] = set()  # closers that do not come any more
-
-    def run(self) -> None:
-        here = 0
-        while found := _OPENER.search(self.text, here):
-            self.entities(here, found.start())
-            here = self.tag(found[0], found.start(), found.end())
-        self.entities(here, len(self.text))
-        if self.open:
-            first = self.source.elements[self.open[-1]]
-            end = len(self.text.rstrip())
-            words = f"<{first.name}> is never closed"
-            self.source.slips.append(Slip(max(0, end - 1), 1, words, first.offset))
-
-    def tag(self, opener: str, start: int, end: int) -> int:
-        """Read what begins at `start`; returns where to go on."""
-        if opener in _CLOSER:
-            closer = _CLOSER[opener]
-            close = -1 if closer in self.never else self.text.find(closer, end)
-            if close < 0:
-                self.never.add(closer)
-                self.source.slips.append(Slip(start, len(opener), f"{opener} is never closed by {closer}"))
-                return end
-            return close + len(closer)
-        name = _NAME.match(self.text, end)
-        if opener == "</":
-            return self.close(name[0] if name else "", start, name.end() if name else end)
-        assert name is not None
-        return self.start_tag(name[0], start, name.end())
-
-    def start_tag(self, name: str, start: int, here: int) -> int:
-        source, parent = self.source, self.open[-1] if self.open else -1
-        number = len(source.elements)
-        local = name.rpartition(":")[2]
-        element = Element(name, start, here, parent)
-        element.root = (
-            number if local == _WHOLE_DOCUMENT else source.elements[parent].root if self.open else -1
-        )
-        nth = self.counts[parent, local] = self.counts.get((parent, local), 0) + 1
-        element.nth = nth
-        source.elements.append(element)
-        source._children[parent, local, nth] = number
-        while not (end := _TAG_END.match(self.text, here)):
-            found = _ATTRIBUTE.match(self.text, here)
-            if found is None:
-                here = self.slipped(name, here)
-                break
-            key, quoted = found[1], 2 if found[2] is not None else 3
-            if key in element.attributes:
-                words = f"{key} is given twice"
-                source.slips.append(Slip(found.start(1), len(key), words, element.attributes[key][0]))
-            else:
-                element.attributes[key] = found.span(quoted)
-            self.entities(*found.span(quoted))
-            here = found.end()
-        element.end = end.end() if end else here
-        if element.root == number:
-            source._roots.append(number)
-        elif element.root >= 0 and "id" in element.attributes:
-            source._ids.setdefault(source.id(element), []).append(element)
-        if not end or self.text[end.end() - 2] != "/":
-            self.open.append(number)
-            self.names[name] = self.names.get(name, 0) + 1
-        return element.end
-
-    def slipped(self, tag: str, here: int) -> int:
-        """Say what is wrong in a start tag; returns where to look for the next tag."""
-        slips, text = self.source.slips, self.text
-        found = _SLIPPED.match(text, here)
-        if found is None:
-            at = here + len(text[here : here + 200]) - len(text[here : here + 200].lstrip())
-            slips.append(Slip(at, 1, f"wanted an attribute or the end of <{tag}>"))
-            return here
-        name, value = found[1], found[2]
-        if value is None:
-            slips.append(Slip(found.start(1), len(name), f'wanted {name}="...", got no value'))
-        elif value[:1] in ('"', "'"):
-            slips.append(
-                Slip(found.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
-            )
-        else:
-            slips.append(
-                Slip(found.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
-            )
-        return found.end()
-
-    def close(self, name: str, start: int, end: int) -> int:
-        elements = self.source.elements
-        if self.names.get(name):
-            if elements[self.open[-1]].name != name:
-                inner = elements[self.open[-1]]
-                words = f"wanted </{inner.name}>, got </{name}>"
-                self.source.slips.append(Slip(start, end - start, words, inner.offset))
-            while self.names.get(name):
-                last = elements[self.open.pop()].name
-                self.names[last] -= 1
-                if last == name:
-                    break
-        elif self.open:
-            inner = elements[self.open[-1]]
-            words = f"wanted </{inner.name}>, got </{name}>"
-            self.source.slips.append(Slip(start, end - start, words, inner.offset))
-        else:
-            self.source.slips.append(Slip(start, end - start, f"</{name}> closes nothing"))
-        return end
-
-    def entities(self, start: int, end: int) -> None:
-        for found in _BAD_ENTITY.finditer(self.text, start, end):
-            if found[0].endswith(";"):
-                words = f"no entity {found[0]} in XML, write the character itself"
-            else:
-                words = "wanted &amp; for the character &"
-            self.source.slips.append(Slip(found.start(), len(found[0]), words))
 
 
 def _decoded(data: bytes) -> str:

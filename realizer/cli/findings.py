@@ -5,14 +5,16 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 from bml_schema import Block
+from bml_schema.scan import Element
 from bml_schema.shape import Attribute, local, shape_of
-from bml_schema.source import Element, Source, Spot
+from bml_schema.source import Source, Spot
+from realizer.cli.clashes import explain_clash
 from realizer.cli.diagnostics import Finding, Label
+from realizer.cli.draft import Draft
 from realizer.scheduling.timing import Warning
 
 __all__ = ["finding_of", "near"]
@@ -27,18 +29,7 @@ _LONG_LIST = re.compile(r"wanted one of ((?:[^,;]+, ){5,}[^,;]+); got ")
 _NO_POINT = re.compile(r'no sync point "?([^"]+?)"? on "?([^"]+?)"?$')
 _NO_BEHAVIOUR = re.compile(r'no behaviour "?([^"]+?)"? in this block')
 _TAKEN = re.compile(r"which line (\d+) has")
-# The scheduler's words for what clashes; see realizer/scheduling/explain.py.
-_CLAUSE = re.compile(
-    r"(\S+) (?:is )?(=|not before|not after) ([^,()]+?) \((?:(constraint)(?: ([^,)]+))?, )?line (\d+)\)"
-)
-_UNPLACED = re.compile(r"\S+ takes (?:at least|exactly) [\d.e+-]+ s from (?:its start|\S+) to [^\s,;]+")
-_CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
-_ASTRAY = re.compile(
-    r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
-)
-_REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
 _HELD = re.compile(r"but (\S+) has it from")
-_BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)$|(all of this is required)$")
 _UNKNOWN_PREFIX = re.compile(r"Namespace prefix (\S+)(?: for \S+)? on (\S+) is not defined")
 _MOST_LISTED = 12
 
@@ -54,17 +45,22 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
     """
     placed = _PLACED.fullmatch(warning.text)
     line, path, text = (int(placed[1]), placed[2] or "", placed[3]) if placed else (None, "", warning.text)
-    words = _Words(source, warning.id, line, path, vocabulary)
-    words.explain(text)
+    draft = Draft(source, warning.id, line, path)
+    lost = _LOST.fullmatch(text)
+    said = lost[1] if lost else text
+    if not explain_clash(draft, said):
+        _Sentences(draft, vocabulary).explain(said)
+    if lost:
+        draft.notes.append(f"note: with it went {lost[2]}")
     return Finding(
         file=file,
         type=warning.type,
         id=warning.id,
-        path=path or words.path,
+        path=path or draft.path,
         text=text,
-        head=words.head or text,
-        labels=tuple(words.labels),
-        notes=tuple(dict.fromkeys(words.notes)),
+        head=draft.head or text,
+        labels=tuple(draft.labels),
+        notes=tuple(dict.fromkeys(draft.notes)),
     )
 
 
@@ -75,55 +71,29 @@ def near(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
     return by_case[found[0]] if found else None
 
 
-@dataclass
-class _Words:
-    """What becomes of the text of one warning."""
+class _Sentences:
+    """Explains what the parser and the kinds of behaviours say: sentences about one element each."""
 
-    source: Source
-    id: str
-    line: int | None
-    path: str
-    vocabulary: Mapping[str, type[Any]]
-
-    def __post_init__(self) -> None:
-        self.block = self.id.partition(":")[0]
-        self.labels: list[Label] = []
-        self.notes: list[str] = []
-        self.head = ""
-        self.element = self.source.find(self.path, line=self.line, block=self.block) if self.path else None
-        if self.element is None and ":" in self.id:
-            self.element = self.source.named(self.id.partition(":")[2], line=self.line, block=self.block)
+    def __init__(self, draft: Draft, vocabulary: Mapping[str, type[Any]]) -> None:
+        self.draft, self.vocabulary = draft, vocabulary
+        self.source, self.labels, self.notes = draft.source, draft.labels, draft.notes
 
     def explain(self, text: str) -> None:
-        lost = _LOST.fullmatch(text)
-        if lost:
-            text = lost[1]
-        if _CLAUSE.search(text):
-            self.clash(text)
-        elif astray := _ASTRAY.fullmatch(text):
-            name, constraint, id, line, said = astray.groups()
-            self.astray(name, bool(constraint), id, int(line) if line else self.line, said)
-        else:
-            self.sentences(text)
-        if lost:
-            self.notes.append(f"note: with it went {lost[2]}")
-
-    def sentences(self, text: str) -> None:
-        """What is wrong with one element, or with a text that gave none."""
-        if self.element is None and self.line is None:
+        draft = self.draft
+        if draft.element is None and draft.line is None:
             # A fault of the whole block; of several with one id, the last.
-            self.element = self.source.document(self.block)
-            self.path = "/bml" if self.element is not None else ""
-        if self.element is None:
+            draft.element = self.source.document(draft.block)
+            draft.path = "/bml" if draft.element is not None else ""
+        if draft.element is None:
             self.broken(text)
         else:
-            pieces = [self.piece(piece, self.element) for piece in _PIECE.split(text)]
-            self.head = "; ".join(pieces)
+            pieces = [self.piece(piece, draft.element) for piece in _PIECE.split(text)]
+            draft.head = "; ".join(pieces)
 
     # a document that gave no block
 
     def broken(self, text: str) -> None:
-        source, line = self.source, self.line
+        source, line = self.source, self.draft.line
         if line is None:
             return
         bad = source.line(line).find("\N{REPLACEMENT CHARACTER}")
@@ -183,7 +153,7 @@ class _Words:
         self.labels.append(Label(self.spot_in(span, said), said))
         if taken := _TAKEN.search(said):
             id = self.source.id(element)
-            first = self.source.named(id, line=int(taken[1]), block=self.block)
+            first = self.source.named(id, line=int(taken[1]), block=self.draft.block)
             if first is not None and first is not element:
                 spot = self.source.locate_in(first, "id")
                 self.labels.append(Label(spot, "the first one is here", primary=False))
@@ -193,7 +163,7 @@ class _Words:
     def holder(self, name: str, element: Element) -> None:
         """Who has what a behaviour wanted: "behaviour", or "block:behaviour" of an earlier block."""
         block, _, id = name.rpartition(":")
-        other = self.source.named(id, block=block or self.block)
+        other = self.source.named(id, block=block or self.draft.block)
         if other is not None and other is not element:
             self.labels.append(Label(self.source.name_spot(other), f"{name} is here", primary=False))
 
@@ -256,88 +226,13 @@ class _Words:
         return next((cls for tag, cls in self.vocabulary.items() if local(tag) == name), None)
 
     def points_of(self, id: str) -> list[str]:
-        element = self.source.named(id, block=self.block)
+        element = self.source.named(id, block=self.draft.block)
         cls = self.class_of(element) if element else None
         if element is None or cls is None:
             return []
         marks = [self.source.id(e) for e in self.source.below(element) if e.name.rpartition(":")[2] == "sync"]
         first, *rest = cls.sync_points
         return [first, *filter(None, marks), *rest]
-
-    # constraints that cannot all hold
-
-    def clash(self, text: str) -> None:
-        """Every line that has a part in it, and what the behaviours themselves need."""
-        self.path = self.path or "/bml"
-        for found in _CLAUSE.finditer(text):
-            left, sign, right, constraint, id, line = found.groups()
-            spot = (
-                self.in_constraint(id, (right, left), int(line))
-                if constraint
-                else self.in_behaviour(left, int(line))
-            )
-            self.labels.append(Label(spot, f"{left} {sign} {right}"))
-            if constraint and id == self.id and (found_one := self.constraint(id, int(line))):
-                self.path = self.source.path(found_one)
-        self.notes += [f"note: {found[0]}" for found in _UNPLACED.finditer(text)]
-        cannot = _CANNOT.match(text)
-        self.head = cannot[0] if cannot else "these cannot all hold"
-        if why := _BECAUSE.search(text):
-            self.notes.append(f"note: {next(filter(None, why.groups()))}")
-
-    def astray(
-        self, name: str, is_constraint: bool, constraint: str | None, line: int | None, said: str
-    ) -> None:
-        """A reference that leads nowhere the scheduler knows."""
-        element = self.element
-        if element is None and is_constraint:
-            element = self.constraint(constraint, line)
-        elif element is None:
-            element = self.source.named(name, line=line, block=self.block)
-        self.path = self.source.path(element) if element is not None else self.path or "/bml"
-        self.head = said
-        if element is None:
-            if line is not None:
-                self.labels.append(Label(self.source.whole_line(line), said))
-            return
-        found = _REFERENCE.match(said)
-        wanted = "".join(found[1].split()) if found else ""
-        for one in (element, *self.source.below(element)):
-            for attribute in one.attributes:
-                if wanted and "".join(self.source.value(one, attribute).split()) == wanted:
-                    self.labels.append(Label(self.source.locate_in(one, attribute), said))
-                    return
-        self.labels.append(Label(self.source.name_spot(element), said))
-
-    def in_behaviour(self, point: str, line: int) -> Spot:
-        id, _, sync = point.partition(":")
-        element = self.source.named(id, line=line, block=self.block)
-        if element is None:
-            return self.source.whole_line(line)
-        if self.source.value_span(element, sync) is None:
-            for mark in self.source.below(element):
-                if self.source.id(mark) == sync:
-                    return self.source.locate_in(mark, "ref")
-        return self.source.locate_in(element, sync)
-
-    def constraint(self, id: str | None, line: int | None) -> Element | None:
-        """A constraint by its id, or the first one on a line."""
-        found = self.source.named(id, line=line) if id else None
-        if found is None and line is not None:
-            on = (e for e in self.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")
-            found = next(on, None)
-        return found
-
-    def in_constraint(self, id: str | None, refs: tuple[str, ...], line: int) -> Spot:
-        source, found = self.source, self.constraint(id, line)
-        if found is None:
-            return source.whole_line(line)
-        wanted = ["".join(str(ref).split()) for ref in refs]
-        for ref in wanted:
-            for element in source.below(found):
-                if "".join(source.value(element, "ref").split()) == ref:
-                    return source.locate_in(element, "ref")
-        return source.name_spot(found)
 
 
 def _listed(words: Iterable[str]) -> str:

@@ -71,28 +71,6 @@ def test_bytes_are_read_as_the_parser_reads_them(encoding: str) -> None:
     assert under(source, source.locate("/bml", "id")) == "é"
 
 
-@pytest.mark.parametrize(
-    ("text", "said", "place"),
-    [
-        ("<bml id='a'><x></y></bml>", "wanted </x>, got </y>", "</y"),
-        ("<bml id='a'>", "<bml> is never closed", ">"),
-        ("<bml id=a/>", "wanted quotes around the value of id", "a/"),
-        ("<bml id/>", 'wanted id="...", got no value', "id"),
-        ("<bml id='a' id='b'/>", "id is given twice", "id"),
-        ("<bml id='a>", "the value of id is never closed by '", "'a"),
-        ("<bml id='a'>&nbsp;</bml>", "no entity &nbsp; in XML, write the character itself", "&nbsp;"),
-        ("<bml id='&'/>", "wanted &amp; for the character &", "&"),
-        ("</bml>", "</bml> closes nothing", "</bml"),
-        ("<bml id='a'><!-- </bml>", "<!-- is never closed by -->", "<!--"),
-        ("<bml id='a' <x/></bml>", "wanted an attribute or the end of <bml>", "<"),
-    ],
-)
-def test_what_is_not_well_formed_is_named(text: str, said: str, place: str) -> None:
-    source = Source(text)
-    slip = next(s for s in source.slips if s.text == said)
-    assert text[slip.offset : slip.offset + slip.length] == place
-
-
 @given(blocks(foreign=False))
 def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
     text = "<!-- one -->\n" + write(block)
@@ -118,11 +96,3 @@ def test_any_text_is_taken_and_every_place_is_inside_it(text: str) -> None:
     for line in range(1, text.count("\n") + 2):
         source.slip(line)
         source.locate("/bml/a[1]", "a", line=line)
-
-
-@pytest.mark.parametrize("piece", ["<a>", "<!--", "</a>", "<bml id='", "&", "<a b='c' ", "<bml>", "<a\n"])
-def test_a_hostile_text_is_taken_too(piece: str) -> None:
-    # A scan that was not linear in the text would take hours.
-    source = Source(piece * 50_000)
-    assert source.slips
-    assert len(source.elements) in (0, 50_000)

@@ -1,0 +1,172 @@
+"""A text in; every start tag with the places of its attributes, and what is not well-formed, out."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+__all__: list[str] = []
+
+DOCUMENT = "bml"
+_OPENER = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|</|<(?=[^\s<>/='\"!?])")
+_CLOSER = {"<!--": "-->", "<![CDATA[": "]]>", "<?": "?>", "<!DOCTYPE": ">"}
+_NAME = re.compile(r"[^\s<>/='\"]+")
+_ATTRIBUTE = re.compile(r"""\s*([^\s<>/='"]+)\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
+_TAG_END = re.compile(r"\s*/?>")
+_SLIPPED = re.compile(r"\s*([^\s<>/='\"]+)(?:\s*=\s*([^\s<>]*))?")
+_BAD_ENTITY = re.compile(r"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s<>;\"'&]{0,30};?")
+
+
+class Slip(NamedTuple):
+    """A place that no XML parser takes, what is wrong there, and the offset of what it does not fit or -1."""
+
+    offset: int
+    length: int
+    text: str
+    related: int = -1
+
+
+@dataclass(slots=True)
+class Element:
+    """A start tag.
+
+    Attributes:
+        name: as written, with its prefix.
+        offset, end: of "<", and behind ">".
+        attributes: name as written -> (offset, end) of its value without the quotes.
+        parent: number of the element around it, -1 for none.
+        nth: which one of its name among the children of its parent, from 1.
+        root: number of the nearest <bml> around it, itself included, -1 for none.
+    """
+
+    name: str
+    offset: int
+    end: int
+    parent: int
+    nth: int = 1
+    root: int = -1
+    attributes: dict[str, tuple[int, int]] = field(default_factory=dict)
+
+
+def scan(text: str) -> tuple[list[Element], list[Slip]]:
+    """Every start tag, and every slip, both in order; forgiving, as texts are scanned that are broken."""
+    one = _Scan(text)
+    one.run()
+    return one.elements, sorted(one.slips)
+
+
+class _Scan:
+    """One pass over a text; linear in it, whatever it holds."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.elements: list[Element] = []
+        self.slips: list[Slip] = []
+        self.open: list[int] = []
+        self.names: dict[str, int] = {}  # how many of these are open
+        self.counts: dict[tuple[int, str], int] = {}
+        self.never: set[str] = set()  # closers that do not come any more
+
+    def run(self) -> None:
+        here = 0
+        while found := _OPENER.search(self.text, here):
+            self.entities(here, found.start())
+            here = self.tag(found[0], found.start(), found.end())
+        self.entities(here, len(self.text))
+        if self.open:
+            first = self.elements[self.open[-1]]
+            end = len(self.text.rstrip())
+            words = f"<{first.name}> is never closed"
+            self.slips.append(Slip(max(0, end - 1), 1, words, first.offset))
+
+    def tag(self, opener: str, start: int, end: int) -> int:
+        """Read what begins at `start`; returns where to go on."""
+        if opener in _CLOSER:
+            closer = _CLOSER[opener]
+            close = -1 if closer in self.never else self.text.find(closer, end)
+            if close < 0:
+                self.never.add(closer)
+                self.slips.append(Slip(start, len(opener), f"{opener} is never closed by {closer}"))
+                return end
+            return close + len(closer)
+        name = _NAME.match(self.text, end)
+        if opener == "</":
+            return self.close(name[0] if name else "", start, name.end() if name else end)
+        assert name is not None
+        return self.start_tag(name[0], start, name.end())
+
+    def start_tag(self, name: str, start: int, here: int) -> int:
+        parent, number = self.open[-1] if self.open else -1, len(self.elements)
+        local = name.rpartition(":")[2]
+        nth = self.counts[parent, local] = self.counts.get((parent, local), 0) + 1
+        around = self.elements[parent].root if self.open else -1
+        element = Element(name, start, here, parent, nth, number if local == DOCUMENT else around)
+        self.elements.append(element)
+        while not (end := _TAG_END.match(self.text, here)):
+            found = _ATTRIBUTE.match(self.text, here)
+            if found is None:
+                here = self.slipped(name, here)
+                break
+            key, quoted = found[1], 2 if found[2] is not None else 3
+            if key in element.attributes:
+                words = f"{key} is given twice"
+                self.slips.append(Slip(found.start(1), len(key), words, element.attributes[key][0]))
+            else:
+                element.attributes[key] = found.span(quoted)
+            self.entities(*found.span(quoted))
+            here = found.end()
+        element.end = end.end() if end else here
+        if not end or self.text[end.end() - 2] != "/":
+            self.open.append(number)
+            self.names[name] = self.names.get(name, 0) + 1
+        return element.end
+
+    def slipped(self, tag: str, here: int) -> int:
+        """Say what is wrong in a start tag; returns where to look for the next tag."""
+        slips, text = self.slips, self.text
+        found = _SLIPPED.match(text, here)
+        if found is None:
+            at = here + len(text[here : here + 200]) - len(text[here : here + 200].lstrip())
+            slips.append(Slip(at, 1, f"wanted an attribute or the end of <{tag}>"))
+            return here
+        name, value = found[1], found[2]
+        if value is None:
+            slips.append(Slip(found.start(1), len(name), f'wanted {name}="...", got no value'))
+        elif value[:1] in ('"', "'"):
+            slips.append(
+                Slip(found.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
+            )
+        else:
+            slips.append(
+                Slip(found.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
+            )
+        return found.end()
+
+    def close(self, name: str, start: int, end: int) -> int:
+        elements = self.elements
+        if self.names.get(name):
+            if elements[self.open[-1]].name != name:
+                inner = elements[self.open[-1]]
+                words = f"wanted </{inner.name}>, got </{name}>"
+                self.slips.append(Slip(start, end - start, words, inner.offset))
+            while self.names.get(name):
+                last = elements[self.open.pop()].name
+                self.names[last] -= 1
+                if last == name:
+                    break
+        elif self.open:
+            inner = elements[self.open[-1]]
+            words = f"wanted </{inner.name}>, got </{name}>"
+            self.slips.append(Slip(start, end - start, words, inner.offset))
+        else:
+            self.slips.append(Slip(start, end - start, f"</{name}> closes nothing"))
+        return end
+
+    def entities(self, start: int, end: int) -> None:
+        for found in _BAD_ENTITY.finditer(self.text, start, end):
+            if found[0].endswith(";"):
+                words = f"no entity {found[0]} in XML, write the character itself"
+            else:
+                words = "wanted &amp; for the character &"
+            self.slips.append(Slip(found.start(), len(found[0]), words))

@@ -1,0 +1,116 @@
+"""The scheduler's words for what cannot hold in, a label for each line that has a part in it out.
+
+The words are those of realizer/scheduling/explain.py.
+"""
+
+from __future__ import annotations
+
+import re
+
+from bml_schema.scan import Element
+from bml_schema.source import Spot
+from realizer.cli.diagnostics import Label
+from realizer.cli.draft import Draft
+
+__all__ = ["explain_clash"]
+
+_CLAUSE = re.compile(
+    r"(\S+) (?:is )?(=|not before|not after) ([^,()]+?) \((?:(constraint)(?: ([^,)]+))?, )?line (\d+)\)"
+)
+_UNPLACED = re.compile(r"\S+ takes (?:at least|exactly) [\d.e+-]+ s from (?:its start|\S+) to [^\s,;]+")
+_CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
+_ASTRAY = re.compile(
+    r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
+)
+_REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
+_BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)$|(all of this is required)$")
+
+
+def explain_clash(draft: Draft, text: str) -> bool:
+    """Whether these are the scheduler's words; if so the draft has what they say."""
+    if _CLAUSE.search(text):
+        _clash(draft, text)
+        return True
+    if (astray := _ASTRAY.fullmatch(text)) is None:
+        return False
+    name, constraint, id, line, said = astray.groups()
+    _astray(draft, name, bool(constraint), id, int(line) if line else draft.line, said)
+    return True
+
+
+def _clash(draft: Draft, text: str) -> None:
+    """Every line that has a part in it, and what the behaviours themselves need."""
+    draft.path = draft.path or "/bml"
+    for found in _CLAUSE.finditer(text):
+        left, sign, right, constraint, id, line = found.groups()
+        spot = (
+            _in_constraint(draft, id, (right, left), int(line))
+            if constraint
+            else _in_behaviour(draft, left, int(line))
+        )
+        draft.labels.append(Label(spot, f"{left} {sign} {right}"))
+        if constraint and id == draft.id and (found_one := _constraint(draft, id, int(line))):
+            draft.path = draft.source.path(found_one)
+    draft.notes += [f"note: {found[0]}" for found in _UNPLACED.finditer(text)]
+    cannot = _CANNOT.match(text)
+    draft.head = cannot[0] if cannot else "these cannot all hold"
+    if why := _BECAUSE.search(text):
+        draft.notes.append(f"note: {next(filter(None, why.groups()))}")
+
+
+def _astray(
+    draft: Draft, name: str, is_constraint: bool, constraint: str | None, line: int | None, said: str
+) -> None:
+    """A reference that leads nowhere the scheduler knows."""
+    element = draft.element
+    if element is None and is_constraint:
+        element = _constraint(draft, constraint, line)
+    elif element is None:
+        element = draft.source.named(name, line=line, block=draft.block)
+    draft.path = draft.source.path(element) if element is not None else draft.path or "/bml"
+    draft.head = said
+    if element is None:
+        if line is not None:
+            draft.labels.append(Label(draft.source.whole_line(line), said))
+        return
+    found = _REFERENCE.match(said)
+    wanted = "".join(found[1].split()) if found else ""
+    for one in (element, *draft.source.below(element)):
+        for attribute in one.attributes:
+            if wanted and "".join(draft.source.value(one, attribute).split()) == wanted:
+                draft.labels.append(Label(draft.source.locate_in(one, attribute), said))
+                return
+    draft.labels.append(Label(draft.source.name_spot(element), said))
+
+
+def _in_behaviour(draft: Draft, point: str, line: int) -> Spot:
+    id, _, sync = point.partition(":")
+    element = draft.source.named(id, line=line, block=draft.block)
+    if element is None:
+        return draft.source.whole_line(line)
+    if draft.source.value_span(element, sync) is None:
+        for mark in draft.source.below(element):
+            if draft.source.id(mark) == sync:
+                return draft.source.locate_in(mark, "ref")
+    return draft.source.locate_in(element, sync)
+
+
+def _constraint(draft: Draft, id: str | None, line: int | None) -> Element | None:
+    """A constraint by its id, or the first one on a line."""
+    found = draft.source.named(id, line=line) if id else None
+    if found is None and line is not None:
+        on = (e for e in draft.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")
+        found = next(on, None)
+    return found
+
+
+def _in_constraint(draft: Draft, id: str | None, refs: tuple[str, ...], line: int) -> Spot:
+    source, found = draft.source, _constraint(draft, id, line)
+    if found is None:
+        return source.whole_line(line)
+    wanted = ["".join(str(ref).split()) for ref in refs]
+    for ref in wanted:
+        for element in source.below(found):
+            if "".join(source.value(element, "ref").split()) == ref:
+                return source.locate_in(element, "ref")
+    return source.name_spot(found)
