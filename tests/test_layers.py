@@ -105,7 +105,7 @@ DOORS = {
     "clarabel": ("realizer.scheduling",),
     "click": ("realizer.cli",),
     "espeakng_loader": ("realizer.speech.espeak_worker",),
-    "stomp": ("realizer.server.doors.stomp",),
+    "stomp": ("realizer.server.doors.broker",),
 }
 
 

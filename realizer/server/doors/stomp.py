@@ -5,15 +5,15 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import socket
-import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from realizer.errors import RealizerError
-from realizer.server.doors.dialects import DIALECTS, Dialect, Leave, Message, ToSession
+from realizer.server.doors.broker import Link, check_installed
+from realizer.server.doors.dialect import Dialect, Leave, Message, ToSession
+from realizer.server.doors.dialects import DIALECTS
 from realizer.server.hub import HubError
 from realizer.server.shell import Shell
 from realizer.settings import Settings
@@ -25,11 +25,8 @@ log = logging.getLogger(__name__)
 FIRST_RETRY = 0.2  # s
 LAST_RETRY = 10.0  # s
 ATTEMPT = 5.0  # s; to connect, and to part
-HEARTBEAT = 10_000  # ms, both ways: what else would tell that the broker's machine is gone
 # Messages that wait for the broker; of more the oldest go.
 KEPT = 4 * 2**20  # characters
-# Messages that have come in and are not handled: so a session keeps step, and the broker waits with more.
-AHEAD = 1
 
 
 class StompDoor:
@@ -48,7 +45,7 @@ class StompDoor:
         made = {name: make(settings) for name, make in DIALECTS.items()}
         self._seats = [_Seat(self, name, dialect) for name, dialect in made.items() if dialect is not None]
         self._thread = ThreadPoolExecutor(1, "stomp")
-        self._link: _Link | None = None
+        self._link: Link | None = None
         self._out: deque[Message] = deque()
         self._size = 0  # characters in _out
         self._news = asyncio.Event()
@@ -62,12 +59,7 @@ class StompDoor:
         return (f"stomp: {self._settings.stomp} reads {names}",)
 
     async def start(self) -> None:
-        try:
-            import stomp  # noqa: F401
-        except ImportError:
-            raise RealizerError("--stomp needs stomp.py: pip install 'bml-realizer[stomp]'") from None
-        # It tells of every lost connection, with a traceback; so do we, in a line.
-        logging.getLogger("stomp.py").setLevel(logging.CRITICAL)
+        check_installed()
         self._loop = asyncio.get_running_loop()
         self._keeper = asyncio.create_task(self._keep())
 
@@ -111,7 +103,7 @@ class StompDoor:
     def waiting(self) -> int:
         return self._size
 
-    def _take(self, link: _Link, seat: int, body: bytes) -> None:
+    def _take(self, link: Link, seat: int, body: bytes) -> None:
         """A message has come in; in the event loop."""
         link.handled()
         if link is not self._link or self._leaving is not None:
@@ -134,7 +126,7 @@ class StompDoor:
         pause = FIRST_RETRY
         told = False
         while True:
-            link = _Link(self._loop, self._take)
+            link = Link(self._loop, self._take, ATTEMPT)
             try:
                 await self._connect(link)
                 log.log(
@@ -155,7 +147,7 @@ class StompDoor:
             await asyncio.sleep(pause)
             pause = min(2 * pause, LAST_RETRY)
 
-    async def _connect(self, link: _Link) -> None:
+    async def _connect(self, link: Link) -> None:
         settings = self._settings
         async with asyncio.timeout(ATTEMPT):
             await self._call(
@@ -179,7 +171,7 @@ class StompDoor:
         self._news.set()
         self._up.set()
 
-    async def _talk(self, link: _Link) -> None:
+    async def _talk(self, link: Link) -> None:
         """Send what there is to send, until the connection is lost."""
         lost = asyncio.create_task(link.lost.wait())
         try:
@@ -200,7 +192,7 @@ class StompDoor:
         finally:
             lost.cancel()
 
-    async def _part(self, link: _Link) -> None:
+    async def _part(self, link: Link) -> None:
         with contextlib.suppress(OSError, RealizerError):
             async with asyncio.timeout(ATTEMPT):
                 if link.connected and not link.lost.is_set():
@@ -254,131 +246,3 @@ class _Seat:
         if self._number is not None:
             self._door._shell.leave(self._number)
             self._number = None
-
-
-class _Link:
-    """One connection to the broker, over stomp.py; told of by its listener thread.
-
-    Args:
-        loop: where `take(self, seat, body)` is called for each message, and the events are set.
-    """
-
-    def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[_Link, int, bytes], None]) -> None:
-        self.settled = asyncio.Event()  # connected, or not
-        self.reading = asyncio.Event()  # all topics are subscribed to; or lost
-        self.lost = asyncio.Event()
-        self.connected = False
-        self.fault = ""
-        self._loop = loop
-        self._take = take
-        self._ahead = threading.BoundedSemaphore(AHEAD)
-        self._stomp: Any = None
-        self._dropped = False
-
-    # in the door's thread
-
-    def connect(
-        self, address: tuple[str, int], host: str | None, login: str | None, password: str | None
-    ) -> None:
-        import stomp
-        from stomp.exception import StompException
-
-        self._stomp = stomp.Connection12(
-            [address],
-            try_loopback_connect=False,  # that address and no other
-            reconnect_attempts_max=1,
-            reconnect_sleep_initial=0,  # we wait ourselves
-            reconnect_sleep_max=0,
-            timeout=ATTEMPT,
-            heartbeats=(HEARTBEAT, HEARTBEAT),
-            heart_beat_receive_scale=2.5,
-            vhost=host,
-            auto_decode=False,
-            # With a length ActiveMQ makes messages of bytes, which Java clients that wait for text pass over.
-            auto_content_length=False,
-        )
-        self._stomp.set_listener("door", self)
-        try:
-            self._stomp.connect(login, password)
-        except StompException as error:
-            raise RealizerError(str(error) or "nobody answers") from None
-        # Otherwise each message waits until the one before is acknowledged: 50 ms a block instead of 7.
-        with contextlib.suppress(OSError, AttributeError):
-            self._stomp.transport.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if self._dropped:  # meanwhile; there was nothing to close yet
-            self.drop()
-
-    def subscribe(self, topics: Sequence[str]) -> None:
-        for number, topic in enumerate(topics):
-            # The broker takes one after the other: its word on the last one is enough.
-            receipt = {"receipt": "reading"} if number == len(topics) - 1 else {}
-            self._guarded(self._stomp.subscribe, topic, id=str(number), headers=receipt)
-
-    def send(self, message: Message) -> None:
-        self._guarded(self._stomp.send, message.topic, message.body, headers=dict(message.headers))
-
-    def disconnect(self) -> None:
-        self._guarded(self._stomp.disconnect)
-
-    @staticmethod
-    def _guarded(call: Callable[..., Any], *arguments: Any, **named: Any) -> None:
-        from stomp.exception import StompException
-
-        try:
-            call(*arguments, **named)
-        except (StompException, AttributeError) as error:  # it clears its socket under our hands
-            raise RealizerError(str(error) or "the connection is lost") from None
-
-    # in any thread
-
-    def drop(self) -> None:
-        """Close the socket, if it is still open or as soon as it is."""
-        self._dropped = True
-        if self._stomp is not None:
-            with contextlib.suppress(OSError, AttributeError):
-                self._stomp.transport.disconnect_socket()
-
-    # in stomp.py's thread
-
-    def on_connected(self, frame: Any) -> None:
-        self._in_loop(self._settle, True, "")
-
-    def on_receipt(self, frame: Any) -> None:
-        if frame.headers.get("receipt-id") == "reading":
-            self._in_loop(self.reading.set)
-
-    def on_error(self, frame: Any) -> None:
-        said = frame.headers.get("message", "")
-        why, *_ = bytes(frame.body or b"").decode("utf-8", "replace").strip().splitlines() or [""]
-        if said not in why:  # some brokers say it again at the head of a long trace
-            said = f"{said}: {why}".removesuffix(": ")
-        self._in_loop(self._settle, False, " ".join((said or why).split())[:200])
-
-    def on_disconnected(self) -> None:
-        self._in_loop(self._settle, False, "")
-        self._in_loop(self.lost.set)
-        self._in_loop(self.reading.set)
-
-    def on_heartbeat_timeout(self) -> None:
-        self._in_loop(self._settle, False, "it has fallen silent")
-        self.on_disconnected()
-
-    def on_message(self, frame: Any) -> None:
-        self._ahead.acquire()
-        body = frame.body.encode() if isinstance(frame.body, str) else bytes(frame.body or b"")
-        self._in_loop(self._take, self, int(frame.headers.get("subscription", 0)), body)
-
-    def _in_loop(self, function: Callable[..., object], *arguments: Any) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(function, *arguments)
-
-    # in the event loop
-
-    def handled(self) -> None:
-        """One message less that has come in and waits."""
-        self._ahead.release()
-
-    def _settle(self, connected: bool, fault: str) -> None:
-        self.connected |= connected
-        self.fault = self.fault or fault
-        self.settled.set()

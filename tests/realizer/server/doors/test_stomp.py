@@ -341,7 +341,7 @@ def test_a_broker_that_is_not_there_is_told_once_and_waited_for(own_broker, capl
 
 
 def test_a_broker_that_falls_silent_is_given_up_and_found_again(own_broker, monkeypatch, caplog) -> None:
-    monkeypatch.setattr("realizer.server.doors.stomp.HEARTBEAT", 200)
+    monkeypatch.setattr("realizer.server.doors.broker.HEARTBEAT", 200)
     monkeypatch.setattr("realizer.server.doors.stomp.ATTEMPT", 1)
 
     async def test(server: Server) -> None:
