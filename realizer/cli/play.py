@@ -12,6 +12,9 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from realizer.player import Player
     from realizer.scheduling.timing import Schedule
 
 __all__: list[str] = []
@@ -116,37 +119,79 @@ def dropped(planned: Schedule) -> bool:
 @click.command()
 @options.documents
 @click.option("--json", "as_json", is_flag=True, help="As JSON instead of a table.")
+@click.option("--bml", "as_bml", is_flag=True, help="As the documents themselves, with all times as numbers.")
+@click.option("-o", "--output", metavar="FILE", help="Where to, instead of here.")
 @options.playing
 def schedule(
     documents: tuple[str, ...],
     as_json: bool,
+    as_bml: bool,
+    output: str | None,
     voice: str | None,
     scene: str | None,
     media: Path | None,
     strict: bool,
 ) -> int:
-    """Print when every sync point falls, in seconds from block start."""
+    """Print when every sync point falls, in seconds from block start.
+
+    With --bml every document comes back with these times, what was dropped left out; scheduling it again
+    gives the same times.
+    """
     from realizer.pipeline import play
     from realizer.player import Player
 
+    if as_json and as_bml:
+        raise click.UsageError("--json, --bml: wanted one of them, got both")
     chosen = options.settings(voice=voice, scene=scene, media=media)
     player = Player(
         scene=options.read_scene(chosen.scene), idle=False, language=chosen.language, media=chosen.media
     )
-    schedules, refused = play(options.read_documents(documents), player, chosen.voice)
+    texts = options.read_documents(documents)
+    accepted, refused = play(texts, player, chosen.voice)
+    schedules = [_moved(player, planned) for planned in accepted]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
         options.tell_silence(chosen.voice)
     options.tell(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
         options.tell(planned.warnings)
-    if as_json:
+    if as_bml:
+        words = _as_documents(texts, schedules)
+    elif as_json:
         out: Any = [s.to_json() for s in schedules]
-        click.echo(json.dumps(out[0] if len(out) == 1 and len(documents) == 1 else out, indent=1))
+        words = json.dumps(out[0] if len(out) == 1 and len(documents) == 1 else out, indent=1) + "\n"
     else:
-        for planned in schedules:
-            click.echo(f"{planned.block}  {planned.start:.3f} .. {planned.end:.3f} s")
-            width = max((len(b) for b in planned.times), default=0)
-            for behaviour, times in planned.behaviours.items():
-                points = "  ".join(f"{name} {time:.3f}" for name, time in times.items())
-                click.echo(f"  {behaviour:<{width}}  {points}")
+        words = "".join(_table(planned) for planned in schedules)
+    if output in (None, "-"):
+        click.echo(words, nl=False)
+    elif output is not None:
+        try:
+            Path(output).write_text(words, "utf-8")
+        except OSError as error:
+            raise click.UsageError(f"{output}: {error.strerror or error}") from None
     return 1 if refused or (strict and any(map(dropped, schedules))) else 0
+
+
+def _moved(player: Player, planned: Schedule) -> Schedule:
+    """The schedule as later documents moved it; as it was planned where they ended it before its time."""
+    latest = player.latest(planned)
+    return latest if latest.times.keys() == planned.times.keys() else planned
+
+
+def _table(planned: Schedule) -> str:
+    """A line for the block, and one for each behaviour."""
+    lines = [f"{planned.block}  {planned.start:.3f} .. {planned.end:.3f} s"]
+    width = max((len(b) for b in planned.times), default=0)
+    for behaviour, times in planned.behaviours.items():
+        points = "  ".join(f"{name} {time:.3f}" for name, time in times.items())
+        lines.append(f"  {behaviour:<{width}}  {points}")
+    return "\n".join(lines) + "\n"
+
+
+def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule]) -> str:
+    """The documents of texts with the times of their schedules, one of each, in order."""
+    from bml_schema import Block, read, timed, write
+    from realizer.behaviours import VOCABULARY
+
+    blocks = [item for text in texts for item in read(text, VOCABULARY) if isinstance(item, Block)]
+    pairs = zip(blocks, schedules, strict=True)
+    return "".join(write(timed(block, planned.behaviours)) for block, planned in pairs if not planned.failed)

@@ -1,0 +1,103 @@
+"""`realizer schedule`: a table, JSON, or the documents themselves with absolute times."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from bml_schema import Block, SyncRef, parse, read
+from realizer.behaviours import VOCABULARY
+from realizer.cli import cli
+
+CORPUS = Path(__file__).parents[2] / "corpus"
+TALK = """<bml id="b">
+  <speech id="s"><text>Hello <sync id="t"/> there</text></speech>
+  <head id="n" lexeme="NOD" repetition="2" stroke="s:t"/>
+  <faceLexeme id="f" lexeme="NOPE"/>
+  <wait id="w" start="f:end" duration="1"/>
+  <constraint><after ref="n:end"><sync ref="w:start"/></after></constraint>
+</bml>"""
+
+
+def schedule(*args: str, text: str = "") -> Result:
+    arguments = ["-q", "schedule", *args, "--voice", "silent"]
+    return CliRunner().invoke(cli, arguments, input=text, standalone_mode=False, catch_exceptions=False)
+
+
+def times(text: str) -> list[dict[str, object]]:
+    out = json.loads(schedule("-", "--json", text=text).stdout)
+    return out if isinstance(out, list) else [out]
+
+
+def test_the_document_comes_back_with_every_time_as_a_number() -> None:
+    done = schedule("-", "--bml", text=TALK)
+    assert done.return_value == 0
+    assert "b:f: CANNOT_CREATE_BEHAVIOR" in done.stderr
+    block = parse(done.stdout)
+    assert [node.id for node in block.behaviours] == ["s", "n", "w"]
+    for node in block.behaviours:
+        assert set(node.syncs) == set(node.sync_points)
+        assert all(ref == SyncRef(offset=ref.offset) for ref in node.syncs.values())
+    assert times(done.stdout)[0]["behaviours"] == times(TALK)[0]["behaviours"]
+
+
+DOCUMENTS = [
+    path
+    for path in sorted(CORPUS.rglob("*.xml"))
+    if [type(item) for item in read(path.read_bytes(), VOCABULARY)] == [Block]
+]
+
+
+@pytest.mark.parametrize(
+    "path", DOCUMENTS, ids=[str(p.relative_to(CORPUS).with_suffix("")) for p in DOCUMENTS]
+)
+def test_what_was_written_back_gives_the_same_times(path: Path) -> None:
+    first = schedule(str(path), "--json")
+    written = schedule(str(path), "--bml")
+    assert written.return_value == first.return_value
+    wanted = json.loads(first.stdout)
+    if not written.stdout:
+        assert first.return_value == 1
+        return
+    (again,) = times(written.stdout)
+    assert again["block"] == wanted["block"]
+    assert again["behaviours"].keys() == wanted["behaviours"].keys()
+    for behaviour, points in wanted["behaviours"].items():
+        assert again["behaviours"][behaviour] == pytest.approx(points, abs=1e-6)
+
+
+def test_several_documents_come_back_in_one_text(tmp_path: Path) -> None:
+    out = tmp_path / "timed.bml"
+    two = TALK + '<bml id="c" composition="APPEND"><head id="h" lexeme="NOD" start="b:n:end + 1"/></bml>'
+    done = schedule("-", "--bml", "-o", str(out), text=two)
+    assert done.stdout == ""
+    blocks = list(read(out.read_bytes()))
+    assert [block.id for block in blocks if isinstance(block, Block)] == ["b", "c"]
+    assert times(out.read_text("utf-8"))[1]["behaviours"]["h"] == pytest.approx(
+        times(two)[1]["behaviours"]["h"], abs=1e-6
+    )
+
+
+def test_a_block_that_is_refused_is_left_out_and_said() -> None:
+    done = schedule("-", "--bml", text=TALK + '<bml id="c"><required><head id="h"/></required></bml>')
+    assert done.return_value == 1
+    assert [item.id for item in read(done.stdout) if isinstance(item, Block)] == ["b"]
+    assert "c" in done.stderr
+
+
+def test_a_block_that_a_later_one_replaces_keeps_the_times_it_was_planned_with() -> None:
+    text = TALK + '<bml id="c" composition="REPLACE"><wait id="w" duration="1"/></bml>'
+    first, second = times(text)
+    assert first["behaviours"] == times(TALK)[0]["behaviours"]
+    assert second["behaviours"] == {"w": {"start": 0.0, "end": 1.0}}
+
+
+def test_json_and_bml_at_once_are_wrong_usage(tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["schedule", "-", "--bml", "--json"], input=TALK)
+    assert done.exit_code == 2
+    done = CliRunner().invoke(cli, ["schedule", "-", "-o", str(tmp_path / "no" / "x")], input=TALK)
+    assert done.exit_code == 2
+    assert "No such file" in done.stderr
