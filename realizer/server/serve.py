@@ -121,9 +121,11 @@ class Server:
         """End every connection and every engine."""
         if self._closed.is_set():
             return
-        await asyncio.gather(*(door.close() for door in self.doors))
-        await self._shell.close()
-        self._closed.set()
+        try:
+            await asyncio.gather(*(door.close() for door in self.doors))
+        finally:
+            await self._shell.close()
+            self._closed.set()
 
     async def wait_closed(self) -> None:
         """Wait until somebody calls `close`."""

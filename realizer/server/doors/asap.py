@@ -76,36 +76,42 @@ class AsapDoor:
         self.shut()
         for writer in self._clients.values():
             writer.transport.abort()
-        await asyncio.gather(*self._clients)
+        await asyncio.gather(*self._clients, return_exceptions=True)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One BML connection, from its opening to its end."""
         task = asyncio.current_task()
         assert task is not None
         self._clients[task] = writer
-        # Nobody says good-bye, least of all a machine that loses its power.
-        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        host = writer.get_extra_info("peername")[0]
+        peer = writer.get_extra_info("peername")
+        try:
+            if peer is not None:  # otherwise it has gone again
+                # Nobody says good-bye, least of all a machine that loses its power.
+                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+                await self._talk(peer[0].removeprefix("::ffff:"), reader, writer)
+        except OSError:
+            pass  # it is gone
+        except Exception:
+            log.exception("asap: %s is let go of: its connection failed", peer[0])
+        finally:
+            writer.transport.abort()
+            del self._clients[task]
+
+    async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         link = CallBack(host, self._feedback_port, writer.transport.abort)
         try:
             number = self._shell.join(link, "asap-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host)[:59])
         except HubError as error:
             log.warning("asap: %s is not let in: %s", host, error)
-            writer.transport.abort()
-            del self._clients[task]
             return
         calling = asyncio.create_task(link.keep())
         try:
             await self._read(reader, number, link)
-        except OSError:
-            pass  # the client is gone
         finally:
             self._shell.leave(number)
             calling.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await calling
-            writer.transport.abort()
-            del self._clients[task]
 
     async def _read(self, reader: asyncio.StreamReader, number: int, link: CallBack) -> None:
         assembler = Assembler(self._limit)
@@ -162,10 +168,15 @@ class CallBack(asyncio.Protocol):
         """Connect, and again whenever the connection is lost, until cancelled."""
         loop = asyncio.get_running_loop()
         try:
+            pause = FIRST_RETRY
             while True:
                 await self._connect(loop)
+                since = loop.time()
                 await self._lost.wait()
-                await asyncio.sleep(FIRST_RETRY)
+                # Who hangs up at once may be somebody else's service.
+                lasted = loop.time() - since > LAST_RETRY
+                pause = FIRST_RETRY if lasted else min(2 * pause, LAST_RETRY)
+                await asyncio.sleep(pause)
         finally:
             if self._transport is not None:
                 self._transport.close()

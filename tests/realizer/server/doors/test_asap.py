@@ -405,6 +405,21 @@ def test_hundreds_of_documents_at_once_all_play() -> None:
     serving(test)
 
 
+def test_a_client_that_finds_the_service_full_is_let_go_of() -> None:
+    async def test(server: Server, bml: int, port: int) -> None:
+        async with connect(server.url):
+            client = Client(bml, port)
+            await client.connect()
+            with contextlib.suppress(ConnectionResetError):
+                assert await client.reader.read() == b""
+            client.leave()
+        async with Client(bml, port) as client:
+            client.send(WAIT.format("b", 0))
+            await client.until("b:end")
+
+    serving(test, max_sessions=1)
+
+
 def test_the_door_says_where_it_is_and_a_port_in_use_is_an_os_error() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         (door,) = [d for d in server.doors if isinstance(d, AsapDoor)]
