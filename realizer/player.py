@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bml_schema import Block, Feedback, WarningFeedback
+from bml_schema import Block, Feedback
 from realizer.animation.blend import blend
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle import idle_channels
@@ -102,9 +102,7 @@ class Player:
 
     def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
         """Report a document, block or behaviour that cannot be played."""
-        self._blocks.tell(
-            WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character)
-        )
+        self._blocks.reports.warn(warning, character)
 
     def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
         """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
@@ -124,11 +122,19 @@ class Player:
     @property
     def alive(self) -> int:
         """How many blocks play or wait for their start."""
-        return len(self._blocks.alive())
+        return len(self._blocks.cast.alive())
 
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
         """Declare where targets are; documents planned from now on look there."""
         self.world = replace(self.world, scene=scene)
+
+    def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
+        """Expect the points `anticipators:id:sync` at these times; what is tied to them follows.
+
+        Args:
+            syncs: sync -> seconds on the session clock. A point that has passed stays where it was.
+        """
+        self._blocks.anticipate(id, syncs, now)
 
     def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
         """Hold AUs (0..1) and FAPs (FAPU) by name until told otherwise; None lets go of one.
@@ -176,7 +182,7 @@ class Player:
         if not len(times):
             return blend((), times)
         first, last = float(times[0]), float(times[-1])
-        channels = [c for p in self._blocks.of(character) for c in p.moving()]
+        channels = [c for p in self._blocks.cast.of(character) for c in p.moving()]
         channels += self._characters[character].channels()
         channels = [c for c in channels if c.span[0] <= last and c.span[1] >= first]
         if self.idle:
@@ -186,17 +192,17 @@ class Player:
     @property
     def end(self) -> float:
         """When the last block has ended, and relaxed where it was cut off; 0 where there was none."""
-        return max((p.gone for p in self._blocks.all() if p.end < float("inf")), default=0.0)
+        return max((p.gone for p in self._blocks.cast.all() if p.end < float("inf")), default=0.0)
 
     def speech(self) -> tuple[Speaking, ...]:
         """What sounds or will sound, in order of its start."""
         return tuple(
-            sorted((s for p in self._blocks.all() for s in p.speech.values()), key=lambda s: s.start)
+            sorted((s for p in self._blocks.cast.all() for s in p.speech.values()), key=lambda s: s.start)
         )
 
     def latest(self, schedule: Schedule) -> Schedule:
         """What became of a schedule that `submit` gave, where other blocks moved or interrupted its block."""
-        return self._blocks.latest(schedule)
+        return self._blocks.cast.latest(schedule)
 
     def state(self, now: float) -> dict[str, Any]:
         """What is playing and which AUs are up, as plain data."""
@@ -211,7 +217,7 @@ class Player:
                 }
             )
         blocks: list[dict[str, Any]] = []
-        for p in self._blocks.alive():
+        for p in self._blocks.cast.alive():
             if p.end <= now:
                 continue
             status = State.IN_EXEC if p.state is State.LURKING and p.start <= now else p.state

@@ -39,9 +39,9 @@ def perform(blocks: Ensemble, playing: Playing, behaviour: str, act: Act, now: f
 
 
 def _interrupt(blocks: Ensemble, act: Interrupt, now: float) -> None:
-    target = blocks.find(act.block)
+    target = blocks.cast.find(act.block)
     if target is None:
-        if not blocks.revoke(act.block, now) and not blocks.known(act.block):
+        if not blocks.revoke(act.block, now) and not blocks.knew(act.block):
             raise ActFault(f"target: wanted a block, got {act.block!r}, of which nothing was heard")
         return
     named = set(target.schedule.times)
@@ -56,7 +56,7 @@ def _interrupt(blocks: Ensemble, act: Interrupt, now: float) -> None:
 
 
 def _change(blocks: Ensemble, act: Change, now: float, until: float) -> None:
-    target = blocks.find(act.block)
+    target = blocks.cast.find(act.block)
     if target is None or act.behaviour not in target.unfinished(now) or not target.begun:
         raise ActFault(f"target: wanted a behaviour that plays, got {act.block}:{act.behaviour}")
     node = target.block[act.behaviour]

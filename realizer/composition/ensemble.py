@@ -6,11 +6,12 @@ from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from bml_schema import Block, Feedback, WarningFeedback
+from bml_schema import Block, Feedback
 from realizer.behaviours.kind import Act, Kind, World
 from realizer.composition import relations
 from realizer.composition.acts import ActFault, perform
 from realizer.composition.calendar import Calendar
+from realizer.composition.cast import Cast
 from realizer.composition.character import Character
 from realizer.composition.expected import Expected
 from realizer.composition.playing import Playing, Wait
@@ -18,21 +19,20 @@ from realizer.composition.references import references
 from realizer.composition.reporting import (
     Event,
     Phase,
+    Reports,
     State,
     acknowledgement,
     prediction,
     progress,
     sync_progress,
 )
-from realizer.composition.retiming import member, touched
+from realizer.composition.retiming import anticipated, lead, member, touched
 from realizer.planning import Plan, plan
-from realizer.scheduling import Member, schedule_together
+from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule, Warning
 
 __all__ = ["Ensemble"]
 
-# Schedules of blocks that have ended, kept for references to their sync points.
-PAST = 100
 FOREVER = float("inf")
 
 
@@ -45,31 +45,19 @@ class Ensemble:
 
     Attributes:
         revision: rises whenever what is shown changes.
+        cast: the blocks.
+        reports: the feedback that is owed.
     """
 
     def __init__(self, kinds: Mapping[str, Kind], characters: Sequence[Character]) -> None:
         self.kinds = kinds
         self.characters = characters
         self.revision = 0
-        self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
-        self._alive: dict[str, Playing] = {}  # by id; those that are not done
-        self._past: dict[str, Schedule] = {}
+        self.cast = Cast()
+        self.reports = Reports()
         self._expected = Expected()
-        self._outbox: list[Feedback] = []
         self._calendar = Calendar()
-        self._number = 0
         self._order = 0
-
-    def all(self) -> list[Playing]:
-        """Every block that can still be seen or heard, in order of acceptance."""
-        return list(self._playing.values())
-
-    def of(self, character: int) -> list[Playing]:
-        return [p for p in self._playing.values() if p.character == character]
-
-    def alive(self) -> list[Playing]:
-        """The blocks that play or wait, in order of acceptance."""
-        return list(self._alive.values())
 
     # blocks in ----------------------------------------------------------------------------------
 
@@ -79,12 +67,12 @@ class Ensemble:
             return
         self._expected.add(block)
         start = max([now, *(w.until for w in self._waits(block, character))])
-        self.tell(acknowledgement(block, now if start == FOREVER else start))
+        self.reports.tell(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Give up a block that was announced."""
         if not self._expected.arrive(block).revoked:
-            self.tell(progress(block, "end", now, State.REVOKED))
+            self.reports.tell(progress(block, "end", now, State.REVOKED))
 
     def submit(self, block: Block, character: int, world: World, now: float) -> Schedule:
         """Plan a block and take it in, or refuse it."""
@@ -101,22 +89,19 @@ class Ensemble:
         fate = self._expected.arrive(block)
         if fate.revoked:
             return Schedule(block.id, {}, {}, start=now, failed=True)
-        ended = relations.ended(block, character, self.alive())
-        # While it is not known when it starts, it is planned as if that were now.
-        start = max([now, *(w.until for w in waits if w.until < FOREVER)])
-        others = touched([block], [p for p in self.alive() if p not in ended], now)
-        planned = self._plan(block, character, world, start, ended, [member(p, start, now) for p in others])
+        ended = relations.ended(block, character, self.cast.alive())
+        state = State.PENDING if block.preplan and not fate.activated else State.LURKING
+        start = FOREVER if state is State.PENDING else max([now, *(w.until for w in waits)])
+        planned, others = self._plan(block, character, world, start, now, ended)
         if planned.schedule.failed:
             return self._refuse(block, planned.schedule.warnings[0], now)
         for earlier in ended:
             self.stop(earlier, now)
         for name in block.interrupt:
             self.revoke(name, now)
-        state = State.PENDING if block.preplan and not fate.activated else State.LURKING
-        playing = Playing(planned, self.kinds, world, character, self._number, now, waits, state)
+        playing = Playing(planned, self.kinds, world, character, self.cast.next_number, now, waits, state)
         playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
-        self._playing[self._number] = self._alive[block.id] = playing
-        self._number += 1
+        self.cast.add(playing)
         self._set_out(playing)
         for follower, subsiding in behind:
             follower.await_too(Wait(playing, subsiding))
@@ -126,43 +111,30 @@ class Ensemble:
                 coming.waits.append(Wait(playing, subsiding))
         self._predict(playing, now)
         for warning in planned.schedule.warnings:
-            self._warn(block, warning)
+            self.reports.warn(warning, block.character_id)
         self._retime(others, planned.moved, now)
         self._moved(playing, now)
         return planned.schedule
-
-    def latest(self, schedule: Schedule) -> Schedule:
-        """What has become of a schedule that `submit` gave."""
-        playing = next((p for p in self._playing.values() if p.first is schedule), None)
-        if playing is None or playing.start == FOREVER:
-            return schedule
-        more = tuple(w for w in playing.schedule.warnings if w not in schedule.warnings)
-        return replace(playing.schedule, warnings=schedule.warnings + more)
 
     # time ---------------------------------------------------------------------------------------
 
     def advance(self, now: float) -> None:
         """Let everything happen that is due, in order, each thing at its own time."""
         for event in self._calendar.due(now):
-            self._happens(event, self._playing[event.block])
+            self._happens(event, self.cast[event.block])
 
     def due(self, now: float) -> list[Feedback]:
         self.advance(now)
-        out, self._outbox = self._outbox, []
-        return out
+        return self.reports.take()
 
     def next_deadline(self) -> float | None:
-        return float("-inf") if self._outbox else self._calendar.next
+        return float("-inf") if self.reports else self._calendar.next
 
     def forget(self, before: float) -> bool:
-        """Drop blocks that ended before a time; True where there were some."""
-        gone = [p for p in self._playing.values() if p.done and p.gone < before]
+        """Drop blocks of which nothing is to be seen after a time; True where there were some."""
+        gone = self.cast.forget(before)
         for playing in gone:
-            self._past[playing.block.id] = playing.schedule
-            del self._playing[playing.number]
             self._calendar.forget(playing)
-        while len(self._past) > PAST:
-            del self._past[next(iter(self._past))]
         return bool(gone)
 
     def _happens(self, event: Event, playing: Playing) -> None:
@@ -171,25 +143,25 @@ class Ensemble:
             case Phase.START:
                 playing.state = State.IN_EXEC
                 playing.waits.clear()
-                self.tell(progress(block, "start", time, playing.state))
-                self.tell(prediction(block, playing.schedule, playing.state))
+                self.reports.tell(progress(block, "start", time, playing.state))
+                self.reports.tell(prediction(block, playing.schedule, playing.state))
                 for id in block.on_start:
                     if not self.activate(id, time):
                         text = f"onStart: wanted a block that was preplanned and waits, got {id!r}"
-                        self._warn(block, Warning(block.id, "EXECUTION_FAILURE", text))
+                        self.reports.warn(Warning(block.id, "EXECUTION_FAILURE", text), block.character_id)
             case Phase.SYNC:
-                self.tell(sync_progress(block, event.name, event.sync, time, playing.start))
+                self.reports.tell(sync_progress(block, event.name, event.sync, time, playing.start))
                 if event.point == 0:
                     node = block[event.name]
                     if (act := self.kinds[node.tag].act) is not None:
                         self._act(playing, event.name, act(node), time)
             case Phase.SUBSIDES:
                 playing.state = State.SUBSIDING
-                self.tell(prediction(block, playing.schedule, playing.state))
+                self.reports.tell(prediction(block, playing.schedule, playing.state))
             case Phase.END:
                 playing.state = State.DONE
-                del self._alive[block.id]
-                self.tell(progress(block, "end", time, playing.state))
+                self.cast.end(playing)
+                self.reports.tell(progress(block, "end", time, playing.state))
 
     def _act(self, playing: Playing, behaviour: str, act: Act, now: float) -> None:
         try:
@@ -200,20 +172,15 @@ class Ensemble:
             text = f"{behaviour}, which is required: {fault}" if required else str(fault)
             place = playing.block.places.get(behaviour)
             text = text if place is None else f"line {place.line}, {place.path}: {text}"
-            self._warn(playing.block, Warning(name, "EXECUTION_FAILURE", text))
+            self.reports.warn(Warning(name, "EXECUTION_FAILURE", text), playing.block.character_id)
             if required and not playing.done:
                 self.stop(playing, now)
 
     # what is done to blocks ---------------------------------------------------------------------
 
-    def find(self, id: str) -> Playing | None:
-        """The block of this id that plays or waits."""
-        return self._alive.get(id)
-
-    def known(self, id: str) -> bool:
-        """Whether there is or was such a block."""
-        past = any(p.block.id == id for p in self._playing.values())
-        return past or id in self._past or id in self._expected
+    def knew(self, id: str) -> bool:
+        """Whether there is or was such a block, or will be."""
+        return id in self._expected or self.cast.knew(id)
 
     def revoke(self, id: str, now: float) -> bool:
         """End a block that was announced and is not here yet; False where there is none."""
@@ -221,13 +188,13 @@ class Ensemble:
         if fate is None or fate.revoked:
             return False
         fate.revoked = True
-        self.tell(progress(fate.block, "end", now, State.REVOKED))
+        self.reports.tell(progress(fate.block, "end", now, State.REVOKED))
         return True
 
     def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
         """Stop these blocks, or all; returns the ids of those that played or waited."""
         self.advance(now)
-        stopped = [p for p in self.alive() if ids is None or p.block.id in ids]
+        stopped = [p for p in self.cast.alive() if ids is None or p.block.id in ids]
         for playing in stopped:
             if not playing.done:
                 self.stop(playing, now)
@@ -240,8 +207,8 @@ class Ensemble:
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         playing.cut(list(playing.schedule.times), now, ends=True)
         playing.stopped, playing.state = now, state
-        del self._alive[playing.block.id]
-        self.tell(progress(playing.block, "end", now, state))
+        self.cast.end(playing)
+        self.reports.tell(progress(playing.block, "end", now, state))
         self.changed()
         self._moved(playing, now)
 
@@ -254,12 +221,13 @@ class Ensemble:
         self._calendar.put(playing, pending)
         self.changed()
         self._predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
-        self._follow(playing, now)
+        if others := self._tied(playing, now):
+            self._solve_again([*others], playing.start, now)
         self._moved(playing, now)
 
     def activate(self, id: str, now: float) -> bool:
         """Let a preplanned block start, when what it waits for is over; False where it is none."""
-        playing = self.find(id)
+        playing = self.cast.find(id)
         if playing is None:
             fate = self._expected.fate(id)
             if fate is None or not fate.block.preplan:
@@ -273,6 +241,20 @@ class Ensemble:
             self._moved(playing, now)
         return True
 
+    def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
+        """Points in time are expected at other times than before: what is tied to them follows.
+
+        Args:
+            id: of an anticipator; its points are `anticipators:id:sync` in references.
+            syncs: sync -> seconds on the session clock; as soon as can be, where that is too soon.
+        """
+        self.advance(now)
+        tied = [p for p in self.cast.alive() if p.start < FOREVER and id in anticipated(p.block)]
+        soonest = {sync: max([now, *(lead(p, id, sync, now) for p in tied)]) for sync in syncs}
+        self.cast.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
+        for playing in tied:
+            self._solve_again([playing, *self._tied(playing, now)], playing.start, now)
+
     # starts -------------------------------------------------------------------------------------
 
     def _links(self, block: Block, character: int) -> tuple[list[Wait], list[tuple[Playing, bool]]]:
@@ -284,7 +266,7 @@ class Ensemble:
         waits = self._waits(block, character)
         behind: list[tuple[Playing, bool]] = []
         for name, subsiding in relations.followers(block):
-            playing = self.find(name)
+            playing = self.cast.find(name)
             if playing is not None and playing.waiting:
                 behind.append((playing, subsiding))
             elif playing is not None or name not in self._expected:
@@ -298,7 +280,7 @@ class Ensemble:
     def _waits(self, block: Block, character: int) -> list[Wait]:
         fate = self._expected.fate(block.id)
         ahead = [w for w in fate.waits if not w.block.done] if fate is not None else []
-        return relations.awaited(block, character, self.alive()) + ahead
+        return relations.awaited(block, character, self.cast.alive()) + ahead
 
     def _moved(self, playing: Playing, now: float) -> None:
         """A block's times have changed: those that wait for it, and for them, may start at another time."""
@@ -328,21 +310,26 @@ class Ensemble:
         self._calendar.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         planned = playing.plan
+        others: list[Playing] = []
         refers = any(ref.block is not None for ref in references(playing.block))
         if start < FOREVER and (playing.start == FOREVER or refers):
             # Its claims were never compared, or its references have other times from the new start.
-            planned = self._plan(playing.block, playing.character, playing.world, start, [playing])
+            planned, others = self._plan(
+                playing.block, playing.character, playing.world, start, now, [playing]
+            )
             if planned.schedule.failed:
-                self._warn(playing.block, planned.schedule.warnings[0])
+                self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
                 self.stop(playing, now)
                 return False
             told = {w.id for w in playing.schedule.warnings}
             for warning in planned.schedule.warnings:
                 if warning.id not in told:
-                    self._warn(playing.block, warning)
+                    self.reports.warn(warning, playing.block.character_id)
         playing.lay(planned, start)
         self._set_out(playing)
         self._predict(playing, now)
+        if others:
+            self._retime(others, planned.moved, now)
         return True
 
     def _plan(
@@ -351,19 +338,27 @@ class Ensemble:
         character: int,
         world: World,
         start: float,
+        now: float,
         without: Collection[Playing],
-        others: Sequence[Member] = (),
-    ) -> Plan:
-        """The plan of a block beside those that are alive, `without` some of them, solved with `others`."""
-        return plan(
+    ) -> tuple[Plan, list[Playing]]:
+        """The plan of a block beside those that are alive, `without` some, and whom it is solved with.
+
+        While it is not known when it starts, it is planned as if that were now, and moves nobody.
+        """
+        known = start < FOREVER
+        origin = start if known else now
+        alive = [p for p in self.cast.alive() if p not in without]
+        others = touched([block], alive, now) if known else []
+        planned = plan(
             block,
             self.kinds,
             world,
-            start=start,
-            outside=relations.instants(self._schedule_of, start),
-            held=relations.held(character, self.alive(), without),
-            others=others,
+            start=origin,
+            outside=relations.instants(self.cast.schedule_of, origin),
+            held=relations.held(character, alive),
+            others=[member(p, origin, now) for p in others],
         )
+        return planned, others
 
     def _retime(self, blocks: Sequence[Playing], schedules: Sequence[Schedule], now: float) -> None:
         """Give blocks other times, each from its own start; what follows them follows."""
@@ -382,31 +377,24 @@ class Ensemble:
             self._predict(playing, now, changed)
             self._moved(playing, now)
 
-    def _follow(self, playing: Playing, now: float) -> None:
-        """A block has other times than it had: solve those again that are tied to it."""
-        others = [p for p in touched([playing.block], self.alive(), now) if p is not playing]
-        if not others:
-            return
-        origin = playing.start
-        members = [member(p, origin, now) for p in (playing, *others)]
-        instants = relations.instants(self._schedule_of, origin)
-        found = schedule_together(members, outside=instants)
-        if found[0].failed:
-            for other in others:
-                text = f"stays as it was planned: {found[0].warnings[0].text}"
-                self._warn(other.block, Warning(other.block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
-            return
-        self._retime(others, found[1:], now)
+    def _tied(self, playing: Playing, now: float) -> list[Playing]:
+        """The other blocks that are solved together with one."""
+        return [p for p in touched([playing.block], self.cast.alive(), now) if p is not playing]
 
-    def _schedule_of(self, id: str) -> Schedule | None:
-        """Of the newest block of an id."""
-        newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
-        return self._past.get(id) if newest is None else newest.schedule
+    def _solve_again(self, blocks: Sequence[Playing], origin: float, now: float) -> None:
+        """Give blocks that play the times that now fit best."""
+        members = [member(p, origin, now) for p in blocks]
+        instants = relations.instants(self.cast.schedule_of, origin)
+        found = schedule_together(members, outside=instants)
+        if not found[0].failed:
+            self._retime(blocks, found, now)
+            return
+        why = found[0].warnings[0].text
+        for playing in blocks:
+            told = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
+            self.reports.warn(told, playing.block.character_id)
 
     # events and feedback ------------------------------------------------------------------------
-
-    def tell(self, feedback: Feedback) -> None:
-        self._outbox.append(feedback)
 
     def changed(self) -> None:
         """What is or will be shown is not what it was."""
@@ -431,21 +419,14 @@ class Ensemble:
             schedule = replace(schedule, start=now)  # as if it were activated now
         syncs = schedule.behaviours
         told = syncs if behaviours is None else {b: syncs[b] for b in behaviours}
-        self.tell(prediction(playing.block, schedule, playing.state, told))
+        self.reports.tell(prediction(playing.block, schedule, playing.state, told))
 
     def _in_use(self, block: Block) -> bool:
         """Its id belongs to a block that plays or waits, and it is not there to replace that."""
-        return block.composition != "REPLACE" and self.find(block.id) is not None
-
-    def _warn(self, block: Block, warning: Warning) -> None:
-        self.tell(
-            WarningFeedback(
-                id=warning.id, type=warning.type, text=warning.text, character_id=block.character_id
-            )
-        )
+        return block.composition != "REPLACE" and self.cast.find(block.id) is not None
 
     def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
-        self._warn(block, warning)
+        self.reports.warn(warning, block.character_id)
         return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
 
 

@@ -10,13 +10,15 @@ from bml_schema import (
     Block,
     BlockPrediction,
     BlockProgress,
+    Feedback,
     PredictionFeedback,
     SyncPointProgress,
+    WarningFeedback,
     predicted,
 )
-from realizer.scheduling.timing import Schedule
+from realizer.scheduling.timing import Schedule, Warning
 
-__all__ = ["Event", "Phase", "State", "acknowledgement", "prediction", "progress", "sync_progress"]
+__all__ = ["Event", "Phase", "Reports", "State"]
 
 
 class State(StrEnum):
@@ -116,3 +118,27 @@ def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Ev
             zip(schedule.points[node.id], schedule.times[node.id], strict=True)
         )
     ]
+
+
+class Reports:
+    """The feedback a session owes, in the order of report; each is handed out once."""
+
+    def __init__(self) -> None:
+        self._owed: list[Feedback] = []
+
+    def __len__(self) -> int:
+        return len(self._owed)
+
+    def tell(self, feedback: Feedback) -> None:
+        """One more."""
+        self._owed.append(feedback)
+
+    def warn(self, warning: Warning, character: str | None) -> None:
+        """A BML warning."""
+        told = WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character)
+        self._owed.append(told)
+
+    def take(self) -> list[Feedback]:
+        """What is owed."""
+        owed, self._owed = self._owed, []
+        return owed

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
+import numpy as np
+
 from bml_schema import Block, SyncRef
+from realizer.composition.cast import ANTICIPATORS
 from realizer.composition.playing import Playing
 from realizer.composition.references import references
 from realizer.scheduling import Member
 
-__all__ = ["member", "touched"]
+__all__ = ["anticipated", "lead", "member", "touched"]
 
 FOREVER = float("inf")
 
@@ -81,3 +84,29 @@ def member(playing: Playing, origin: float, now: float) -> Member:
         passed=passed,
         firm=True,
     )
+
+
+def anticipated(block: Block) -> set[str]:
+    """The anticipators that a block is tied to."""
+    return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
+
+
+def lead(playing: Playing, id: str, sync: str, now: float) -> float:
+    """The soonest that an anticipated point can be: what leads up to it in a behaviour takes its least time.
+
+    Returns:
+        Seconds on the session clock; `now` where nothing of the block is tied to the point, or it has passed.
+    """
+    soonest = now
+    for node in playing.block.behaviours:
+        timing = playing.plan.timings.get(node.id)
+        for point, ref in node.syncs.items():
+            if timing is None or (ref.block, ref.behaviour, ref.sync) != (ANTICIPATORS, id, sync):
+                continue
+            times = playing.start + playing.schedule.times[node.id]
+            gaps = timing.preferred if timing.rigid else timing.least
+            last = timing.points.index(point)
+            if times[last] > now:
+                first = int(np.searchsorted(times, now, side="right"))  # the first point that has not passed
+                soonest = max(soonest, now + float(gaps[first:last].sum()) - ref.offset)
+    return soonest

@@ -16,6 +16,7 @@ from realizer.server.connection import (
 from realizer.server.messages import (
     PROTOCOL,
     STREAMS,
+    Anticipate,
     CharacterMessage,
     Control,
     ErrorMessage,
@@ -68,6 +69,8 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
                 _character(session, message)
             case SetMessage():
                 _set(session, message, t)
+            case Anticipate():
+                session.player.anticipate(message.id, message.syncs, t)
             case Stop():
                 wanted = None if message.blocks is None else set(message.blocks)
                 waiting = session.preparation.waiting

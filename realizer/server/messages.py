@@ -10,6 +10,7 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field, TypeAdapter, Va
 __all__ = [
     "STREAMS",
     "SUPPORTED",
+    "Anticipate",
     "CharacterMessage",
     "Control",
     "ErrorMessage",
@@ -146,6 +147,22 @@ class SetMessage(Message):
     character: str | None = Field(None, max_length=256)
 
 
+SyncName = Annotated[str, Field(pattern=r"^[^\s:]{1,256}$")]
+
+
+class Anticipate(Message):
+    """Says when points in time are expected that behaviours are tied to, as `anticipators:id:sync`.
+
+    It may be sent again and again while the estimate moves; what has not passed follows.
+    """
+
+    type: Literal["anticipate"]
+    id: str = Field(min_length=1, max_length=256, pattern=r"^[^\s:]+$")
+    syncs: dict[SyncName, Annotated[float, Field(ge=0, le=1e9)]] = Field(
+        max_length=1000, description="name -> seconds on the session clock"
+    )
+
+
 class Stop(Message):
     """Ends blocks gracefully: those named, or all."""
 
@@ -167,7 +184,16 @@ class Ping(Message):
 
 
 Control = (
-    Hello | Subscribe | Unsubscribe | SceneMessage | CharacterMessage | SetMessage | Stop | StateQuery | Ping
+    Hello
+    | Subscribe
+    | Unsubscribe
+    | SceneMessage
+    | CharacterMessage
+    | SetMessage
+    | Anticipate
+    | Stop
+    | StateQuery
+    | Ping
 )
 SUPPORTED: tuple[str, ...] = (
     "hello",
@@ -176,6 +202,7 @@ SUPPORTED: tuple[str, ...] = (
     "scene",
     "character",
     "set",
+    "anticipate",
     "stop",
     "state",
     "ping",

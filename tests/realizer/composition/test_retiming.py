@@ -135,7 +135,53 @@ def test_blocks_are_touched_by_any_chain_of_points_to_come() -> None:
     stage.send("b", '<head id="n" lexeme="NOD" start="a:f:end"/>')
     stage.send("c", FACE.format(""))
     new = stage.block("x", '<wait id="w" start="b:n:end"/>')
-    alive = stage.player._blocks.alive()
+    alive = stage.player._blocks.cast.alive()
     assert [p.block.id for p in touched([new], alive, 0.0)] == ["a", "b"]
     assert touched([new], alive, 60.0) == []
     assert touched([stage.block("y", FACE.format(""))], alive, 0.0) == []
+
+
+BEAT = '<head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/>'
+
+
+def test_a_behaviour_follows_a_point_that_is_anticipated(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
+    stage.send("a", BEAT)
+    stage.until(1.0)
+    stage.player.anticipate("clock", {"beat": 2.5}, 1.0)
+    stage.player.anticipate("clock", {"beat": 4.0}, 2.2)
+    times = stage.times()
+    assert times["a:n:stroke"] == pytest.approx(4.0)
+    assert times["a:n:start"] < 2.2, "it had begun by then"
+
+
+def test_what_has_passed_does_not_follow_an_estimate_that_comes_late(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 1.0}, 0.0)
+    stage.send("a", BEAT)
+    stage.until(1.2)
+    stage.player.anticipate("clock", {"beat": 2.0}, 1.2)
+    assert stage.times()["a:n:stroke"] == pytest.approx(1.0)
+
+
+def test_a_point_that_should_have_been_already_is_to_be_at_once(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 9.0}, 0.0)
+    stage.send("a", BEAT)
+    stage.until(3.0)
+    stage.player.anticipate("clock", {"beat": 2.0}, 3.0)
+    times = stage.times()
+    assert times["a:n:start"] == pytest.approx(3.0)
+    assert 3.0 < times["a:n:stroke"] < 3.1, "its preparation takes its least time"
+
+
+def test_a_point_nobody_anticipates_costs_the_behaviour(stage: Stage) -> None:
+    schedule = stage.send("a", BEAT)
+    assert not schedule.times
+    assert [w.id for w in schedule.warnings] == ["a:n"]
+
+
+def test_a_preplanned_block_moves_nobody_before_it_is_activated(stage: Stage) -> None:
+    first = stage.send("a", FACE.format(""))
+    stage.send("p", '<wait id="w" duration="9" start="0" end="a:f:end"/>', said='bmla:preplan="true"')
+    assert stage.player.latest(first).end == first.end
+    stage.send("x", '<bmla:activate id="x" target="p"/>', at=0.3)
+    assert stage.player.latest(first).end > first.end

@@ -25,6 +25,7 @@ def test_every_supported_type_is_understood() -> None:
         "unsubscribe": ',"stream":"fap"',
         "scene": ',"objects":{"cup":{"x":0.2,"y":0,"z":1}}',
         "character": ',"id":"Ada"',
+        "anticipate": ',"id":"clock","syncs":{"beat":2.5}',
     }
     for kind in SUPPORTED:
         message = parse_control(f'{{"type":"{kind}"{extra.get(kind, "")}}}')
@@ -41,7 +42,9 @@ def test_every_supported_type_is_understood() -> None:
         ("{}", "unsupported", "type", "hello, subscribe"),
         ('{"type":"dance"}', "unsupported", "type", '"dance"'),
         ('{"type":["hello"]}', "unsupported", "type", "hello"),
-        ('{"type":"anticipate"}', "unsupported", "type", "hello"),
+        ('{"type":"speech"}', "unsupported", "type", "hello"),
+        ('{"type":"anticipate"}', "invalid", "anticipate.id", "required"),
+        ('{"type":"anticipate","id":"a:b","syncs":{}}', "invalid", "anticipate.id", "pattern"),
         ('{"type":"subscribe","stream":"arkit"}', "unsupported", "subscribe.stream", "fap, au"),
         ('{"type":"subscribe","stream":[]}', "unsupported", "subscribe.stream", "fap, au"),
         ('{"type":"subscribe","stream":"fap","fps":-1}', "invalid", "subscribe.fps", "greater than 0"),

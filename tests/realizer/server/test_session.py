@@ -680,3 +680,17 @@ def test_a_block_in_preparation_can_be_interrupted() -> None:
     driver.say(driver.spoken[0].id, spoken(2.0))
     told = [f for f in driver.run(9).feedback if isinstance(f, BlockProgress) and f.id.startswith("a:")]
     assert [(f.id, f.status) for f in told] == [("a:end", "REVOKED")]
+
+
+def test_an_anticipated_point_moves_what_is_tied_to_it(driver) -> None:
+    driver.send({"type": "anticipate", "id": "clock", "syncs": {"beat": 3.0}})
+    driver.send('<bml id="b"><head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/></bml>')
+    driver.run(1)
+    driver.send({"type": "anticipate", "id": "clock", "syncs": {"beat": 2.0}})
+    driver.run(9)
+    strokes = [f for f in driver.clients[1].feedback if getattr(f, "id", "") == "b:n:stroke"]
+    assert [f.global_time for f in strokes] == [pytest.approx(2.0)]
+    predicted = [
+        b.syncs["stroke"].offset for f in driver.clients[1].feedback for b in getattr(f, "behaviours", ())
+    ]
+    assert predicted == [pytest.approx(3.0), pytest.approx(2.0)]

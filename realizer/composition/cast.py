@@ -1,0 +1,98 @@
+"""The blocks of a session: who plays or waits, who is still to be seen, and when their points are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from realizer.composition.playing import Playing
+from realizer.scheduling.timing import Schedule
+
+__all__ = ["ANTICIPATORS", "Cast"]
+
+# Schedules of blocks that have ended, kept for references to their sync points.
+PAST = 100
+FOREVER = float("inf")
+# BMLA's name for what is no block: points in time that a client announces.
+ANTICIPATORS = "anticipators"
+
+
+class Cast:
+    """Blocks from their acceptance until nothing of them is to be seen, and what is known of them later.
+
+    Attributes:
+        next_number: of the next block that is added.
+    """
+
+    def __init__(self) -> None:
+        self.next_number = 0
+        self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
+        self._alive: dict[str, Playing] = {}  # by id; those that are not done
+        self._past: dict[str, Schedule] = {}
+        self._anticipated = Schedule(ANTICIPATORS, {}, {})
+
+    def add(self, playing: Playing) -> None:
+        """Take in an accepted block."""
+        self._playing[playing.number] = self._alive[playing.block.id] = playing
+        self.next_number += 1
+
+    def end(self, playing: Playing) -> None:
+        """A block has ended: its id is free."""
+        del self._alive[playing.block.id]
+
+    def forget(self, before: float) -> list[Playing]:
+        """Drop the blocks of which nothing is to be seen from a time on; returns them."""
+        gone = [p for p in self._playing.values() if p.done and p.gone < before]
+        for playing in gone:
+            self._past[playing.block.id] = playing.schedule
+            del self._playing[playing.number]
+        while len(self._past) > PAST:
+            del self._past[next(iter(self._past))]
+        return gone
+
+    def __getitem__(self, number: int) -> Playing:
+        return self._playing[number]
+
+    def all(self) -> list[Playing]:
+        """Every block that can still be seen or heard, in order of acceptance."""
+        return list(self._playing.values())
+
+    def of(self, character: int) -> list[Playing]:
+        """Those of one character."""
+        return [p for p in self._playing.values() if p.character == character]
+
+    def alive(self) -> list[Playing]:
+        """The blocks that play or wait, in order of acceptance."""
+        return list(self._alive.values())
+
+    def find(self, id: str) -> Playing | None:
+        """The block of this id that plays or waits."""
+        return self._alive.get(id)
+
+    def knew(self, id: str) -> bool:
+        """Whether there is or was such a block."""
+        return self.schedule_of(id) is not None
+
+    def schedule_of(self, id: str) -> Schedule | None:
+        """Of the newest block of an id, on the session clock; of what is anticipated too."""
+        if id == ANTICIPATORS:
+            return self._anticipated
+        newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
+        return self._past.get(id) if newest is None else newest.schedule
+
+    def anticipate(self, id: str, syncs: Mapping[str, float]) -> None:
+        """Points in time that a client expects, seconds on the session clock."""
+        known = {**self._anticipated.behaviours.get(id, {}), **syncs}
+        points = {**self._anticipated.points, id: tuple(known)}
+        times = {**self._anticipated.times, id: np.array(list(known.values()))}
+        self._anticipated = replace(self._anticipated, points=points, times=times)
+
+    def latest(self, schedule: Schedule) -> Schedule:
+        """What has become of a schedule as a block had it when it was accepted."""
+        playing = next((p for p in self._playing.values() if p.first is schedule), None)
+        if playing is None or playing.start == FOREVER:
+            return schedule
+        more = tuple(w for w in playing.schedule.warnings if w not in schedule.warnings)
+        return replace(playing.schedule, warnings=schedule.warnings + more)
