@@ -181,7 +181,7 @@ class Wait(Behaviour):
     """Do nothing for some seconds, or as long as its start and end say."""
 
     tag = core("wait")
-    duration: float = attribute(number(0, 86400, wanted="seconds, 0..86400"), default=0.0)
+    duration: float = attribute(number(0, 86400, wanted="seconds, 0..86400"), default=0.0, old="max-wait")
 
 
 @node

@@ -109,6 +109,8 @@ class Elements:
         points = shape.points if timed else ()
         for name, text in attributes(element):
             spec = known.get(name)
+            if spec is None and name in shape.old and shape.old[name].name not in element.attrib:
+                spec = shape.old[name]
             try:
                 if spec is None:
                     if name in points:

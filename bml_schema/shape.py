@@ -34,7 +34,8 @@ sync_ref = Value("a sync reference", lambda text: text, str, "syncReference")
 class Attribute:
     """One XML attribute: field it goes to, its name in XML, what it may hold.
 
-    `read` is that of its value, None for a sync reference, which cannot be read alone.
+    `read` is that of its value, None for a sync reference, which cannot be read alone. `old` is the name that
+    drafts of the standard gave it, or "".
     """
 
     field: str
@@ -43,6 +44,7 @@ class Attribute:
     required: bool
     default: Any = None
     read: Callable[[str], Any] | None = None
+    old: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +62,7 @@ class Shape:
     """All an element may hold, as the parser and the writer need it.
 
     Attributes:
-        attributes: XML name -> Attribute.
+        attributes: XML name -> Attribute; `old`: the same by the names that drafts gave them.
         children: in order of declaration.
         by_tag: Clark tag -> (Child, class); `by_local`: the same by local name, for documents that leave an
             extension's own children in another namespace.
@@ -75,6 +77,7 @@ class Shape:
     """
 
     attributes: Mapping[str, Attribute]
+    old: Mapping[str, Attribute]
     required: tuple[Attribute, ...]
     children: tuple[Child, ...]
     by_tag: Mapping[str, tuple[Child, type[Any]]]
@@ -96,11 +99,14 @@ class Shape:
         return ", ".join(tags[:-1]) + f" or {tags[-1]}" if len(tags) > 1 else tags[0]
 
 
-def attribute(value: Value, *, default: Any = MISSING, default_factory: Any = MISSING, name: str = "") -> Any:
-    """An XML attribute, required without a default; `name` if it is not the field's name in camelCase."""
-    return field(
-        default=default, default_factory=default_factory, metadata={_KEY: ("attribute", value, name)}
-    )
+def attribute(value: Value, *, default: Any = MISSING, name: str = "", old: str = "") -> Any:
+    """An XML attribute, required without a default.
+
+    Args:
+        name: in XML, if it is not the field's name in camelCase.
+        old: what drafts called it; it is read where the attribute itself is not given, and not written.
+    """
+    return field(default=default, metadata={_KEY: ("attribute", value, (name, old))})
 
 
 def child(cls: type[Any], *, default: Any = MISSING) -> Any:
@@ -201,11 +207,12 @@ def _shape(cls: type[Any]) -> Shape:
             continue
         kind, what, more = f.metadata[_KEY]
         if kind == "attribute":
-            optional = f.default is not MISSING or f.default_factory is not MISSING
-            default = f.default if f.default is not MISSING else None
-            xml = more or camel(f.name)
+            required = f.default is MISSING
+            name, old = more
+            xml = name or camel(f.name)
             read = None if what is sync_ref else what.read
-            attributes[xml] = Attribute(f.name, xml, what, not optional, default, read)
+            default = None if required else f.default
+            attributes[xml] = Attribute(f.name, xml, what, required, default, read, old)
             continue
         if kind in content:
             content[kind] = f.name
@@ -214,17 +221,18 @@ def _shape(cls: type[Any]) -> Shape:
     by_tag = {c.tag: (k, c) for k in kinds for c in k.classes}
     timed = hasattr(cls, "sync_points")
     points = frozenset(cls.sync_points) if timed else frozenset()
-    required = tuple(a for a in attributes.values() if a.required)
+    needed = tuple(a for a in attributes.values() if a.required)
     return Shape(
         attributes=attributes,
-        required=required,
+        old={a.old: a for a in attributes.values() if a.old},
+        required=needed,
         children=tuple(kinds),
         by_tag=by_tag,
         by_local={local(tag): found for tag, found in by_tag.items()},
         mixed=content["mixed"],
         text=content["text"],
         names=frozenset(f.name for f in fields(cls)),
-        needed=frozenset(a.field for a in required),
+        needed=frozenset(a.field for a in needed),
         name=local(getattr(cls, "tag", "")),
         timed=timed,
         points=points,

@@ -72,18 +72,12 @@ def test_every_time_of_every_behaviour_is_said_to_the_last_bit(given_: tuple[Blo
     back = parse(write(result))
     assert not back.problems
     assert back == result
+    assert timed(back, times) == back, "what says its times already stays as it is"
     assert [b.id for b in result.behaviours] == [b.id for b in block.behaviours if b.id in times]
     for id, at in times.items():
         assert {p: t for p, t in told(back)[id].items() if p in at and ":" not in p} == {
             p: t for p, t in at.items() if ":" not in p
         }
-
-
-@given(scheduled())
-def test_a_block_that_says_its_times_stays_as_it_is(given_: tuple[Block, Times]) -> None:
-    block, times = given_
-    once = timed(block, times)
-    assert timed(once, times) == once
 
 
 def test_a_block_with_its_times_reads_as_people_would_write_it() -> None:

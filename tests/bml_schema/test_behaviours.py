@@ -18,6 +18,7 @@ from bml_schema import (
     Speech,
     SpeechText,
     Sync,
+    Wait,
     parse,
     write,
 )
@@ -193,3 +194,16 @@ def test_a_posture_has_one_stance_and_any_poses() -> None:
         "wanted one <stance>"
         in only("<posture id='p'><stance type='LYING'/><stance type='LYING'/></posture>").problems[0].text
     )
+
+
+def test_the_duration_of_a_wait_may_have_the_name_of_the_drafts() -> None:
+    assert only("<wait id='w' max-wait='2'/>").children == (Wait(id="w", duration=2.0),)
+    both = only("<wait id='w' max-wait='2' duration='1'/>").children
+    assert both == (Wait(id="w", duration=1.0, foreign={"max-wait": "2"}),)
+    assert only("<wait id='w' max-wait='x'/>").problems[0].text.startswith("max-wait: wanted seconds")
+
+
+def test_a_speech_without_text_says_nothing() -> None:
+    block = only("<speech id='s'/>")
+    assert block.children == (Speech(id="s"),)
+    assert not block.problems

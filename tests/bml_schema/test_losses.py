@@ -140,8 +140,4 @@ def test_what_is_left_names_nothing_that_went_and_is_a_sound_document(
     back = parse(write(left))
     assert not back.problems
     assert back == left
-
-
-@given(blocks())
-def test_without_nobody_a_block_is_itself(block: Block) -> None:
     assert without(block, ()) == (block, {}, frozenset())

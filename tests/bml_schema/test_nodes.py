@@ -31,13 +31,9 @@ def test_nodes_can_be_keys_of_a_dict() -> None:
 
 
 @given(blocks())
-def test_a_block_survives_a_process_border(block: Block) -> None:
+def test_a_block_survives_a_process_border_and_is_hashable(block: Block) -> None:
     back = pickle.loads(pickle.dumps(block))
     assert back == block
+    assert hash(back) == hash(block)
     assert back.behaviours == block.behaviours
-
-
-@given(blocks())
-def test_a_block_is_hashable(block: Block) -> None:
-    assert isinstance(hash(block), int)
-    assert all(isinstance(b, Behaviour) for b in block.behaviours)
+    assert all(isinstance(b, Behaviour) and back[b.id] == b for b in block.behaviours)
