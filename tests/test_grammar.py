@@ -19,6 +19,7 @@ from bml_schema import (
     SyncPointProgress,
     WarningFeedback,
     read,
+    timed,
     write,
 )
 from realizer.animation.fap import to_fap
@@ -92,13 +93,29 @@ def plays(text: str) -> None:
         schedules.append(player.submit(item, now, speak(player.wants(item), SilentVoice())))
         now += APART
     assert blocks
+    if not schedules[0].failed:
+        stays(blocks[0], schedules[0])
     faces(player)
     told += run(player, LATEST)
     calm = not any(map(ends_or_withholds, blocks))
     for block, schedule in zip(blocks, schedules, strict=True):
         well_told(block, schedule, told, calm)
+        if calm:
+            well_predicted(block, told)
+    well_composed(blocks, told)
     progress = [f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)]
     assert progress == sorted(progress)
+
+
+def stays(block: Block, schedule: Schedule) -> None:
+    """A block that is written back with its times is scheduled to the same times."""
+    (again,) = read(write(timed(block, schedule.behaviours)), VOCABULARY)
+    assert isinstance(again, Block)
+    player = Player(idle=False)
+    second = player.submit(again, 0.0, speak(player.wants(again), SilentVoice()))
+    assert second.times.keys() == schedule.times.keys()
+    for behaviour, times in schedule.times.items():
+        assert np.abs(second.times[behaviour] - times).max() < 1e-6
 
 
 def ends_or_withholds(block: Block) -> bool:
@@ -182,6 +199,48 @@ def well_told(block: Block, schedule: Schedule, told: list[Feedback], calm: bool
         assert per.keys() == schedule.times.keys()
     last = ends[0] if ends else len(own)
     assert all(n < last for n, f in enumerate(own) if isinstance(f, WarningFeedback))
+
+
+def well_predicted(block: Block, told: list[Feedback]) -> None:
+    """What was last predicted of a block that was played is what happened."""
+    start: float | None = None
+    times: dict[str, float] = {}
+    happened: dict[str, float] = {}
+    for f in told:
+        if isinstance(f, PredictionFeedback):
+            start = next((b.global_start for b in f.blocks if b.id == block.id), start)
+            for node in f.behaviours:
+                if node.id.startswith(f"{block.id}:"):
+                    times |= {f"{node.id}:{p}": ref.offset for p, ref in node.syncs.items()}
+        elif isinstance(f, BlockProgress) and f.id == f"{block.id}:start":
+            assert start == pytest.approx(f.global_time, abs=1e-6)
+        elif isinstance(f, SyncPointProgress) and f.id.startswith(f"{block.id}:"):
+            happened[f.id] = f.time
+    for point in times.keys() & happened.keys():
+        assert times[point] == pytest.approx(happened[point], abs=1e-5), point
+
+
+def well_composed(blocks: list[Block], told: list[Feedback]) -> None:
+    """What APPEND waits for has ended; what REPLACE replaces has ended."""
+    starts = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if started(f)}
+    ends = {f.id.rpartition(":")[0]: (n, f) for n, f in enumerate(told) if ended(f)}
+    first = next((b.character_id for b in blocks if b.character_id), None)
+    for n, block in enumerate(blocks):
+        if block.composition == "MERGE" or block.id not in starts:
+            continue
+        for earlier in blocks[:n]:
+            if (earlier.character_id or first) == (block.character_id or first) and earlier.id in starts:
+                assert ends[earlier.id][0] < starts[block.id][0], (
+                    f"{earlier.id} ends before {block.id} starts"
+                )
+
+
+def started(f: Feedback) -> bool:
+    return isinstance(f, BlockProgress) and f.id.endswith(":start")
+
+
+def ended(f: Feedback) -> bool:
+    return isinstance(f, BlockProgress) and f.id.endswith(":end")
 
 
 def ids(feedback: Feedback) -> set[str]:
