@@ -7,6 +7,7 @@ Keys of a .toml; all but `says` and `proves` are optional:
     proves     the rules (tests/corpus/rules.toml) that it shows to hold
 
     sent       when each document of the .xml is sent, seconds; 0 for those beyond the list
+    ready      when each is ready to be planned (its voice has spoken), seconds; else when it is sent
     [scene]    target = [x, y, z], declared before the first document
     idle       true: with idle motion
     within     tolerance of times, seconds

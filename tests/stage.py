@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from bml_schema import Block, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
+from bml_schema import Block, BMLError, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
 from realizer.animation.fap import to_fap
 from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import VOCABULARY
@@ -26,6 +27,14 @@ __all__ = ["Played", "play"]
 MEDIA = CORPUS / "media"  # the files that documents name
 EPOCH = 1_700_000_000.0  # some day on which a session opened
 MOST_STEPS = 10_000  # deadlines of one case
+
+
+class Step(Enum):
+    """What is done at a time."""
+
+    SEND = auto()
+    PLAN = auto()
+    LOOK = auto()
 
 
 @dataclass
@@ -113,19 +122,26 @@ def play(
     items = list(read(case.document if document is None else document, VOCABULARY))
     sent = [float(time) for time in wanted.get("sent", ())]
     sent += [max([0.0, *sent])] * (len(items) - len(sent))
-    script: list[tuple[float, int, Any]] = [(t, 0, item) for t, item in zip(sent, items, strict=True)]
-    script += [(instant.time, 1, instant) for instant in looks]
+    ready = [float(time) for time in wanted.get("ready", ())]
+    ready += sent[len(ready) :]
+    script: list[tuple[float, Step, Any]] = []
+    for here, there, item in zip(sent, ready, items, strict=True):
+        script += [(here, Step.SEND, item), (there, Step.PLAN, item)]
+    script += [(instant.time, Step.LOOK, instant) for instant in looks]
     played, voice, now = Played(), SilentVoice(), 0.0
-    for time, _, item in sorted(script, key=lambda entry: entry[:2]):
+    for time, step, item in sorted(script, key=lambda entry: entry[0]):
         hear(player, played, now, time, punctual)
         now = time
-        if isinstance(item, Instant):
-            played.faces |= shown(player, [item])
-        elif isinstance(item, Block):
-            played.blocks.append(item)
-            played.schedules[item.id] = player.submit(item, time, speak(player.wants(item), voice))
-        else:
-            player.refuse(warning_of(item), time)
+        match step, item:
+            case Step.LOOK, Instant():
+                played.faces |= shown(player, [item])
+            case Step.SEND, Block():
+                player.announce(item, time)
+            case Step.PLAN, Block():
+                played.blocks.append(item)
+                played.schedules[item.id] = player.submit(item, time, speak(player.wants(item), voice))
+            case Step.SEND, BMLError():
+                player.refuse(warning_of(item), time)
     hear(player, played, now, math.inf, punctual)
     for id, schedule in played.schedules.items():
         played.schedules[id] = player.latest(schedule)
