@@ -13,12 +13,13 @@ __all__ = ["Clash", "Gap", "Link", "Web"]
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A behaviour's least length between two of its points."""
+    """A behaviour's least length between two of its points; its greatest if `most`."""
 
     part: Part
     begin: str
     end: str
     seconds: float
+    most: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Clash:
 
     Attributes:
         relations: the equalities and orders, in the order in which they chain.
-        gaps: least lengths, one for each stretch of a behaviour.
+        gaps: least and greatest lengths, one for each stretch of a behaviour.
         earliest: what starts too soon and the bound, seconds; None where no bound takes part.
         named: the behaviours whose points occur, whether or not they state or hinder anything themselves.
     """
@@ -116,17 +117,27 @@ def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link
             continue
         b = problem.owner[link.u]
         part, names, first = problem.behaviours[b], problem.timings[b].points, problem.first[b]
-        begin, end = names[link.u - first], names[link.v - first]
-        if gaps and gaps[-1].part is part and gaps[-1].end == begin:
-            gaps[-1] = Gap(part, gaps[-1].begin, end, gaps[-1].seconds + link.seconds)
-        else:
-            gaps.append(Gap(part, begin, end, link.seconds))
-    if len(gaps) > 1 and gaps[0].part is gaps[-1].part and gaps[-1].end == gaps[0].begin:
-        head, tail = gaps[0], gaps.pop()
-        gaps[0] = Gap(head.part, tail.begin, head.end, tail.seconds + head.seconds)
+        most = link.u > link.v  # a greatest length leads backwards
+        begin, end = sorted((link.u - first, link.v - first))
+        gap = Gap(part, names[begin], names[end], abs(link.seconds), most)
+        gaps[-1:] = _joined(gaps[-1], gap) if gaps else [gap]
+    if len(gaps) > 1 and len(ring := _joined(gaps[-1], gaps[0])) == 1:
+        gaps[0] = ring[0]
+        gaps.pop()
     owners = [problem.behaviours[problem.owner[p]] for p in sorted(points) if p != ORIGIN]
     unique = {id(r): r for r in relations}
     return Clash(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
+
+
+def _joined(one: Gap, after: Gap) -> list[Gap]:
+    """Two lengths that follow each other in a cycle as one, where they are of one kind and meet."""
+    if one.part is after.part and one.most is after.most:
+        seconds = one.seconds + after.seconds
+        if one.most and one.begin == after.end:
+            return [Gap(one.part, after.begin, one.end, seconds, True)]
+        if not one.most and one.end == after.begin:
+            return [Gap(one.part, one.begin, after.end, seconds)]
+    return [one, after]
 
 
 def _once(parts: Iterable[Part]) -> list[Part]:

@@ -88,6 +88,8 @@ def _where(part: Part) -> str:
 
 def _gap(gap: Gap) -> str:
     name = gap.part.name
+    if gap.most:
+        return f"{name} takes at most {_seconds(gap.seconds)} from {gap.begin} to {gap.end}"
     if gap.seconds > 0:
         return f"{name} takes at least {_seconds(gap.seconds)} from {gap.begin} to {gap.end}"
     return f"{name}:{gap.end} is not before {name}:{gap.begin}"

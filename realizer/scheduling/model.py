@@ -35,7 +35,7 @@ class Model:
         chain: (n,) seconds after the behaviour's first point when every gap has its preferred length.
         slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens what lies between.
         gap: (g,) the point where each gap starts; it ends at the next point.
-        wanted, least, stiffness: (g,) of each gap.
+        wanted, least, most, stiffness: (g,) of each gap; most is inf where there is no upper bound.
         earliest: (B,) no first point is sooner.
     """
 
@@ -51,6 +51,7 @@ class Model:
     gap: Index
     wanted: Float64
     least: Float64
+    most: Float64
     stiffness: Float64
     earliest: Float64
 
@@ -92,6 +93,10 @@ def model_of(problem: Problem) -> Model | list[Clash]:
         np.concatenate([getattr(t, name) for t in timings]) if timings else np.zeros(0)
         for name in ("preferred", "stiffness", "least")
     )
+    most = np.full(len(every), np.inf)
+    if any(t.most is not None for t in timings):
+        bounds = [np.full(t.preferred.shape, np.inf) if t.most is None else t.most for t in timings]
+        most = np.concatenate(bounds)
     rigid = np.array([t.rigid for t in timings], np.bool_)
     if rigid.any():
         free = ~rigid[owner[every]]
@@ -111,6 +116,7 @@ def model_of(problem: Problem) -> Model | list[Clash]:
         every[free],
         wanted[free],
         least[free],
+        most[free],
         stiffness[free],
         np.array(problem.earliest),
     )

@@ -57,9 +57,10 @@ def solve(problem: Problem) -> Solution | list[Clash]:
 def _keep_inequalities(model: Model, shapes: Shapes) -> list[Clash]:
     """Squeeze, in place, the groups of shapes that break a gap or an order which sliding cannot mend."""
     at, label = shapes.at, shapes.label
-    short = at[model.gap + 1] - at[model.gap] < model.least - TIGHT
+    length = at[model.gap + 1] - at[model.gap]
+    misfit = (length < model.least - TIGHT) | (length > model.most + TIGHT)
     soon = shapes.held[label[:-1]] & (at[model.first] < model.earliest - TIGHT)
-    bad = {*label[model.owner[model.gap[short]]].tolist(), *label[:-1][soon].tolist()}
+    bad = {*label[model.owner[model.gap[misfit]]].tolist(), *label[:-1][soon].tolist()}
     groups = groups_of(model, shapes)
     alone = bad.difference(*(group.shapes for group in groups))
     begin = _earliest(model, shapes)

@@ -24,13 +24,15 @@ class _Squeeze:
 
     Attributes:
         points: whose times are sought. number: (n,) the node of each point's class.
-        gaps, orders, starts: what the inequalities are, in this order; starts are first points of behaviours.
+        gaps, bounded, orders, starts: what the inequalities are, in this order: the least lengths of gaps,
+            the greatest of those that have one, orders, and first points of behaviours, not too soon.
     """
 
     quadratic: Quadratic
     points: Index
     number: Index
     gaps: Index
+    bounded: Index
     orders: list[Relation]
     starts: Index
 
@@ -47,6 +49,10 @@ class _Squeeze:
             p = int(model.gap[self.gaps[k]])
             return Link(p, p + 1, float(model.least[self.gaps[k]]))
         k -= len(self.gaps)
+        if k < len(self.bounded):
+            p = int(model.gap[self.bounded[k]])
+            return Link(p + 1, p, -float(model.most[self.bounded[k]]))
+        k -= len(self.bounded)
         if k < len(self.orders):
             order = self.orders[k]
             return Link(order.u, order.v, order.seconds, order)
@@ -92,11 +98,11 @@ def _impossible(model: Model, shapes: Shapes, group: Group) -> list[Link] | None
 
 def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
     owner, root, shift = model.owner, model.root, model.shift
-    chosen, bounded = np.zeros(len(shapes.label), np.bool_), np.zeros(len(shapes.label), np.bool_)
+    chosen, held = np.zeros(len(shapes.label), np.bool_), np.zeros(len(shapes.label), np.bool_)
     for group in groups:
         chosen[group.shapes] = True
-        bounded[group.shapes] = group.held
-    chosen, bounded = chosen[shapes.label], bounded[shapes.label]
+        held[group.shapes] = group.held
+    chosen, held = chosen[shapes.label], held[shapes.label]
     points = model.points_of(chosen)
     at_start = [ORIGIN, *(_anchor(model, group) for group in groups if not group.held)]
     nodes = np.setdiff1d(root[points], at_start)
@@ -105,11 +111,15 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
 
     gaps = np.flatnonzero(chosen[owner[model.gap]])
     orders = [order for group in groups for order in group.orders]
-    starts = model.first[bounded[:-1]]
+    starts = model.first[held[:-1]]
     begin, g = model.gap[gaps], len(gaps)
-    tail = np.concatenate([begin, [r.u for r in orders], np.zeros(len(starts))]).astype(np.intp)
-    head = np.concatenate([begin + 1, [r.v for r in orders], starts]).astype(np.intp)
-    seconds = np.concatenate([model.least[gaps], [r.seconds for r in orders], model.earliest[owner[starts]]])
+    ends = gaps[model.most[gaps] < np.inf]
+    end = model.gap[ends] + 1
+    tail = np.concatenate([begin, end, [r.u for r in orders], np.zeros(len(starts))]).astype(np.intp)
+    head = np.concatenate([begin + 1, end - 1, [r.v for r in orders], starts]).astype(np.intp)
+    seconds = np.concatenate(
+        [model.least[gaps], -model.most[ends], [r.seconds for r in orders], model.earliest[owner[starts]]]
+    )
     u, v, between = number[root[tail]], number[root[head]], shift[tail] - shift[head]
     quadratic = Quadratic(
         len(nodes) + 1,
@@ -121,7 +131,7 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
         v,
         seconds + between,
     )
-    return _Squeeze(quadratic, points, number, gaps, orders, starts)
+    return _Squeeze(quadratic, points, number, gaps, ends, orders, starts)
 
 
 def _anchor(model: Model, group: Group) -> int:
@@ -130,11 +140,15 @@ def _anchor(model: Model, group: Group) -> int:
 
 
 def _yield_to_stated(model: Model, gaps: Index) -> bool:
-    """Where the document itself states how long a stretch is, that length wins over the least gaps in it."""
+    """Where the document itself states how long a stretch is, that length wins over the least gaps in it,
+    but for behaviours that are bounded.
+    """
     changed = False
     owners, firsts = np.unique(model.owner[model.gap[gaps]], return_index=True)
     for b, k in zip(owners.tolist(), gaps[firsts].tolist(), strict=True):
         first = int(model.first[b])
+        if model.problem.timings[b].most is not None:
+            continue
         seen: dict[int, int] = {}
         for p in range(first, int(model.last[b]) + 1):
             begin = seen.get(int(model.root[p]))

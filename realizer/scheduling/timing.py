@@ -22,7 +22,10 @@ class Timing:
         preferred: (k-1,) float64 seconds, the length each gap would like.
         least: (k-1,) float64 seconds, the length each gap must have.
         stiffness: (k-1,) float64 > 0, the a of a (t[i+1] - t[i] - preferred[i])^2 (Paul 2010, 3.3.3).
-        rigid: every gap is exactly its preferred length (speech); stiffness and least do not count then.
+        rigid: every gap is exactly its preferred length; stiffness, least and most do not count then.
+        most: (k-1,) float64 seconds >= least, the length each gap may have at most, inf where there is none;
+            None: nowhere. A behaviour that has any is bounded: least and most hold against every time that
+            the document states, where otherwise a stated length wins over the least gaps in it.
     """
 
     points: tuple[str, ...]
@@ -30,16 +33,22 @@ class Timing:
     least: Float64
     stiffness: Float64
     rigid: bool = False
+    most: Float64 | None = None
 
     def __post_init__(self) -> None:
         gaps = (len(self.points) - 1,)
-        for name in ("preferred", "least", "stiffness"):
-            value = np.asarray(getattr(self, name), np.float64)
+        for name in ("preferred", "least", "stiffness", "most"):
+            given = getattr(self, name)
+            if given is None and name == "most":
+                continue
+            value = np.asarray(given, np.float64)
             if value.shape != gaps:
                 raise ValueError(
                     f"{name}: wanted shape {gaps} for {len(self.points)} points, got {value.shape}"
                 )
             object.__setattr__(self, name, value)
+        if self.most is not None and not (self.most >= self.least).all():
+            raise ValueError(f"most: wanted at least {self.least.tolist()}, got {self.most.tolist()}")
 
 
 @dataclass(frozen=True)
@@ -66,6 +75,8 @@ class Schedule:
         warnings: one per thing that was dropped.
         cost: the sum of a (gap - preferred)^2 that remains.
         failed: the whole block was refused (a required part cannot hold); times is empty then.
+        lengths: speech -> seconds it would have to last for more of the block to fit. Where there are any,
+            nothing was planned: speak again and plan with what comes.
     """
 
     block: str
@@ -75,6 +86,7 @@ class Schedule:
     warnings: tuple[Warning, ...] = ()
     cost: float = 0.0
     failed: bool = False
+    lengths: Mapping[str, float] = field(default_factory=dict)
     character: str | None = field(default=None, compare=False)
 
     @property

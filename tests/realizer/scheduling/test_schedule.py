@@ -21,10 +21,12 @@ def timing(
     least: float = 0.02,
     stiffness: float = 1.0,
     rigid: bool = False,
+    most: Sequence[float] | None = None,
 ) -> Timing:
     k = len(preferred)
+    bounds = None if most is None else np.array(most)
     names = tuple(points) if points is not None else {1: ("start", "end"), 3: FACE, 6: NOD}[k]
-    return Timing(names, np.array(preferred), np.full(k, least), np.full(k, stiffness), rigid)
+    return Timing(names, np.array(preferred), np.full(k, least), np.full(k, stiffness), rigid, bounds)
 
 
 def speech(*marks: float) -> Timing:
@@ -306,6 +308,71 @@ def test_a_long_chain_of_orders() -> None:
     found = schedule(body, {f"w{k}": timing([0.1]) for k in range(n)})
     assert found.at("w0", "end") == pytest.approx(0.1 * n)
     assert found.cost == pytest.approx(0)
+
+
+# Bounded gaps.
+
+
+def bounded(least: float, preferred: float, most: float) -> Timing:
+    return timing([preferred], least=least, most=[most])
+
+
+def test_a_bounded_gap_gives_as_far_as_it_can_and_others_give_the_rest() -> None:
+    body = wait("a") + wait("b", start="a:start", end="a:end")
+    found = schedule(body, {"a": bounded(0.5, 1.0, 1.2), "b": timing([2.0])})
+    assert found["a"] == found["b"] == pytest.approx({"start": 0.0, "end": 1.2}, abs=1e-9)
+    assert found.cost == pytest.approx(0.2**2 + 0.8**2)
+    found = schedule(body, {"a": bounded(0.5, 1.0, 9.0), "b": timing([2.0])})
+    assert found.duration == pytest.approx(1.5)
+
+
+def test_several_bounded_gaps_share_what_they_can() -> None:
+    points = ("start", "m1", "m2", "end")
+    voice = Timing(points, np.ones(3), np.full(3, 0.8), np.ones(3), most=np.array([1.1, 3.0, np.inf]))
+    found = schedule(wait("a", start="0", end="4"), {"a": voice})
+    np.testing.assert_allclose(found.times["a"], [0, 1.1, 2.55, 4.0], atol=1e-9)
+
+
+def test_a_preferred_length_over_the_most_is_cut_down_to_it() -> None:
+    found = schedule(wait("a") + wait("b", start="a:end"), {"a": bounded(0, 2.0, 1.5), "b": timing([1.0])})
+    assert found["a"] == pytest.approx({"start": 0.0, "end": 1.5}, abs=1e-9)
+    assert found["b"] == pytest.approx({"start": 1.5, "end": 2.5}, abs=1e-9)
+
+
+def test_bounds_without_any_room_hold_exactly() -> None:
+    found = schedule(
+        wait("a") + wait("b", start="a:start", end="a:end"), {"a": bounded(1.0, 1.0, 1.0), "b": timing([2.0])}
+    )
+    assert found["b"] == pytest.approx({"start": 0.0, "end": 1.0}, abs=1e-9)
+
+
+def test_orders_meet_bounds_and_push_what_is_not_bounded() -> None:
+    body = wait("a", start="0") + wait("b") + constraint(after("a:end", "b:start") + before("2.5", "b:end"))
+    found = schedule(body, {"a": bounded(1.0, 2.0, 3.0), "b": timing([1.0], least=0.9)})
+    assert found["a"] == pytest.approx({"start": 0.0, "end": 1.6}, abs=1e-9)
+    assert found["b"] == pytest.approx({"start": 1.6, "end": 2.5}, abs=1e-9)
+
+
+@pytest.mark.parametrize(("end", "words"), [("9", "at most 3 s"), ("0.2", "at least 1 s")])
+def test_a_stated_length_cannot_break_bounds(end: str, words: str) -> None:
+    found = schedule(wait("a", start="0", end=end) + wait("b"), {"a": bounded(1, 2, 3), "b": timing([1.0])})
+    assert dropped(found) == ["b1:a"]
+    assert f"a takes {words} from start to end" in found.warnings[0].text
+    assert f"a:end = {end} (line 2)" in found.warnings[0].text
+
+
+def test_lengths_that_follow_each_other_are_added_up_in_the_words() -> None:
+    expression = Timing(FACE, np.ones(3), np.full(3, 0.8), np.ones(3), most=np.array([1.1, 1.2, 1.3]))
+    found = schedule(face("a", start="0", relax="5"), {"a": expression})
+    assert dropped(found) == ["b1:a"]
+    assert "a takes at most 2.3 s from start to relax" in found.warnings[0].text
+
+
+def test_bounds_have_a_length_for_each_gap_and_leave_room() -> None:
+    with pytest.raises(ValueError, match=r"most: wanted shape \(1,\)"):
+        timing([1.0], most=[1.0, 2.0])
+    with pytest.raises(ValueError, match="most: wanted at least"):
+        timing([1.0], least=0.5, most=[0.4])
 
 
 # What cannot hold.
