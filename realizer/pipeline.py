@@ -7,7 +7,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ from realizer.composition.playing import Speaking
 from realizer.errors import RealizerError, VoiceError
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Say, Utterance, Voice
 from realizer.tables import faps
 from realizer.units import frame_count
@@ -224,7 +225,7 @@ def schedule(
     player = Player(scene=scene, idle=False, media=media)
     block = parse(document, VOCABULARY)
     with _opened(voice) as speaker:
-        return player.submit(block, 0.0, speak(player.wants(block), speaker))
+        return submitted(player, block, speaker)
 
 
 def play(
@@ -236,7 +237,7 @@ def play(
     with _opened(voice) as speaker:
         for item in (item for text in texts for item in read(text, VOCABULARY)):
             if isinstance(item, Block):
-                planned = player.submit(item, 0.0, speak(player.wants(item), speaker))
+                planned = submitted(player, item, speaker)
                 schedules.append(planned)
                 if planned.failed:
                     refused += planned.warnings
@@ -245,6 +246,23 @@ def play(
                 player.refuse(warning, 0.0)
                 refused.append(warning)
     return schedules, refused
+
+
+def submitted(player: Player, block: Block, voice: Voice) -> Schedule:
+    """Submit a block at t = 0 with what the voice makes of it, at other rates where that lets more fit."""
+    says = player.wants(block)
+    utterances = speak(says, voice)
+    planned = player.submit(block, 0.0, utterances)
+    if planned.lengths:
+        again = {b: replace(says[b], seconds=seconds) for b, seconds in planned.lengths.items()}
+        utterances |= speak(again, voice)
+        planned = player.submit(block, 0.0, {b: as_it_is(u) for b, u in utterances.items()})
+    return planned
+
+
+def as_it_is(utterance: Utterance) -> Utterance:
+    """An utterance that is not to be spoken again."""
+    return replace(utterance, stretch=(1.0, 1.0))
 
 
 @contextmanager
@@ -293,12 +311,12 @@ def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
     utterances: dict[str, Utterance] = {}
     for behaviour, say in says.items():
         try:
-            utterances[behaviour] = voice.say(say)
+            utterances[behaviour] = fitted(voice, say)
         except VoiceError as error:
             from realizer.speech import SilentVoice
 
             print(f"realizer: {behaviour}: {error}; going on without sound", file=sys.stderr)
-            utterances[behaviour] = SilentVoice().say(say)
+            utterances[behaviour] = fitted(SilentVoice(), say)
         for warning in utterances[behaviour].warnings:
             print(f"realizer: {behaviour}: {warning}", file=sys.stderr)
     return utterances

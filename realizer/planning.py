@@ -14,6 +14,8 @@ from realizer.scheduling.timing import Schedule, Timing, Warning
 
 __all__ = ["Plan", "plan"]
 
+# A speech whose length differs by no more than this part is not spoken again.
+SAME = 1e-6
 _MOST_LISTED = 10  # references named in a warning as gone with their behaviour
 
 
@@ -62,6 +64,8 @@ def plan(
         work.take_problems()
         work.check()
         schedule, *moved = work.schedule(start, outside, tuple(held), others)
+    except _Bends as bends:
+        return Plan(block, Schedule(block.id, {}, {}, start=start, lengths=bends.lengths))
     except _Failed as failed:
         warning = replace(failed.warning, id=block.id)
         return Plan(block, Schedule(block.id, {}, {}, start=start, warnings=(warning,), failed=True))
@@ -80,6 +84,14 @@ class _Failed(Exception):
     def __init__(self, warning: Warning) -> None:
         super().__init__(warning.text)
         self.warning = warning
+
+
+class _Bends(Exception):
+    """More of the block fits if speech lasts longer or shorter."""
+
+    def __init__(self, lengths: Mapping[str, float]) -> None:
+        super().__init__(str(lengths))
+        self.lengths = lengths
 
 
 class _Work:
@@ -134,6 +146,8 @@ class _Work:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities)
             found, *moved = schedule_together([own, *others], outside=outside)
+            if found.failed or len(found.times) < len(self.timings):
+                self.try_bending(own, others, outside, found)
             warnings = [replace(w, text=self.at(self.behaviour(w), w.text)) for w in found.warnings]
             if found.failed:
                 raise _Failed(warnings[0])
@@ -155,6 +169,28 @@ class _Work:
                 )
                 for loss in lost
             )
+
+    def try_bending(
+        self,
+        own: Member,
+        others: Sequence[Member],
+        outside: Callable[[SyncRef], float | None],
+        rigid: Schedule,
+    ) -> None:
+        """Where speech is in the way and could be spoken at another rate: raise _Bends if more fits then."""
+        bent = dict(own.timings)
+        for node in self.block.behaviours:
+            if node.id in bent and (timing := self.kinds[node.tag].bend(node, self.world)) is not None:
+                bent[node.id] = timing
+        could = [b for b, timing in bent.items() if timing is not own.timings[b]]
+        if not could:
+            return
+        found = schedule_together([replace(own, timings=bent), *others], outside=outside)[0]
+        if found.failed or len(found.times) <= len(rigid.times):
+            return
+        lengths = {b: float(found.times[b][-1] - found.times[b][0]) for b in could if b in found.times}
+        natural = {b: float(own.timings[b].preferred.sum()) for b in lengths}
+        raise _Bends({b: s for b, s in lengths.items() if abs(s - natural[b]) > SAME * natural[b]})
 
     def drop(self, gone: Iterable[tuple[str, Warning]]) -> None:
         """Take behaviours out, and what refers to them; each has one warning, which names what went too."""

@@ -95,7 +95,9 @@ class Player:
             utterances: what the voice made of `wants(block)`.
 
         Returns:
-            The schedule; `schedule.failed` when the whole block was refused.
+            The schedule; `schedule.failed` when the whole block was refused. Where it has `lengths`, more of
+            the block fits with other utterances: submit it again with such as last so long
+            (`speech.fitting`), or with the same ones whose `stretch` is (1, 1).
         """
         world = replace(self.world, utterances=dict(utterances or {}))
         return self._blocks.submit(block, self._character(block.character_id), world, now)

@@ -93,6 +93,8 @@ class Kind:
         check: (node, world) -> faults: unknown lexeme or AU, no such target. Run before timing.
         say: (node, world) -> what the voice has to say, or None. Only speech has it.
         act: node -> what it does to other blocks and behaviours when it starts.
+        bend: (node, world) -> Timing of a rigid behaviour that can be made to fit others where nothing else
+            helps; None where it cannot.
         sound: (node, world) -> what sounds from its start to its end; None where it is silent.
         claims: (node, world) -> names of what it needs for itself ("voice", "gaze", "head pitch") from its
             start to its relax (its end where it has none): of two behaviours of a character that claim the
@@ -109,6 +111,7 @@ class Kind:
     check: Callable[[Any, World], tuple[Fault, ...]] = lambda node, world: ()
     say: Callable[[Any, World], Say | None] | None = None
     act: Callable[[Any], Act] | None = None
+    bend: Callable[[Any, World], Timing | None] = lambda node, world: None
     sound: Callable[[Any, World], Utterance | None] = lambda node, world: None
     claims: Callable[[Any, World], frozenset[str]] = lambda node, world: frozenset()
     parameters: Mapping[str, str | float] = field(default_factory=dict)

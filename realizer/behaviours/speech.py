@@ -18,6 +18,8 @@ from realizer.speech.utterance import MOST_TEXT, Say, Utterance
 __all__ = ["KINDS"]
 
 SSML = "application/ssml+xml"
+# 1/s: a second of speech resists as much as a stiff gap of the face; shorter gaps than SHORT count as such.
+BEND, SHORT = 1000.0, 0.01
 LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
@@ -59,6 +61,18 @@ def timing(node: Speech, world: World) -> Timing:
     points = ("start", *names, "end")
     gaps = np.diff([0.0, *(times[name] for name in names), utterance.duration])
     return Timing(points, gaps, gaps, np.ones(len(gaps)), rigid=True)
+
+
+def bend(node: Speech, world: World) -> Timing | None:
+    """As `timing`, but evenly longer or shorter as far as the voice can make it; None where it cannot."""
+    least, most = world.utterances[node.id].stretch
+    if least == most:
+        return None
+    natural = timing(node, world)
+    gaps = natural.preferred
+    # Springs as stiff as their gaps are short give way evenly, as one rate of speech does.
+    stiffness = BEND / np.maximum(gaps, SHORT)
+    return Timing(natural.points, gaps, gaps * least, stiffness, most=gaps * most)
 
 
 def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
@@ -138,4 +152,16 @@ def claims(node: Speech, world: World) -> frozenset[str]:
     return frozenset({"voice"})
 
 
-KINDS = (Kind(Speech, timing, expand, check, say, sound=sound, claims=claims, parameters={"volume": 100.0}),)
+KINDS = (
+    Kind(
+        Speech,
+        timing,
+        expand,
+        check,
+        say,
+        bend=bend,
+        sound=sound,
+        claims=claims,
+        parameters={"volume": 100.0},
+    ),
+)

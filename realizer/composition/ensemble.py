@@ -13,7 +13,7 @@ from realizer.composition.acts import ActFault, perform
 from realizer.composition.calendar import Calendar
 from realizer.composition.cast import Cast
 from realizer.composition.character import Character
-from realizer.composition.expected import Expected
+from realizer.composition.expected import Expected, Fate
 from realizer.composition.playing import Playing, Wait
 from realizer.composition.references import references
 from realizer.composition.reporting import (
@@ -86,13 +86,17 @@ class Ensemble:
         except _Refused as refused:
             self._expected.arrive(block)
             return self._refuse(block, refused.warning, now)
-        fate = self._expected.arrive(block)
+        fate = self._expected.fate(block.id) or Fate(block)
         if fate.revoked:
+            self._expected.arrive(block)
             return Schedule(block.id, {}, {}, start=now, failed=True)
         ended = relations.ended(block, character, self.cast.alive())
         state = State.PENDING if block.preplan and not fate.activated else State.LURKING
         start = FOREVER if state is State.PENDING else max([now, *(w.until for w in waits)])
         planned, others = self._plan(block, character, world, start, now, ended)
+        if planned.schedule.lengths:
+            return planned.schedule
+        self._expected.arrive(block)
         if planned.schedule.failed:
             return self._refuse(block, planned.schedule.warnings[0], now)
         for earlier in ended:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from bml_schema import Block
 from realizer.composition.references import references
+from realizer.pipeline import as_it_is
 from realizer.speech.utterance import Say, Utterance
 
 __all__: list[str] = []
@@ -20,6 +21,7 @@ class Waiting:
         says: speak id -> (behaviour, what it says): what the voice still owes.
         utterances: behaviour -> what the voice has made.
         after: blocks in preparation that must be planned first.
+        final: what the voice makes now is not asked for again.
     """
 
     block: Block
@@ -28,6 +30,7 @@ class Waiting:
     says: dict[int, tuple[str, Say]]
     utterances: dict[str, Utterance] = field(default_factory=dict)
     after: set[Waiting] = field(default_factory=set)
+    final: bool = False
 
 
 class Preparation:
@@ -72,7 +75,7 @@ class Preparation:
         for waiting in self.waiting:
             if speak in waiting.says:
                 behaviour, _ = waiting.says.pop(speak)
-                waiting.utterances[behaviour] = utterance
+                waiting.utterances[behaviour] = as_it_is(utterance) if waiting.final else utterance
 
     def unspoken(self, speak: int) -> None:
         """No voice can say it: the block goes on without, its speech is dropped when it is planned."""
@@ -89,12 +92,8 @@ class Preparation:
         return any(not w.says and not w.after for w in self.waiting)
 
     def ready(self) -> Waiting | None:
-        """The first block that waits for nothing, taken out; None where all wait."""
-        for waiting in self.waiting:
-            if not waiting.says and not waiting.after:
-                self.remove([waiting])
-                return waiting
-        return None
+        """The first block that waits for nothing; None where all wait. `remove` it when it is planned."""
+        return next((w for w in self.waiting if not w.says and not w.after), None)
 
     def replaced_by(self, waiting: Waiting) -> list[Waiting]:
         """The blocks in preparation that came before a replacing block of their character."""

@@ -13,7 +13,7 @@ from bml_schema import Block, BMLError, read
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError, VoiceError
-from realizer.pipeline import warning_of
+from realizer.pipeline import as_it_is, warning_of
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
@@ -31,6 +31,7 @@ from realizer.server.messages import (
 from realizer.server.preparation import Preparation, Waiting
 from realizer.server.streams import EPSILON
 from realizer.settings import Settings
+from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Say, Utterance
 
 if TYPE_CHECKING:
@@ -272,17 +273,12 @@ class Session:
         try:
             wants = self.player.wants(block)
             character = self.player.character_index(block.character_id)
-            says: dict[int, tuple[str, Say]] = {}
-            for behaviour, say in wants.items():
-                self._speaks += 1
-                voice = say.voice or self.voices.get(character) or self.settings.voice
-                says[self._speaks] = (behaviour, replace(say, voice=voice))
-            self.preparation.add(block, character, says, t)
+            waiting = self.preparation.add(block, character, {}, t)
             self.player.announce(block, t)
         except Exception:
             self._internal(block, t)
             return
-        self._effects += [Speak(speak, say) for speak, (_, say) in says.items()]
+        self._speak(waiting.says, character, wants)
 
     def _submit_ready(self, t: float) -> bool:
         """Plan the first block that waits for nothing; False where all wait."""
@@ -292,11 +288,33 @@ class Session:
         try:
             schedule = self.player.submit(waiting.block, t, waiting.utterances)
         except Exception:
+            self.preparation.remove([waiting])
             self._internal(waiting.block, t)
             return True
+        if schedule.lengths:
+            self._speak_again(waiting, schedule.lengths, t)
+            return True
+        self.preparation.remove([waiting])
         if waiting.block.composition == "REPLACE" and not schedule.failed:
             self.withdraw(self.preparation.replaced_by(waiting), t)
         return True
+
+    def _speak_again(self, waiting: Waiting, lengths: Mapping[str, float], t: float) -> None:
+        """More of the block fits if its speech lasts so long; what comes back is taken as it is."""
+        wants = self.player.wants(waiting.block)
+        waiting.utterances = {b: as_it_is(u) for b, u in waiting.utterances.items()}
+        waiting.since, waiting.final = t, True
+        self._speak(
+            waiting.says, waiting.character, {b: replace(wants[b], seconds=s) for b, s in lengths.items()}
+        )
+
+    def _speak(self, says: dict[int, tuple[str, Say]], character: int, wants: Mapping[str, Say]) -> None:
+        """Order what a voice has to say; `says` remembers it."""
+        for behaviour, say in wants.items():
+            self._speaks += 1
+            voice = say.voice or self.voices.get(character) or self.settings.voice
+            says[self._speaks] = (behaviour, replace(say, voice=voice))
+            self._effects.append(Speak(self._speaks, says[self._speaks][1]))
 
     def withdraw(self, gone: list[Waiting], t: float) -> None:
         for waiting in gone:
@@ -335,7 +353,7 @@ class Session:
         if say is not None:
             self.voice_fault = fault
             try:
-                self.preparation.spoken(speak, SilentVoice().say(say))
+                self.preparation.spoken(speak, fitted(SilentVoice(), say))
             except VoiceError:
                 self.preparation.unspoken(speak)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from realizer.errors import RealizerError, RenderError, VoiceError
 from realizer.server.effects import Draw, Speak
+from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Utterance, Voice
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class Studio:
     def speak(self, order: Speak) -> Utterance | RealizerError:
         """What a voice made of it; or why it could not, which is also said once on stderr."""
         try:
-            return self._voice(order.say.voice).say(order.say)
+            return fitted(self._voice(order.say.voice), order.say)
         except VoiceError as error:
             self._tell(str(error))
             return error

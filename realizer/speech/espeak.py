@@ -13,7 +13,7 @@ from realizer.errors import VoiceError
 from realizer.speech.espeak_events import timeline, write_document
 from realizer.speech.espeak_process import EspeakProcess, missing
 from realizer.speech.ssml import Break, read_script
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import STRETCH, Say, Utterance
 
 __all__ = ["EspeakVoice", "choose_voice", "missing"]
 
@@ -101,6 +101,7 @@ class EspeakVoice:
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
         return Utterance(
             duration=len(pcm) / rate,
+            stretch=STRETCH,
             words=times.words,
             phonemes=times.phonemes,
             marks=times.marks,

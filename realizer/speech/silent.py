@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from realizer.speech.spelling import letters_to_phonemes, syllable_facts, units
 from realizer.speech.ssml import Mark, read_script
-from realizer.speech.utterance import Phoneme, Say, Utterance, Word
+from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
 from realizer.speech.words import Item, Pause, Spelled, items
 
 __all__ = ["SilentVoice"]
@@ -69,6 +69,7 @@ def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tupl
         words=tuple(words),
         phonemes=_joined(phonemes),
         marks=marks,
+        stretch=STRETCH,
         warnings=warnings,
     )
 

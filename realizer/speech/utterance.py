@@ -8,8 +8,10 @@ from typing import Protocol
 
 from realizer.arrays import Int16
 
-__all__ = ["MOST_TEXT", "Phoneme", "Say", "Utterance", "Voice", "Word"]
+__all__ = ["MOST_TEXT", "STRETCH", "Phoneme", "Say", "Utterance", "Voice", "Word"]
 
+# A voice can speak so much faster or slower and still be understood, as parts of its usual length; ours.
+STRETCH = (0.6, 1.8)
 MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
 
 
@@ -24,6 +26,7 @@ class Say:
         language: BCP-47, such as "en-US".
         voice: name of a voice, or None for the language's default.
         rate: 1 is the voice's own rate, 2 twice as fast.
+        seconds: how long it is to last; None as long as it takes. For `speech.fitting`, voices need not look.
     """
 
     ssml: str
@@ -31,6 +34,7 @@ class Say:
     language: str = "en-US"
     voice: str | None = None
     rate: float = 1.0
+    seconds: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,8 @@ class Utterance:
         words, phonemes: in order; phonemes do not overlap.
         marks: mark name -> seconds.
         warnings: sentences for the client, such as "the text is empty".
+        stretch: the shortest and the longest it could be made, as parts of its duration, by asking the voice
+            again; (1, 1) where it is as it is.
     """
 
     duration: float
@@ -70,6 +76,7 @@ class Utterance:
     sample_rate: int = 0
     pcm: Int16 | None = None
     warnings: tuple[str, ...] = field(default=())
+    stretch: tuple[float, float] = (1.0, 1.0)
 
 
 class Voice(Protocol):

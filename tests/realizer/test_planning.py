@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
 from bml_schema import parse
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import World
+from realizer.pipeline import realize
 from realizer.planning import Plan, plan
+from realizer.speech import SilentVoice
 
 
 def planned(content: str, world: World = World()) -> Plan:  # noqa: B008 - a frozen value
@@ -44,3 +48,43 @@ def test_a_required_fault_fails_the_block_with_one_warning_of_its_own() -> None:
     assert made.schedule.failed
     assert [w.id for w in made.schedule.warnings] == ["b"]
     assert made.channels == {}
+
+
+SPEECH = '<speech id="s"{}><text>one two <sync id="m"/>three four</text></speech>'
+
+
+def natural() -> float:
+    return realize(f'<bml id="b">{SPEECH.format("")}</bml>', voice=SilentVoice()).schedules[0].end
+
+
+@pytest.mark.parametrize("ratio", [0.7, 1.5])
+def test_a_speech_is_spoken_at_another_rate_where_it_fits_no_other_way(ratio: float) -> None:
+    end = natural() * ratio
+    said = SPEECH.format(f' start="0" end="{end}"')
+    played = realize(f'<bml id="b">{said}</bml>', voice=SilentVoice())
+    assert not played.warnings
+    assert played.schedules[0].at("s", "end") == pytest.approx(end)
+    assert played.speech[0][1].duration == pytest.approx(end)
+
+
+def test_a_speech_is_left_as_it_is_where_others_can_give_way() -> None:
+    face = '<faceLexeme id="f" lexeme="SMILE" start="s:start" attackPeak="s:m" end="s:end"/>'
+    played = realize(f'<bml id="b">{SPEECH.format("")}{face}</bml>', voice=SilentVoice())
+    assert played.schedules[0].at("s", "end") == pytest.approx(natural())
+
+
+def test_a_speech_that_would_have_to_be_gabbled_is_dropped() -> None:
+    said = SPEECH.format(f' start="0" end="{natural() * 0.3}"')
+    played = realize(f'<bml id="b">{said}</bml>', voice=SilentVoice())
+    assert [w.id for w in played.warnings] == ["b:s"]
+    assert played.speech == ()
+
+
+def test_two_speeches_tied_at_both_ends_meet() -> None:
+    both = (
+        '<speech id="s"><text>one two three</text></speech>'
+        '<speech id="t" start="s:end + 0.1" end="4"><text>four five six seven</text></speech>'
+    )
+    played = realize(f'<bml id="b">{both}</bml>', voice=SilentVoice())
+    assert not played.warnings
+    assert played.schedules[0].at("t", "end") == pytest.approx(4.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -694,3 +696,26 @@ def test_an_anticipated_point_moves_what_is_tied_to_it(driver) -> None:
         b.syncs["stroke"].offset for f in driver.clients[1].feedback for b in getattr(f, "behaviours", ())
     ]
     assert predicted == [pytest.approx(3.0), pytest.approx(2.0)]
+
+
+def test_a_speech_that_has_to_last_longer_is_spoken_again_and_later_blocks_wait_for_it() -> None:
+    driver = Driver(mute=True)
+    driver.send('<bml id="a"><speech id="s" start="0" end="3"><text>Hello there</text></speech></bml>')
+    driver.send('<bml id="b" composition="APPEND"/>')
+    driver.say(driver.spoken[0].id, replace(spoken(2.0), stretch=(0.6, 1.8)))
+    assert [order.say.seconds for order in driver.spoken] == [None, pytest.approx(3.0)]
+    assert not any(id.endswith(":start") for id in driver.run(1).ids)
+    driver.say(driver.spoken[1].id, spoken(3.0))
+    times = {f.id: f.global_time for f in driver.run(9).feedback if isinstance(f, BlockProgress)}
+    assert times == {"a:start": 1.0, "a:end": 4.0, "b:start": 4.0, "b:end": 4.0}
+
+
+def test_a_voice_that_comes_back_with_another_length_is_not_asked_a_third_time() -> None:
+    driver = Driver(mute=True)
+    driver.send('<bml id="a"><speech id="s" start="0" end="3"><text>Hello there</text></speech></bml>')
+    driver.say(driver.spoken[0].id, replace(spoken(2.0), stretch=(0.6, 1.8)))
+    driver.say(driver.spoken[1].id, replace(spoken(2.5), stretch=(0.6, 1.8)))
+    told = driver.run(9)
+    assert len(driver.spoken) == 2
+    assert [w.id for w in told.feedback if isinstance(w, WarningFeedback)] == ["a:s"]
+    assert "a:end" in told.ids

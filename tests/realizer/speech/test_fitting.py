@@ -1,0 +1,57 @@
+"""Speech that has to last so long is spoken faster or slower."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.speech import SilentVoice
+from realizer.speech.fitting import fitted, stretched
+from realizer.speech.utterance import Say
+
+SAY = Say('one two <mark name="m"/>three four five', ("m",))
+
+
+@pytest.mark.parametrize("ratio", [0.7, 0.95, 1.0, 1.3, 1.6])
+def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
+    voice = SilentVoice()
+    natural = voice.say(SAY)
+    made = fitted(voice, Say(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
+    assert made.duration == pytest.approx(natural.duration * ratio)
+    assert made.phonemes[-1].end == pytest.approx(made.duration)
+    assert made.marks["m"] / made.duration == pytest.approx(natural.marks["m"] / natural.duration, abs=0.05)
+    assert made.stretch == (1.0, 1.0)
+
+
+def test_without_a_length_it_is_the_voices_own() -> None:
+    voice = SilentVoice()
+    assert fitted(voice, SAY).duration == voice.say(SAY).duration
+    assert voice.say(SAY).stretch[0] < 1 < voice.say(SAY).stretch[1]
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize("ratio", [0.75, 1.4])
+def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
+    from realizer.speech import find_voice
+
+    voice = find_voice("espeak")
+    try:
+        natural = voice.say(SAY)
+        made = fitted(voice, Say(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
+        assert made.pcm is not None
+        assert len(made.pcm) == round(made.duration * made.sample_rate)
+        assert made.words[-1].end == pytest.approx(natural.words[-1].end * ratio, rel=0.1)
+        loud = np.abs(made.pcm.astype(float))
+        assert loud[: int(made.words[0].end * made.sample_rate)].max() > 1000
+    finally:
+        voice.close()
+
+
+def test_a_stretched_sound_keeps_its_loudness() -> None:
+    from realizer.speech.utterance import Utterance
+
+    wave = (8000 * np.sin(np.arange(22050) * 0.1)).astype(np.int16)
+    made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, wave), 1.005)
+    assert made.pcm is not None
+    assert np.abs(made.pcm).max() == pytest.approx(8000, rel=0.01)
+    assert made.marks["m"] == pytest.approx(0.5025)
