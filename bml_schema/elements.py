@@ -7,6 +7,7 @@ decides what goes with it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import Any, cast
 
 from lxml import etree
@@ -51,6 +52,15 @@ _SYNC, _DESCRIPTION = Sync.tag, Description.tag
 _INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
 
 
+@lru_cache(maxsize=1000)
+def _standard(raw: str) -> tuple[str, str]:
+    """The tag in the core if it is a draft's or has no namespace, and the same in the extensions, else ""."""
+    space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
+    if space in _DRAFTS or not space or space == CORE:
+        return core(name), extension(name)
+    return raw, ""
+
+
 class Elements:
     """Reads elements of one document.
 
@@ -59,26 +69,19 @@ class Elements:
         names: what references may name; None looks nothing up.
     """
 
-    __slots__ = ("_tags", "names", "vocabulary")
+    __slots__ = ("names", "vocabulary")
 
     def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
         self.vocabulary = vocabulary
         self.names = names
-        self._tags: dict[str, str] = {}
 
     def tag(self, element: etree._Element) -> str:
         """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
         raw: Any = element.tag
         if raw in _INNER or raw in self.vocabulary:
             return cast("str", raw)
-        known = self._tags.get(raw)
-        if known is None:
-            space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
-            known = core(name) if not space or space in _DRAFTS else raw
-            if known == core(name) and known not in self.vocabulary and extension(name) in self.vocabulary:
-                known = extension(name)
-            self._tags[raw] = known
-        return known
+        known, extended = _standard(raw)
+        return extended if extended in self.vocabulary and known not in self.vocabulary else known
 
     # element := attributes children
 
@@ -109,8 +112,6 @@ class Elements:
         points = shape.points if timed else ()
         for name, text in attributes(element):
             spec = known.get(name)
-            if spec is None and name in shape.old and shape.old[name].name not in element.attrib:
-                spec = shape.old[name]
             try:
                 if spec is None:
                     if name in points:
@@ -125,7 +126,9 @@ class Elements:
                 # Who reads a reference says the whole sentence.
                 said = wrong if spec is None or spec.read is None else _unwanted(spec, text)
                 faults.append(f"{local(name)}: {said}")
-        if not shape.needed <= values.keys():
+        if shape.old:
+            faults += _drafts(shape, values, foreign)
+        if not values.keys() >= shape.needed:
             if shape.timed and not timed and "id" not in element.attrib:
                 values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
             missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
@@ -252,6 +255,17 @@ class Elements:
             return read_sync_ref(text, self.names)
         except ValueError as wrong:
             raise Fault(f"ref: {wrong}", element) from None
+
+
+def _drafts(shape: Shape, values: dict[str, Any], foreign: dict[str, str]) -> Iterator[str]:
+    """Read what a draft named otherwise, unless its present name is there too; yields what is wrong."""
+    for name, spec in shape.old.items():
+        if name in foreign and spec.field not in values and spec.read is not None:
+            text = foreign.pop(name)
+            try:
+                values[spec.field] = spec.read(text)
+            except ValueError:
+                yield f"{name}: {_unwanted(spec, text)}"
 
 
 def _unwanted(spec: Attribute, text: str) -> str:

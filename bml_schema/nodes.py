@@ -229,7 +229,7 @@ class Block:
         put(self, "constraints", tuple([c for c in flat if isinstance(c, Constraint)]))
         put(self, "required", frozenset(required))
         # The first of two with the same id counts, as in documents.
-        put(self, "_by_id", {b.id: b for b in reversed(behaviours)})
+        put(self, "_by_id", {b.id: b for b in behaviours[::-1]})
 
     def __getitem__(self, id: str) -> Behaviour:
         """The behaviour with this id; KeyError if there is none."""

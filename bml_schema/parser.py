@@ -6,8 +6,9 @@ Faults stay where they are: a behaviour or constraint with a fault is left out a
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -39,6 +40,8 @@ _MOST_LISTED = 10  # lost references named in a warning's text; `Problem.lost` h
 _APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\s*\(([^()]*)\)\s*", re.IGNORECASE)
 _BLOCK_LISTS = {a.field for a in shape_of(Block).attributes.values() if a.value is block_names}
 _MOST_ID = 256  # characters of an id a warning repeats
+# A NamedTuple of thousands is made in a third of the time without its own `__new__`, which is Python.
+_tuple = tuple.__new__
 
 
 def read_block(
@@ -73,7 +76,7 @@ def read_block(
     names = elements.names = Names(values["id"])
     reader = _Reader(elements, names, lines)
     tree = reader.entries(root, "/bml", required=False)
-    entries = [e for item in tree for e in (item if isinstance(item, list) else (item,))]
+    entries = _flat(tree)
     if len(entries) > most_behaviours:
         said = f"wanted at most {most_behaviours} behaviours and constraints in a block, got {len(entries)}"
         raise BMLError(said, line=line, path="/bml", block=names.block)
@@ -201,12 +204,14 @@ class _Entry(NamedTuple):
 class _Reader:
     """What is known while one block is read."""
 
-    __slots__ = ("elements", "line", "names", "owners", "places", "problems")
+    __slots__ = ("elements", "kinds", "line", "names", "owners", "places", "problems")
 
     def __init__(self, elements: Elements, names: Names, lines: _Lines) -> None:
         self.elements = elements
         self.names = names
-        self.line = lines.of
+        # Nearly always lxml's lines are those of the text.
+        self.line: Callable[[etree._Element], int] = lines.of if any(lines) else attrgetter("sourceline")
+        self.kinds: dict[str, _Kind] = {}  # by tag as it stands
         self.problems: list[Problem] = []
         self.places: dict[str, Place] = {}
         self.owners: dict[str, _Entry] = {}
@@ -218,12 +223,13 @@ class _Reader:
         tree: list[_Entry | list[_Entry]] = []
         counts: dict[str, int] = {}
         loose = parent.text
-        known = self.elements.vocabulary.get
+        kinds = self.kinds
         owners, points = self.owners, self.names.points
         for element in parent:
             raw: Any = element.tag
-            cls = known(raw)
-            kind = self.kind(element) if cls is None else _kind_of(cls)
+            kind = kinds.get(raw)
+            if kind is None:
+                kind = kinds[raw] = self.kind(element)
             step = kind.step
             counts[step] = n = counts.get(step, 0) + 1
             here = f"{path}/{step}[{n}]"
@@ -231,10 +237,10 @@ class _Reader:
                 loose = element.tail
             if kind.tag == Required.tag:
                 inside = self.entries(element, here, required=True)
-                tree.append([e for item in inside for e in (item if isinstance(item, list) else (item,))])
+                tree.append(_flat(inside))
                 continue
             id = element.get("id", "").strip()
-            entry = _Entry(element, kind, id, here, required)
+            entry = _tuple(_Entry, (element, kind, id, here, required))
             tree.append(entry)
             # What references may say of it, before any is read.
             if id and id not in owners and kind.tag != Constraint.tag:
@@ -247,7 +253,6 @@ class _Reader:
         return tree
 
     def kind(self, element: etree._Element) -> _Kind:
-        """The kind of an element whose tag is not in the vocabulary as it stands."""
         tag = self.elements.tag(element)
         cls = self.elements.vocabulary.get(tag)
         return _Kind(tag, local(tag)) if cls is None else _kind_of(cls)
@@ -287,7 +292,7 @@ class _Reader:
             id = entry.id if 0 < len(entry.id) <= _MOST_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
-        self.places[node.id] = Place(self.line(element), entry.path)
+        self.places[node.id] = _tuple(Place, (self.line(element), entry.path))
         return node
 
     def unknown(self, entry: _Entry) -> Fault:
@@ -352,10 +357,16 @@ class _Reader:
         )
 
 
+def _flat(tree: list[_Entry | list[_Entry]]) -> list[_Entry]:
+    return [e for item in tree for e in (item if isinstance(item, list) else (item,))]
+
+
 def _grouped(
     tree: list[_Entry | list[_Entry]], nodes: Mapping[int, Behaviour | Constraint]
 ) -> tuple[Behaviour | Required | Constraint, ...]:
     """The nodes that are left, in the tree of their entries."""
+    if list not in map(type, tree):
+        return tuple(nodes.values())
     out: list[Behaviour | Required | Constraint] = []
     n = 0
     for item in tree:
