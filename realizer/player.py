@@ -20,6 +20,7 @@ from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float64
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
+from realizer.composition.cast import Cast
 from realizer.composition.character import RELAX, Character
 from realizer.composition.ensemble import Ensemble
 from realizer.composition.playing import Speaking
@@ -122,6 +123,11 @@ class Player:
         self._blocks.withdraw(block, now)
 
     @property
+    def cast(self) -> Cast:
+        """The blocks themselves, to look at: only the player changes them."""
+        return self._blocks.cast
+
+    @property
     def alive(self) -> int:
         """How many blocks play or wait for their start."""
         return len(self._blocks.cast.alive())
@@ -137,6 +143,17 @@ class Player:
             syncs: sync -> seconds on the session clock. A point that has passed stays where it was.
         """
         self._blocks.anticipate(id, syncs, now)
+
+    def respeak(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
+        """Take what a voice says of its real timing while it speaks: the rest of the block follows.
+
+        Args:
+            utterance: the whole of it, as it turned out. What has passed stays where it was.
+
+        Returns:
+            False where that speech does not play and does not wait.
+        """
+        return self._blocks.respeak(block, behaviour, utterance, now)
 
     def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
         """Hold AUs (0..1) and FAPs (FAPU) by name until told otherwise; None lets go of one.

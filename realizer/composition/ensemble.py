@@ -30,6 +30,7 @@ from realizer.composition.retiming import anticipated, lead, member, touched
 from realizer.planning import Plan, plan
 from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.utterance import Utterance
 
 __all__ = ["Ensemble"]
 
@@ -258,6 +259,21 @@ class Ensemble:
         self.cast.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
         for playing in tied:
             self._solve_again([playing, *self._tied(playing, now)], playing.start, now)
+
+    def respeak(self, id: str, behaviour: str, utterance: Utterance, now: float) -> bool:
+        """A voice says how it really speaks: what has not passed follows; False where it is not (still) said.
+
+        Args:
+            id: of a block that plays or waits.
+        """
+        self.advance(now)
+        playing = self.cast.find(id)
+        if playing is None or behaviour not in playing.plan.timings or playing.start == FOREVER:
+            return False
+        playing.respeak(behaviour, utterance, now)
+        self.changed()
+        self._solve_again([playing, *self._tied(playing, now)], playing.start, now)
+        return True
 
     # starts -------------------------------------------------------------------------------------
 

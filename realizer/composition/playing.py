@@ -216,6 +216,34 @@ class Playing:
         self.plan = replace(self.plan, claims=tuple(claims(self.block, own, self.kinds, self.world)))
         return changed
 
+    def respeak(self, behaviour: str, utterance: Utterance, now: float) -> None:
+        """Take another utterance of a speech; its points that have passed stay where they were.
+
+        The schedule is as before: `retime` gives it the times that follow.
+        """
+        self.world = replace(self.world, utterances={**self.world.utterances, behaviour: utterance})
+        node = self.block[behaviour]
+        wanted = self.kinds[node.tag].timing(node, self.world)
+        was = dict(zip(self.schedule.points[behaviour], self.schedule.times[behaviour], strict=True))
+        local = now - self.start
+        at: list[float] = []
+        new = np.concatenate([[0.0], np.cumsum(wanted.preferred)])
+        for point, time in zip(wanted.points, new + was["start"], strict=True):
+            passed = was.get(point, np.inf)
+            # What has not passed comes when the voice says, but not before now.
+            at.append(float(passed) if passed <= local else max(float(time), local if at else float(time)))
+        gaps = np.diff(np.maximum.accumulate(at))
+        timing = replace(wanted, preferred=gaps, least=gaps)
+        points = {**self.schedule.points, behaviour: wanted.points}
+        times = {**self.schedule.times, behaviour: np.array([was.get(p, np.nan) for p in wanted.points])}
+        self.plan = replace(
+            self.plan,
+            timings={**self.plan.timings, behaviour: timing},
+            schedule=replace(self.schedule, points=points, times=times),
+        )
+        if behaviour in self.speech:
+            self.speech[behaviour] = replace(self.speech[behaviour], utterance=utterance)
+
     def _placed(self, behaviour: str, channels: Iterable[Channel]) -> tuple[Channel, ...]:
         """Channels of a behaviour on the session clock."""
         name = f"{self.block.id}:{behaviour}"

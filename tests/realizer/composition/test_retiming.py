@@ -9,6 +9,7 @@ from bml_schema import Block, PredictionFeedback, SyncPointProgress, parse
 from realizer.composition.retiming import touched
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule
+from realizer.speech.utterance import Phoneme, Utterance
 
 
 class Stage:
@@ -185,3 +186,38 @@ def test_a_preplanned_block_moves_nobody_before_it_is_activated(stage: Stage) ->
     assert stage.player.latest(first).end == first.end
     stage.send("x", '<bmla:activate id="x" target="p"/>', at=0.3)
     assert stage.player.latest(first).end > first.end
+
+
+TALK = '<speech id="s"><text>one <sync id="m"/>two</text></speech><head id="n" lexeme="NOD" stroke="s:m"/>'
+
+
+def spoken(mark: float, end: float) -> Utterance:
+    return Utterance(end, (), (Phoneme(0.0, end, "a"),), {"m": mark})
+
+
+def test_a_voice_that_turns_out_slower_takes_the_rest_with_it() -> None:
+    stage = Stage()
+    stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
+    stage.until(0.5)
+    assert stage.player.respeak("a", "s", spoken(1.6, 3.0), 0.5)
+    times = stage.times()
+    assert times["a:s:m"] == times["a:n:stroke"] == pytest.approx(1.6)
+    assert times["a:s:end"] == pytest.approx(3.0)
+
+
+def test_a_mark_that_was_told_stays_where_it_was() -> None:
+    stage = Stage()
+    stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
+    stage.until(1.2)
+    assert stage.player.respeak("a", "s", spoken(1.6, 3.0), 1.2)
+    times = stage.times()
+    assert times["a:s:m"] == pytest.approx(1.0)
+    assert times["a:s:end"] == pytest.approx(3.0)
+
+
+def test_a_speech_that_is_over_is_not_spoken_again() -> None:
+    stage = Stage()
+    stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
+    stage.until(9.0)
+    assert not stage.player.respeak("a", "s", spoken(1.6, 3.0), 9.0)
+    assert not stage.player.respeak("nobody", "s", spoken(1.6, 3.0), 9.0)
