@@ -7,7 +7,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bml_schema import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback, parse, write
+from bml_schema import (
+    Behaviour,
+    BlockProgress,
+    PredictionFeedback,
+    Speech,
+    Sync,
+    SyncPointProgress,
+    WarningFeedback,
+    parse,
+    write,
+)
 from bml_schema.shape import shape_of
 from realizer.animation.curves import gain_at
 from realizer.behaviours import VOCABULARY
@@ -181,6 +191,49 @@ def test_feedback_keeps_its_laws(case: Case) -> None:
         elif isinstance(feedback, WarningFeedback):
             assert feedback.id.partition(":")[0] not in over, f"a warning of {feedback.id} after its block"
     assert not start, "every block that started ends"
+
+
+@every_case
+def test_what_was_predicted_last_is_what_happens(case: Case) -> None:
+    """Of blocks: start and end; of behaviours: every sync point, in the order in which they pass."""
+    blocks: dict[str, tuple[float | None, float | None]] = {}
+    points: dict[str, dict[str, float]] = {}
+    played = plain(case)
+    described = {f"{b.id}:{node.id}" for b in played.blocks for node in b.behaviours if node.descriptions}
+    for feedback in played.feedback:
+        match feedback:
+            case PredictionFeedback():
+                blocks |= {b.id: (b.global_start, b.global_end) for b in feedback.blocks}
+                points |= {node.id: predicted_points(node) for node in feedback.behaviours}
+            case SyncPointProgress():
+                behaviour = ":".join(feedback.id.split(":")[:2])
+                point = feedback.id[len(behaviour) + 1 :]
+                # The n-th stroke, and a mark that only a description has, cannot be said in a prediction.
+                if ":" not in point and (behaviour not in described or point in points[behaviour]):
+                    assert points[behaviour][point] == pytest.approx(feedback.time, abs=WITHIN)
+            case BlockProgress(status="IN_EXEC" | "DONE"):
+                id, _, point = feedback.id.rpartition(":")
+                expected = blocks[id][point == "end"]
+                assert expected == pytest.approx(feedback.global_time, abs=WITHIN), feedback.id
+
+
+def predicted_points(node: Behaviour) -> dict[str, float]:
+    points = {name: ref.offset for name, ref in node.syncs.items()}
+    if isinstance(node, Speech) and node.text is not None:
+        points |= {p.id: p.ref.offset for p in node.text.parts if isinstance(p, Sync) and p.ref is not None}
+    return points
+
+
+@every_case
+def test_nothing_is_warned_of_twice(case: Case) -> None:
+    """One warning a behaviour, until its block has ended and its id is free again."""
+    warned: set[str] = set()
+    for feedback in plain(case).feedback:
+        if isinstance(feedback, WarningFeedback) and ":" in feedback.id:
+            assert feedback.id not in warned, feedback.text
+            warned.add(feedback.id)
+        elif isinstance(feedback, BlockProgress) and feedback.id.endswith(":end"):
+            warned = {id for id in warned if not id.startswith(feedback.id.removesuffix("end"))}
 
 
 # A behaviour that is interrupted does not pass all its points.
