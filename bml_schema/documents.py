@@ -7,7 +7,6 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import count
-from typing import NamedTuple
 
 from lxml import etree
 
@@ -15,31 +14,17 @@ from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MOST_BEHAVIOURS, read_block
 from bml_schema.shape import local
+from bml_schema.stretches import NEXT, Stretch, stretches
 from bml_schema.vocabulary import VOCABULARY
 
 __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
 
 MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
-_MOST_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
 _MOST_RETRIES = 20  # times that a broken document is searched for a good one inside it
 MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
-# What decides where a document begins and ends, and what may hide such marks.
-_MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml\s*>")
-_NEXT = re.compile(r"<(?:[\w.-]+:)?bml(?=[\s/>])")
-_REST_OF_TAG = re.compile(r"""(?:[^<>"']|"[^<"]*"|'[^<']*')*+>""")
-_REST_OF_DOCTYPE = re.compile(r"""(?:[^<>"'\[]|"[^<"]*"|'[^<']*')*+[>\[]""")
-_CLOSERS = {
-    "<!--": re.compile("-->"),
-    "<![CDATA[": re.compile(r"\]\]>"),
-    "<?": re.compile(r"\?>"),
-    "<!DOCTYPE": re.compile(r"\]\s*>"),
-}
-_BLANKS = " \t\r\n\ufeff"
-# What may stand between documents; SmartBody wraps its own in <act>.
-_BETWEEN = re.compile(rf"(?:[{_BLANKS}]|</?act(?=[\s/>])[^<>]*>|</?participant(?=[\s/>])[^<>]*>)*+")
 _LONG_TAG = re.compile(rb"<([^\s<>/!?]++)[^<>\n]*+\n[^<>]*+>")
 _ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
@@ -117,14 +102,14 @@ def read(
         yield wrong
         return
     try:
-        stretches = list(_stretches(text))
+        found = list(stretches(text))
     except BMLError as wrong:
         yield wrong
         return
     line = 1
     counted = 0
     broken = False  # the stretch before was broken XML: what follows it up to the next document is part of it
-    todo = deque(stretches)
+    todo = deque(found)
     retries = _MOST_RETRIES
     told = 0  # up to here broken XML has been told of
     for n in count():
@@ -147,11 +132,11 @@ def read(
                 yield wrong
             if broken and not stretch.fault and retries:
                 # A good document may stand inside the broken one, where their end tags happen to match.
-                inner = _NEXT.search(text, stretch.start + len(stretch.tag), stretch.end)
+                inner = NEXT.search(text, stretch.start + len(stretch.tag), stretch.end)
                 if inner is not None:
                     retries -= 1
                     told = max(told, stretch.end)
-                    todo.extendleft(reversed(list(_stretches(text, inner.start(), stretch.end))))
+                    todo.extendleft(reversed(list(stretches(text, inner.start(), stretch.end))))
         else:
             broken = False
             yield block
@@ -201,116 +186,8 @@ def _begins(data: bytes) -> dict[tuple[int, str], int]:
     return begins
 
 
-class _Stretch(NamedTuple):
-    """text[start:end] is a document whose start tag is `tag`, or `fault` says why it cannot be one."""
-
-    start: int
-    end: int
-    tag: str = ""
-    fault: str = ""
-
-
-class _Mark(NamedTuple):
-    """text[start:end]: an "open", "close" or "whole" tag of <bml>, a "doctype", or to "skip" (a comment)."""
-
-    kind: str
-    start: int
-    end: int
-
-
-def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
-    """What decides where documents begin and end; linear in the text whatever it holds."""
-    never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
-    here = first
-    for n in count():
-        found = _MARKS.search(text, here, last)
-        if found is None:
-            return
-        if n == _MOST_MARKS:
-            raise BMLError(f"wanted at most {n} tags of <bml>, comments and the like in one text")
-        start, here = found.span()
-        opener = found[0]
-        if opener.startswith("</"):
-            yield _Mark("close", start, here)
-            continue
-        if opener not in _CLOSERS:
-            rest = _REST_OF_TAG.match(text, here, last)
-            here = rest.end() if rest else here
-            yield _Mark("whole" if rest and text[here - 2] == "/" else "open", start, here)
-            continue
-        doctype = opener == "<!DOCTYPE"
-        if doctype:
-            rest = _REST_OF_DOCTYPE.match(text, here, last)
-            here = rest.end() if rest else here
-            if rest is None or text[here - 1] == ">":
-                yield _Mark("doctype", start, here)
-                continue
-        closer = None if opener in never else _CLOSERS[opener].search(text, here, last)
-        if closer is None:
-            never.add(opener)
-        else:
-            here = closer.end()
-        if doctype:
-            yield _Mark("doctype", start, here)
-        elif closer is not None and opener != "<![CDATA[":
-            yield _Mark("skip", start, here)
-
-
-def _stretches(text: str, first: int = 0, last: int | None = None) -> Iterator[_Stretch]:
-    """Documents in text[first:last], and what stands between them that should not, in order."""
-    last = len(text) if last is None else last
-    marks = list(_marks(text, first, last))
-    ends: dict[int, int] = {}
-    opened: list[int] = []
-    for n, mark in enumerate(marks):
-        if mark.kind == "open":
-            opened.append(n)
-        elif mark.kind == "whole":
-            ends[n] = mark.end
-        elif mark.kind == "close" and opened:
-            ends[opened.pop()] = mark.end
-    roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
-    after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
-    here = first
-    junk = doctype = -1  # where the stretch began that is not told of yet; -1 while there is none
-    for n, mark in enumerate([*marks, _Mark("end", last, last)]):
-        if mark.start < here:
-            continue  # inside a document
-        if junk < 0:
-            between = _BETWEEN.match(text, here, mark.start)
-            junk = between.end() if between and between.end() < mark.start else -1
-        if junk < 0 and mark.kind == "close":
-            junk = mark.start
-        if doctype < 0 and mark.kind == "doctype":
-            doctype = mark.start if junk < 0 else junk
-        here = mark.end
-        if mark.kind not in ("open", "whole", "end"):
-            continue
-        end = ends.get(n) or after.get(n, last)
-        if mark.kind == "end":
-            if doctype >= 0:
-                yield _Stretch(doctype, here, fault=_NO_DTD)
-            elif junk >= 0:
-                yield _Stretch(junk, here, fault=_not_bml(text[junk:here]))
-        elif doctype >= 0:
-            yield _Stretch(doctype, end, text[mark.start : mark.end], _NO_DTD)
-        else:
-            if junk >= 0:
-                yield _Stretch(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
-            yield _Stretch(mark.start, end, text[mark.start : mark.end])
-        here = end
-        junk = doctype = -1
-
-
-_NO_DTD = "wanted a document without DTD and entities, got <!DOCTYPE"
-
-
-def _not_bml(text: str) -> str:
-    return f"wanted <bml>, got {shown(text.strip(_BLANKS))}"
-
-
 def _block(
-    text: str, stretch: _Stretch, line: int, vocabulary: Vocabulary, most_bytes: int, most_behaviours: int
+    text: str, stretch: Stretch, line: int, vocabulary: Vocabulary, most_bytes: int, most_behaviours: int
 ) -> Block:
     named = _ID.search(stretch.tag)
     id = (named[1] or named[2]) if named else None

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
-from bml_schema.behaviours import SpeechText, Sync
 from bml_schema.canonical import attributes
 from bml_schema.elements import Elements, Vocabulary
 from bml_schema.errors import (
@@ -27,9 +26,10 @@ from bml_schema.errors import (
     shown,
 )
 from bml_schema.losses import Losses
-from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Description, Required
+from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
+from bml_schema.outline import Entry, Outline, flat, made
 from bml_schema.shape import local, shape_of
-from bml_schema.sync_refs import Names, Points
+from bml_schema.sync_refs import Names
 from bml_schema.values import block_names, unwanted
 
 __all__ = ["MOST_BEHAVIOURS"]
@@ -40,8 +40,6 @@ _MOST_LISTED = 10  # lost references named in a warning's text; `Problem.lost` h
 _APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\s*\(([^()]*)\)\s*", re.IGNORECASE)
 _BLOCK_LISTS = {a.field for a in shape_of(Block).attributes.values() if a.value is block_names}
 _MOST_ID = 256  # characters of an id a warning repeats
-# A NamedTuple of thousands is made in a third of the time without its own `__new__`, which is Python.
-_tuple = tuple.__new__
 
 
 def read_block(
@@ -74,14 +72,20 @@ def read_block(
     except Fault as wrong:
         raise BMLError(wrong.text, line=line, path="/bml") from None
     names = elements.names = Names(values["id"])
-    reader = _Reader(elements, names, lines)
-    tree = reader.entries(root, "/bml", required=False)
-    entries = _flat(tree)
+    outline = Outline(elements, names)
+    tree = outline.entries(root, "/bml", required=False)
+    reader = _Reader(outline, lines)
+    entries = flat(tree)
     if len(entries) > most_behaviours:
         said = f"wanted at most {most_behaviours} behaviours and constraints in a block, got {len(entries)}"
         raise BMLError(said, line=line, path="/bml", block=names.block)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root)
+    for text, parent, path in outline.loose:
+        # Nobody's text, so the block's problem.
+        reader.problem(
+            names.block, Fault(f"wanted elements, got the text {shown(text)}", parent), path, parent
+        )
     nodes: dict[int, Behaviour | Constraint] = {}
     for n, entry in enumerate(entries):
         read = reader.constraint if entry.kind.tag == Constraint.tag else reader.behaviour
@@ -164,118 +168,21 @@ class _Lines(NamedTuple):
         return int(line or 1) + self.before
 
 
-class _Kind(NamedTuple):
-    """What children of the block of one tag have in common.
-
-    Attributes:
-        step: name in paths.
-        cls: None for a constraint and for what is unknown.
-        points: what references may name; None if that depends on the element, or nobody knows.
-    """
-
-    tag: str
-    step: str
-    cls: type[Behaviour] | None = None
-    points: Points | None = None
-
-
-def _kind_of(cls: type[Behaviour]) -> _Kind:
-    kind = _KINDS.get(cls)
-    if kind is None:
-        shape = shape_of(cls)
-        points = None if cls.marks or shape.strokes else Points(shape.points)
-        kind = _KINDS[cls] = _Kind(cls.tag, shape.name, cls, points)
-    return kind
-
-
-_KINDS: dict[type[Behaviour], _Kind] = {}
-
-
-class _Entry(NamedTuple):
-    """A child of the block: a behaviour, a constraint, or unknown."""
-
-    element: etree._Element
-    kind: _Kind
-    id: str
-    path: str
-    required: bool
-
-
 class _Reader:
     """What is known while one block is read."""
 
-    __slots__ = ("elements", "kinds", "line", "names", "owners", "places", "problems")
+    __slots__ = ("elements", "line", "names", "owners", "places", "problems")
 
-    def __init__(self, elements: Elements, names: Names, lines: _Lines) -> None:
-        self.elements = elements
-        self.names = names
+    def __init__(self, outline: Outline, lines: _Lines) -> None:
+        self.elements = outline.elements
+        self.names = outline.names
+        self.owners = outline.owners
         # Nearly always lxml's lines are those of the text.
         self.line: Callable[[etree._Element], int] = lines.of if any(lines) else attrgetter("sourceline")
-        self.kinds: dict[str, _Kind] = {}  # by tag as it stands
         self.problems: list[Problem] = []
         self.places: dict[str, Place] = {}
-        self.owners: dict[str, _Entry] = {}
 
-    # bml := (behaviour | constraint | required)*
-
-    def entries(self, parent: etree._Element, path: str, *, required: bool) -> list[_Entry | list[_Entry]]:
-        """What stands in a block, as a tree: a list for each <required>; one inside another adds nothing."""
-        tree: list[_Entry | list[_Entry]] = []
-        counts: dict[str, int] = {}
-        loose = parent.text
-        kinds = self.kinds
-        owners, points = self.owners, self.names.points
-        for element in parent:
-            raw: Any = element.tag
-            kind = kinds.get(raw)
-            if kind is None:
-                kind = kinds[raw] = self.kind(element)
-            step = kind.step
-            counts[step] = n = counts.get(step, 0) + 1
-            here = f"{path}/{step}[{n}]"
-            if not loose or loose.isspace():
-                loose = element.tail
-            if kind.tag == Required.tag:
-                inside = self.entries(element, here, required=True)
-                tree.append(_flat(inside))
-                continue
-            id = element.get("id", "").strip()
-            entry = _tuple(_Entry, (element, kind, id, here, required))
-            tree.append(entry)
-            # What references may say of it, before any is read.
-            if id and id not in owners and kind.tag != Constraint.tag:
-                owners[id] = entry
-                points[id] = kind.points or self.points(element, kind)
-        if loose and not loose.isspace():
-            # Nobody's text, so the block's problem.
-            fault = Fault(f"wanted elements, got the text {shown(loose.strip())}", parent)
-            self.problem(self.names.block, fault, path, parent)
-        return tree
-
-    def kind(self, element: etree._Element) -> _Kind:
-        tag = self.elements.tag(element)
-        cls = self.elements.vocabulary.get(tag)
-        return _Kind(tag, local(tag)) if cls is None else _kind_of(cls)
-
-    def points(self, element: etree._Element, kind: _Kind) -> Points | None:
-        """What references may name of an element whose kind does not tell."""
-        if kind.cls is None:
-            return None
-        names = shape_of(kind.cls).points
-        if not kind.cls.marks:
-            times = element.get("repetition", "1").strip()
-            return Points(names, int(times) if times.isdecimal() and len(times) < 6 else 1)
-        marks: list[str] = []
-        for child in element:
-            tag = self.elements.tag(child)
-            if tag == SpeechText.tag:
-                marks += [s.get("id", "").strip() for s in child if self.elements.tag(s) == Sync.tag]
-            elif tag == Description.tag:
-                # It may name points that the core text leaves out.
-                marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]
-        return Points(names.union(m for m in marks if ":" not in m) if marks else names)
-
-    def behaviour(self, entry: _Entry) -> Behaviour | None:
+    def behaviour(self, entry: Entry) -> Behaviour | None:
         """The node of an entry; None, and a Problem, if it is dropped."""
         element = entry.element
         try:
@@ -292,10 +199,10 @@ class _Reader:
             id = entry.id if 0 < len(entry.id) <= _MOST_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
-        self.places[node.id] = _tuple(Place, (self.line(element), entry.path))
+        self.places[node.id] = made(Place, (self.line(element), entry.path))
         return node
 
-    def unknown(self, entry: _Entry) -> Fault:
+    def unknown(self, entry: Entry) -> Fault:
         tag, element = entry.kind.tag, entry.element
         standard = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
         if not tag.startswith(standard):
@@ -310,7 +217,7 @@ class _Reader:
             )
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
-    def constraint(self, entry: _Entry) -> Constraint | None:
+    def constraint(self, entry: Entry) -> Constraint | None:
         """The node of an entry; None, and a Problem, if it is dropped."""
         element = entry.element
         try:
@@ -357,12 +264,8 @@ class _Reader:
         )
 
 
-def _flat(tree: list[_Entry | list[_Entry]]) -> list[_Entry]:
-    return [e for item in tree for e in (item if isinstance(item, list) else (item,))]
-
-
 def _grouped(
-    tree: list[_Entry | list[_Entry]], nodes: Mapping[int, Behaviour | Constraint]
+    tree: list[Entry | list[Entry]], nodes: Mapping[int, Behaviour | Constraint]
 ) -> tuple[Behaviour | Required | Constraint, ...]:
     """The nodes that are left, in the tree of their entries."""
     if list not in map(type, tree):

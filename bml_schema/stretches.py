@@ -1,0 +1,137 @@
+"""Text that holds documents in, the stretches of it that are documents, or are not but should be, out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import count
+from typing import NamedTuple
+
+from bml_schema.errors import BMLError, shown
+
+__all__: list[str] = []
+
+_MOST_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
+
+# What decides where a document begins and ends, and what may hide such marks.
+_MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml\s*>")
+NEXT = re.compile(r"<(?:[\w.-]+:)?bml(?=[\s/>])")
+_REST_OF_TAG = re.compile(r"""(?:[^<>"']|"[^<"]*"|'[^<']*')*+>""")
+_REST_OF_DOCTYPE = re.compile(r"""(?:[^<>"'\[]|"[^<"]*"|'[^<']*')*+[>\[]""")
+_CLOSERS = {
+    "<!--": re.compile("-->"),
+    "<![CDATA[": re.compile(r"\]\]>"),
+    "<?": re.compile(r"\?>"),
+    "<!DOCTYPE": re.compile(r"\]\s*>"),
+}
+_BLANKS = " \t\r\n\ufeff"
+# What may stand between documents; SmartBody wraps its own in <act>.
+_BETWEEN = re.compile(rf"(?:[{_BLANKS}]|</?act(?=[\s/>])[^<>]*>|</?participant(?=[\s/>])[^<>]*>)*+")
+
+
+class Stretch(NamedTuple):
+    """text[start:end] is a document whose start tag is `tag`, or `fault` says why it cannot be one."""
+
+    start: int
+    end: int
+    tag: str = ""
+    fault: str = ""
+
+
+class _Mark(NamedTuple):
+    """text[start:end]: an "open", "close" or "whole" tag of <bml>, a "doctype", or to "skip" (a comment)."""
+
+    kind: str
+    start: int
+    end: int
+
+
+def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
+    """What decides where documents begin and end; linear in the text whatever it holds."""
+    never: set[str] = set()  # closers that do not come any more: looked for once, not for each opener
+    here = first
+    for n in count():
+        found = _MARKS.search(text, here, last)
+        if found is None:
+            return
+        if n == _MOST_MARKS:
+            raise BMLError(f"wanted at most {n} tags of <bml>, comments and the like in one text")
+        start, here = found.span()
+        opener = found[0]
+        if opener.startswith("</"):
+            yield _Mark("close", start, here)
+            continue
+        if opener not in _CLOSERS:
+            rest = _REST_OF_TAG.match(text, here, last)
+            here = rest.end() if rest else here
+            yield _Mark("whole" if rest and text[here - 2] == "/" else "open", start, here)
+            continue
+        doctype = opener == "<!DOCTYPE"
+        if doctype:
+            rest = _REST_OF_DOCTYPE.match(text, here, last)
+            here = rest.end() if rest else here
+            if rest is None or text[here - 1] == ">":
+                yield _Mark("doctype", start, here)
+                continue
+        closer = None if opener in never else _CLOSERS[opener].search(text, here, last)
+        if closer is None:
+            never.add(opener)
+        else:
+            here = closer.end()
+        if doctype:
+            yield _Mark("doctype", start, here)
+        elif closer is not None and opener != "<![CDATA[":
+            yield _Mark("skip", start, here)
+
+
+def stretches(text: str, first: int = 0, last: int | None = None) -> Iterator[Stretch]:
+    """Documents in text[first:last], and what stands between them that should not, in order."""
+    last = len(text) if last is None else last
+    marks = list(_marks(text, first, last))
+    ends: dict[int, int] = {}
+    opened: list[int] = []
+    for n, mark in enumerate(marks):
+        if mark.kind == "open":
+            opened.append(n)
+        elif mark.kind == "whole":
+            ends[n] = mark.end
+        elif mark.kind == "close" and opened:
+            ends[opened.pop()] = mark.end
+    roots = [n for n, mark in enumerate(marks) if mark.kind in ("open", "whole")]
+    after = dict(zip(roots, [marks[n].start for n in roots[1:]], strict=False))
+    here = first
+    junk = doctype = -1  # where the stretch began that is not told of yet; -1 while there is none
+    for n, mark in enumerate([*marks, _Mark("end", last, last)]):
+        if mark.start < here:
+            continue  # inside a document
+        if junk < 0:
+            between = _BETWEEN.match(text, here, mark.start)
+            junk = between.end() if between and between.end() < mark.start else -1
+        if junk < 0 and mark.kind == "close":
+            junk = mark.start
+        if doctype < 0 and mark.kind == "doctype":
+            doctype = mark.start if junk < 0 else junk
+        here = mark.end
+        if mark.kind not in ("open", "whole", "end"):
+            continue
+        end = ends.get(n) or after.get(n, last)
+        if mark.kind == "end":
+            if doctype >= 0:
+                yield Stretch(doctype, here, fault=_NO_DTD)
+            elif junk >= 0:
+                yield Stretch(junk, here, fault=_not_bml(text[junk:here]))
+        elif doctype >= 0:
+            yield Stretch(doctype, end, text[mark.start : mark.end], _NO_DTD)
+        else:
+            if junk >= 0:
+                yield Stretch(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
+            yield Stretch(mark.start, end, text[mark.start : mark.end])
+        here = end
+        junk = doctype = -1
+
+
+_NO_DTD = "wanted a document without DTD and entities, got <!DOCTYPE"
+
+
+def _not_bml(text: str) -> str:
+    return f"wanted <bml>, got {shown(text.strip(_BLANKS))}"
