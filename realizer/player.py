@@ -70,7 +70,7 @@ class Player:
 
     @property
     def revision(self) -> int:
-        return self._blocks.revision
+        return self._blocks.course.revision
 
     # documents in -------------------------------------------------------------------------------
 
@@ -162,7 +162,7 @@ class Player:
             KeyError: no such AU or FAP.
         """
         self._characters[character].set_direct(values, now)
-        self._blocks.changed()
+        self._blocks.course.changed()
 
     # feedback out -------------------------------------------------------------------------------
 

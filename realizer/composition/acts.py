@@ -50,9 +50,9 @@ def _interrupt(blocks: Ensemble, act: Interrupt, now: float) -> None:
     chosen = (named if act.include is None else act.include) - act.exclude
     left = target.unfinished(now)
     if (act.include is None and not act.exclude) or (left and left <= chosen):
-        blocks.stop(target, now)
+        blocks.course.stop(target, now)
     elif left & chosen:
-        blocks.cut(target, left & chosen, now)
+        blocks.course.cut(target, left & chosen, now)
 
 
 def _change(blocks: Ensemble, act: Change, now: float, until: float) -> None:
@@ -78,4 +78,4 @@ def _change(blocks: Ensemble, act: Change, now: float, until: float) -> None:
     else:
         gains.append(Gain(soon if gains else now, until, act.to / whole, act.curve))
     target.scale(act.behaviour, gains, sound=sound)
-    blocks.changed()
+    blocks.course.changed()

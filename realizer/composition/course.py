@@ -1,0 +1,212 @@
+"""The blocks that were accepted: laid on the clock, moved, solved again, cut off, stopped as they depend."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from bml_schema import Block
+from realizer.behaviours.kind import Kind, World
+from realizer.composition import relations
+from realizer.composition.calendar import Calendar
+from realizer.composition.cast import Cast
+from realizer.composition.character import Character
+from realizer.composition.playing import Playing
+from realizer.composition.references import references
+from realizer.composition.reporting import Reports, State, prediction, progress
+from realizer.composition.retiming import member, touched
+from realizer.planning import Plan
+from realizer.planning import plan as plan_block
+from realizer.scheduling import schedule_together
+from realizer.scheduling.timing import Schedule, Warning
+
+__all__ = ["Course"]
+
+FOREVER = float("inf")
+
+
+class Course:
+    """When accepted blocks play, and what becomes of them.
+
+    Args:
+        kinds: tag -> Kind.
+        characters: whose base states the blocks shift; shared with who made them.
+
+    Attributes:
+        revision: rises whenever what is shown changes.
+        cast: the blocks.
+        calendar: what is still to happen in them.
+        reports: the feedback that is owed.
+    """
+
+    def __init__(self, kinds: Mapping[str, Kind], characters: Sequence[Character]) -> None:
+        self.kinds = kinds
+        self.characters = characters
+        self.revision = 0
+        self.cast = Cast()
+        self.calendar = Calendar()
+        self.reports = Reports()
+        self._order = 0
+
+    def plan(
+        self,
+        block: Block,
+        character: int,
+        world: World,
+        start: float,
+        now: float,
+        without: Collection[Playing],
+    ) -> tuple[Plan, list[Playing]]:
+        """The plan of a block beside those that are alive, `without` some, and whom it is solved with.
+
+        While it is not known when it starts, it is planned as if that were now, and moves nobody.
+        """
+        known = start < FOREVER
+        origin = start if known else now
+        alive = [p for p in self.cast.alive() if p not in without]
+        others = touched([block], alive, now) if known else []
+        planned = plan_block(
+            block,
+            self.kinds,
+            world,
+            start=origin,
+            outside=relations.instants(self.cast.schedule_of, origin),
+            held=relations.held(character, alive),
+            others=[member(p, origin, now) for p in others],
+        )
+        return planned, others
+
+    def set_out(self, playing: Playing) -> None:
+        """A block has a new start: it shifts base states then, and its events are due."""
+        self.characters[playing.character].shift(playing.shifts.values())
+        playing.order = self._order
+        self._order += 1
+        if playing.start < FOREVER:
+            self.calendar.put(playing)
+            self.changed()
+
+    def line_up(self, playing: Playing) -> None:
+        """Let a waiting block, and those that follow it, report after all others at one instant."""
+        line = deque([playing])
+        while line:
+            first = line.popleft()
+            line += [other for other in first.followers if other.waiting]
+            first.order = self._order
+            self._order += 1
+            if first.start < FOREVER:
+                self.calendar.drop(first)
+                self.calendar.put(first)
+
+    def follow(self, playing: Playing, now: float) -> None:
+        """A block's times have changed: those that wait for it, and for them, may start at another time."""
+        moved = deque([playing])
+        while moved:
+            for other in list(moved.popleft().followers):
+                if other.waiting and self.move(other, now):
+                    moved.append(other)
+
+    def move(self, playing: Playing, now: float) -> bool:
+        """Let a waiting block start when it now may; False where that is when it was to."""
+        start = playing.earliest
+        if start == playing.start:
+            return False
+        self.calendar.drop(playing)
+        self._withdraw_shifts(playing, playing.shifts.keys(), now)
+        planned = playing.plan
+        others: list[Playing] = []
+        refers = any(ref.block is not None for ref in references(playing.block))
+        if start < FOREVER and (playing.start == FOREVER or refers):
+            # Its claims were never compared, or its references have other times from the new start.
+            planned, others = self.plan(
+                playing.block, playing.character, playing.world, start, now, [playing]
+            )
+            if planned.schedule.failed:
+                self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
+                self.stop(playing, now)
+                return False
+            told = {w.id for w in playing.schedule.warnings}
+            for warning in planned.schedule.warnings:
+                if warning.id not in told:
+                    self.reports.warn(warning, playing.block.character_id)
+        playing.lay(planned, start)
+        self.set_out(playing)
+        self.predict(playing, now)
+        if others:
+            self.retime(others, planned.moved, now)
+        return True
+
+    def retime(self, blocks: Sequence[Playing], schedules: Sequence[Schedule], now: float) -> None:
+        """Give blocks other times, each from its own start; what follows them follows."""
+        for playing, schedule in zip(blocks, schedules, strict=True):
+            if playing.done:
+                continue
+            pending = self.calendar.pending(playing)
+            before = dict(playing.shifts)
+            changed = playing.retime(schedule, now)
+            if not changed:
+                continue
+            self.characters[playing.character].exchange(before, playing.shifts)
+            self.calendar.drop(playing)
+            self.calendar.put(playing, None if playing.waiting else pending)
+            self.changed()
+            self.predict(playing, now, changed)
+            self.follow(playing, now)
+
+    def tied(self, playing: Playing, now: float) -> list[Playing]:
+        """The other blocks that are solved together with one."""
+        return [p for p in touched([playing.block], self.cast.alive(), now) if p is not playing]
+
+    def solve_again(self, blocks: Sequence[Playing], origin: float, now: float) -> None:
+        """Give blocks that play the times that now fit best."""
+        members = [member(p, origin, now) for p in blocks]
+        instants = relations.instants(self.cast.schedule_of, origin)
+        found = schedule_together(members, outside=instants)
+        if not found[0].failed:
+            self.retime(blocks, found, now)
+            return
+        why = found[0].warnings[0].text
+        for playing in blocks:
+            told = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
+            self.reports.warn(told, playing.block.character_id)
+
+    def stop(self, playing: Playing, now: float) -> None:
+        """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
+        self.calendar.drop(playing)
+        state = State.INTERRUPTED if playing.begun else State.REVOKED
+        self._withdraw_shifts(playing, playing.shifts.keys(), now)
+        playing.cut(list(playing.schedule.times), now, ends=True)
+        playing.stopped, playing.state = now, state
+        self.cast.end(playing)
+        self.reports.tell(progress(playing.block, "end", now, state))
+        self.changed()
+        self.follow(playing, now)
+
+    def cut(self, playing: Playing, behaviours: Collection[str], now: float) -> None:
+        """End some behaviours of a block; the block ends with the last of the others."""
+        pending = self.calendar.pending(playing)
+        self.calendar.drop(playing)
+        self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
+        playing.cut(behaviours, now)
+        self.calendar.put(playing, pending)
+        self.changed()
+        self.predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
+        if others := self.tied(playing, now):
+            self.solve_again([*others], playing.start, now)
+        self.follow(playing, now)
+
+    def predict(self, playing: Playing, now: float, behaviours: Iterable[str] | None = None) -> None:
+        schedule = playing.schedule
+        if schedule.start == FOREVER:
+            schedule = replace(schedule, start=now)  # as if it were activated now
+        syncs = schedule.behaviours
+        told = syncs if behaviours is None else {b: syncs[b] for b in behaviours}
+        self.reports.tell(prediction(playing.block, schedule, playing.state, told))
+
+    def changed(self) -> None:
+        """What is or will be shown is not what it was."""
+        self.revision += 1
+
+    def _withdraw_shifts(self, playing: Playing, behaviours: Iterable[str], now: float) -> None:
+        gone = [playing.shifts[b] for b in behaviours]
+        self.characters[playing.character].cancel(gone, now)
