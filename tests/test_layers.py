@@ -49,6 +49,14 @@ MAY: dict[str, set[str]] = {
         "realizer.speech.utterance",
         "realizer.tables",
     },
+    "realizer.charts": VALUES
+    | {
+        "bml_schema",
+        "realizer.charts",
+        "realizer.composition",
+        "realizer.outputs.files",
+        "realizer.scheduling.timing",
+    },
     "realizer.planning": VALUES
     | {
         "bml_schema",

@@ -1,0 +1,167 @@
+"""A block and its schedule in, what ties its sync points out: to what, by what, with how much room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from bml_schema import After, Before, Block, Constraint, Speech, Synchronize, SyncRef
+from realizer.scheduling.timing import Schedule
+
+__all__ = ["Link", "links_of"]
+
+# An order with less room than this binds.
+BINDS = 1e-6  # s
+_MIRROR = {"before": "after", "after": "before"}
+
+
+@dataclass(frozen=True)
+class Link:
+    """A sync point is at, not after, or not before another point and `offset` seconds.
+
+    Attributes:
+        sync: the point, of the behaviour that has the link.
+        kind: attribute, text (a <sync> inside speech), synchronize, before or after.
+        block, behaviour, other: the other point; behaviour None is the start of the block, and the offset a
+            time. A block of None is the own one.
+        slack: of before and after: seconds that the point could still move before this binds; None where it
+            ties, or where the other point's time is not known.
+        line, constraint, required: of what states it.
+    """
+
+    sync: str
+    kind: str
+    block: str | None
+    behaviour: str | None
+    other: str | None
+    offset: float
+    slack: float | None = None
+    line: int | None = None
+    constraint: str | None = None
+    required: bool = False
+
+    @property
+    def binds(self) -> bool:
+        """An order that holds the point where it is."""
+        return self.slack is not None and self.slack < BINDS
+
+    @property
+    def target(self) -> str | None:
+        """The other point as documents name it; None for the start of the block."""
+        if self.behaviour is None:
+            return None
+        return ":".join(filter(None, (self.block, self.behaviour, self.other)))
+
+    def to_json(self) -> dict[str, Any]:
+        out: dict[str, Any] = {"sync": self.sync, "kind": self.kind, "to": self.target}
+        out["offset"] = round(self.offset, 6)
+        if self.kind in _MIRROR:
+            out["slack"] = None if self.slack is None else round(self.slack, 6)
+        if self.constraint is not None:
+            out["constraint"] = self.constraint
+        return out | {"line": self.line, "required": self.required}
+
+
+def links_of(
+    block: Block, schedule: Schedule, outside: Callable[[SyncRef], float | None]
+) -> dict[str, list[Link]]:
+    """Behaviour id -> its links.
+
+    Args:
+        outside: a reference into another block, its offset included -> seconds from this block's start.
+    """
+    found = _Links(block, schedule, outside)
+    for node in block.behaviours:
+        for sync, ref in node.syncs.items():
+            found.tie(node.id, sync, "attribute", ref)
+        if isinstance(node, Speech) and node.text is not None:
+            for mark in node.text.parts:
+                if not isinstance(mark, str) and mark.ref is not None:
+                    found.tie(node.id, mark.id, "text", mark.ref)
+    for constraint in block.constraints:
+        found.constrain(constraint)
+    return found.links
+
+
+class _Links:
+    """The links of a block while they are collected."""
+
+    def __init__(self, block: Block, schedule: Schedule, outside: Callable[[SyncRef], float | None]) -> None:
+        self.block, self.schedule, self.outside = block, schedule, outside
+        self.links: dict[str, list[Link]] = {}
+
+    def tie(self, behaviour: str, sync: str, kind: str, ref: SyncRef) -> None:
+        place = self.block.places.get(behaviour)
+        link = Link(sync, kind, *self._other(ref), ref.offset, line=place.line if place else None)
+        self.add(behaviour, replace(link, required=behaviour in self.block.required))
+
+    def constrain(self, constraint: Constraint) -> None:
+        place = self.block.places.get(constraint.id) if constraint.id else constraint.place
+        for kind, here, there in _pairs(constraint):
+            if not self._is_own(here):
+                if not self._is_own(there):
+                    continue
+                # Said of a number or of another block: the same, from this block's point of view.
+                kind, here, there = _MIRROR.get(kind, kind), there, here
+            slack = None
+            if kind in _MIRROR:
+                first, last = (here, there) if kind == "before" else (there, here)
+                begin, end = self._time(first), self._time(last)
+                slack = None if begin is None or end is None else end - begin
+            link = Link(
+                _sync(here),
+                kind,
+                *self._other(there),
+                there.offset - here.offset,
+                slack,
+                place.line if place else None,
+                constraint.id,
+                constraint.required,
+            )
+            self.add(here.behaviour or "", link)
+
+    def add(self, behaviour: str, link: Link) -> None:
+        points = self.schedule.points
+        if link.sync not in points.get(behaviour, ()):
+            return
+        own = link.block is None and link.behaviour is not None
+        if own and link.other not in points.get(link.behaviour or "", ()):
+            return
+        self.links.setdefault(behaviour, []).append(link)
+
+    def _is_own(self, ref: SyncRef) -> bool:
+        return ref.block in (None, self.block.id) and ref.behaviour not in (None, "bml")
+
+    def _other(self, ref: SyncRef) -> tuple[str | None, str | None, str | None]:
+        own = ref.block in (None, self.block.id)
+        if ref.behaviour is None or (own and ref.behaviour == "bml"):
+            return None, None, None
+        return (None if own else ref.block), ref.behaviour, _sync(ref)
+
+    def _time(self, ref: SyncRef) -> float | None:
+        """Seconds from block start, the offset included."""
+        if ref.block not in (None, self.block.id):
+            return self.outside(ref)
+        if ref.behaviour in (None, "bml"):
+            return ref.offset
+        try:
+            return self.schedule.at(ref.behaviour or "", _sync(ref)) + ref.offset
+        except KeyError:
+            return None
+
+
+def _sync(ref: SyncRef) -> str:
+    return f"{ref.sync}:{ref.index}" if ref.index is not None else ref.sync or ""
+
+
+def _pairs(constraint: Constraint) -> Iterator[tuple[str, SyncRef, SyncRef]]:
+    """(kind, what is constrained, to what) for all that a constraint says."""
+    for part in constraint.parts:
+        match part:
+            case Synchronize():
+                yield from (("synchronize", ref, part.refs[0]) for ref in part.refs[1:])
+            case Before():
+                yield from (("before", ref, part.ref) for ref in part.refs)
+            case After():
+                yield from (("after", ref, part.ref) for ref in part.refs)

@@ -1,0 +1,21 @@
+"""Documents played without a clock and without a voice, as the data of charts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from realizer.charts.timeline import BlockLine, lines_of
+from realizer.pipeline import play
+from realizer.player import Player
+
+
+@pytest.fixture
+def lines() -> Callable[..., list[BlockLine]]:
+    def of(*documents: str) -> list[BlockLine]:
+        player = Player(idle=False)
+        schedules, _ = play(documents, player, "silent")
+        return lines_of(player.cast, schedules)
+
+    return of

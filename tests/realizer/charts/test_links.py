@@ -1,0 +1,90 @@
+"""What ties sync points, and how much room before and after leave."""
+
+from __future__ import annotations
+
+import pytest
+
+BLOCK = """<bml id="b"><wait id="w" start="1" duration="1"/><wait id="v" {} duration="1"/>{}</bml>"""
+
+
+def of(block, behaviour):
+    return next(line for line in block.lines if line.id == behaviour).links
+
+
+def test_an_attribute_is_a_link_to_its_point(lines) -> None:
+    (block,) = lines(BLOCK.format('start="w:end+0.5"', ""))
+    (link,) = of(block, "v")
+    assert (link.sync, link.kind, link.target, link.offset) == ("start", "attribute", "w:end", 0.5)
+    assert (link.slack, link.binds, link.line) == (None, False, 1)
+
+
+def test_a_number_is_a_link_to_the_start_of_the_block(lines) -> None:
+    (block,) = lines(BLOCK.format("", ""))
+    (link,) = of(block, "w")
+    assert (link.sync, link.target, link.offset) == ("start", None, 1.0)
+
+
+def test_a_sync_in_speech_that_says_a_time_is_a_link(lines) -> None:
+    (block,) = lines(
+        '<bml id="b"><wait id="w" start="3" duration="1"/>'
+        '<speech id="s"><text>now <sync id="t" ref="w:start"/> then</text></speech></bml>'
+    )
+    (link,) = of(block, "s")
+    assert (link.sync, link.kind, link.target) == ("t", "text", "w:start")
+
+
+def test_synchronize_ties_all_its_points_to_the_first(lines) -> None:
+    said = (
+        '<constraint id="c"><synchronize>'
+        '<sync ref="w:end+0.2"/><sync ref="v:start+0.5"/></synchronize></constraint>'
+    )
+    (block,) = lines(BLOCK.format("", said))
+    (link,) = of(block, "v")
+    assert (link.kind, link.target, link.constraint) == ("synchronize", "w:end", "c")
+    assert link.offset == pytest.approx(-0.3)
+    start = next(p.time for line in block.lines for p in line.points if line.id == "v")
+    assert start == pytest.approx(2.0 + link.offset)
+
+
+def test_synchronize_with_a_number_is_told_of_the_point_not_of_the_number(lines) -> None:
+    said = '<constraint><synchronize><sync ref="3"/><sync ref="v:start"/></synchronize></constraint>'
+    (block,) = lines(BLOCK.format("", said))
+    (link,) = of(block, "v")
+    assert (link.sync, link.target, link.offset) == ("start", None, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("said", "slack"),
+    [
+        ('<before ref="w:end"><sync ref="v:start"/></before>', 2.0),
+        ('<before ref="w:end-1.5"><sync ref="v:start"/></before>', 0.5),
+        ('<before ref="w:end"><sync ref="v:start+0.25"/></before>', 1.75),
+        ('<after ref="w:end"><sync ref="v:start"/></after>', 0.0),
+        ('<before ref="7"><sync ref="v:end"/></before>', 6.0),
+    ],
+)
+def test_before_and_after_say_how_much_room_is_left(lines, said: str, slack: float) -> None:
+    (block,) = lines(BLOCK.format("", f"<constraint>{said}</constraint>"))
+    (link,) = of(block, "v")
+    assert link.slack == pytest.approx(slack, abs=1e-9)
+    assert link.binds == (slack == 0.0)
+
+
+def test_what_is_said_of_another_block_is_told_of_the_own_point(lines) -> None:
+    _, block = lines(
+        '<bml id="a"><wait id="x" duration="3"/></bml>',
+        '<bml id="b"><wait id="w" start="1" duration="1"/>'
+        '<constraint><after ref="w:end"><sync ref="a:x:end"/></after></constraint></bml>',
+    )
+    link = of(block, "w")[1]
+    assert (link.sync, link.kind, link.target) == ("end", "before", "a:x:end")
+    assert link.slack == pytest.approx(1.0)
+    assert link.to_json() == {
+        "sync": "end",
+        "kind": "before",
+        "to": "a:x:end",
+        "offset": 0.0,
+        "slack": 1.0,
+        "line": 1,
+        "required": False,
+    }
