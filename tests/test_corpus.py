@@ -20,6 +20,7 @@ from bml_schema import (
 )
 from bml_schema.shape import shape_of
 from realizer.animation.curves import gain_at
+from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from tests.cases import CASES, Case, Instant, Told
 from tests.stage import Played, play
@@ -234,6 +235,27 @@ def test_nothing_is_warned_of_twice(case: Case) -> None:
             warned.add(feedback.id)
         elif isinstance(feedback, BlockProgress) and feedback.id.endswith(":end"):
             warned = {id for id in warned if not id.startswith(feedback.id.removesuffix("end"))}
+
+
+# What lasts a hundredth of a second cannot but jump.
+UNHURRIED = [case for case in CASES if "behaviour.short" not in case.proves]
+
+
+@pytest.mark.parametrize("case", UNHURRIED, ids=[case.name for case in UNHURRIED])
+def test_no_face_jumps_when_something_happens(case: Case) -> None:
+    """Where a block starts, is replaced or interrupted, where a point passes and a plan changes."""
+    played = plain(case)
+    times = {*case.wanted.get("sent", ()), *(time for line in played.log for time in line.times)}
+    around = [(time - 1e-4, time + 1e-4) for time in sorted(times) if time > 0]
+    for character in {f.character_id for f in played.feedback}:
+        watches = [Instant(time, character) for pair in around for time in pair]
+        film = play(case, watches=watches).film
+        for before, after in around:
+            old, new = (
+                np.array([film[Instant(time, character)][au] for au in AU_NAMES()])
+                for time in (before, after)
+            )
+            assert np.abs(new - old).max() < 0.02, f"at {after:.3f}"
 
 
 # A behaviour that is interrupted does not pass all its points.
