@@ -17,7 +17,7 @@ __all__ = ["explain_clash"]
 _CLAUSE = re.compile(
     r"(\S+) (?:is )?(=|not before|not after) ([^,()]+?) \((?:(constraint)(?: ([^,)]+))?, )?line (\d+)\)"
 )
-_UNPLACED = re.compile(r"\S+ takes (?:at least|exactly) [\d.e+-]+ s from (?:its start|\S+) to [^\s,;]+")
+_UNPLACED = re.compile(r"\S+ takes (?:at least|at most|exactly) [\d.e+-]+ s from (?:its start|\S+) to [^\s,;]+")
 _CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
 _ASTRAY = re.compile(
     r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"

@@ -42,19 +42,24 @@ class Clash:
     Attributes:
         relations: the equalities and orders, in the order in which they chain.
         gaps: least and greatest lengths, one for each stretch of a behaviour.
-        earliest: what starts too soon and the bound, seconds; None where no bound takes part.
+        earliest: what starts too soon, its point and the bound, seconds; None where no bound takes part.
         named: the behaviours whose points occur, whether or not they state or hinder anything themselves.
     """
 
     relations: tuple[Relation, ...]
     gaps: tuple[Gap, ...] = ()
-    earliest: tuple[str, float] | None = None
+    earliest: tuple[Part, str, float] | None = None
     named: tuple[Part, ...] = ()
 
     @property
     def parts(self) -> list[Part]:
         """What states or needs something in the clash, each once."""
         return _once([r.part for r in self.relations] + [g.part for g in self.gaps])
+
+    @property
+    def statements(self) -> int:
+        """How many things have to be said to explain it."""
+        return len(self.relations) + len(self.gaps) + (self.earliest is not None)
 
 
 class Web:
@@ -87,6 +92,12 @@ class Web:
             relations += self._chain(link.v, after.u)
         return _clash(self.problem, relations, links)
 
+    def clash(self, steps: Sequence[tuple[int, float, Relation | Link]]) -> Clash:
+        """A cycle of steps, each to a point by some seconds, and what says so."""
+        links = [why for *_, why in steps if isinstance(why, Link)]
+        relations = [why if isinstance(why, Relation) else why.order for *_, why in steps]
+        return _clash(self.problem, [r for r in relations if r is not None], links)
+
     def _chain(self, begin: int, end: int) -> list[Relation]:
         """The fewest equalities that tie one point to another."""
         came: dict[int, tuple[int, Relation] | None] = {begin: None}
@@ -113,7 +124,8 @@ def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link
         if link.order is not None:
             continue
         if link.u == ORIGIN:
-            earliest = (problem.name_of(link.v), problem.earliest[problem.owner[link.v]])
+            b = problem.owner[link.v]
+            earliest = (problem.behaviours[b], problem.name_of(link.v), problem.earliest[b])
             continue
         b = problem.owner[link.u]
         part, names, first = problem.behaviours[b], problem.timings[b].points, problem.first[b]

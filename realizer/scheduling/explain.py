@@ -6,9 +6,9 @@ from collections.abc import Collection, Sequence
 
 from realizer.scheduling.clash import Clash, Gap
 from realizer.scheduling.problem import Part, Relation
-from realizer.scheduling.timing import Warning
+from realizer.scheduling.timing import Clause, Warning
 
-__all__ = ["IMPOSSIBLE", "choose", "fault_warning", "in_words", "refusal", "warning_of"]
+__all__ = ["IMPOSSIBLE", "choose", "clauses", "fault_warning", "in_words", "refusal", "warning_of"]
 
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
 
@@ -31,28 +31,40 @@ def warning_of(clash: Clash, dropped: Part) -> Warning:
     else:
         reason = _reason(clash, dropped)
         text = f"{name} cannot be placed: {in_words(clash)}; {name} was dropped because {reason}"
-    return Warning(dropped.id, IMPOSSIBLE, text)
+    return Warning(dropped.id, IMPOSSIBLE, text, clauses(clash))
 
 
 def refusal(block: str, clash: Clash) -> Warning:
     """The warning of a block that fails, because everything in the clash is required."""
-    return Warning(block, IMPOSSIBLE, f"{in_words(clash)}, and all of this is required")
+    text = f"{in_words(clash)}, and all of this is required"
+    return Warning(block, IMPOSSIBLE, text, clauses(clash))
 
 
 def fault_warning(part: Part, text: str) -> Warning:
     """The warning of a part that refers to what is not there."""
     name = part.name or "a constraint"
-    return Warning(part.id, IMPOSSIBLE, f"{name} was dropped{_where(part)}: {text}")
+    return Warning(part.id, IMPOSSIBLE, f"{name} was dropped{_placed(part, part.line)}: {text}")
 
 
 def in_words(clash: Clash) -> str:
     """The clash as the clauses of one sentence, in the order in which they chain."""
-    clauses = [_relation(r) for r in clash.relations] + [_gap(g) for g in clash.gaps]
-    if clash.earliest is not None:
-        point, seconds = clash.earliest
-        clauses.append(f"{point} is not before {_seconds(seconds)}")
-    unique = list(dict.fromkeys(clauses))
+    said = [f"{clause.text}{_placed(part, clause.line)}" for part, clause in _clauses(clash)]
+    unique = list(dict.fromkeys(said))
     return f"{_join(unique)} cannot {'all ' if len(unique) > 2 else 'both ' if len(unique) > 1 else ''}hold"
+
+
+def clauses(clash: Clash) -> tuple[Clause, ...]:
+    """The clash as things to read or to process one by one."""
+    return tuple(dict.fromkeys(clause for _, clause in _clauses(clash)))
+
+
+def _clauses(clash: Clash) -> list[tuple[Part, Clause]]:
+    said = [(r.part, _relation(r)) for r in clash.relations] + [(g.part, _gap(g)) for g in clash.gaps]
+    found = [(part, Clause(part.id, part.line, text)) for part, text in said]
+    if clash.earliest is not None:
+        part, point, seconds = clash.earliest
+        found.append((part, Clause(part.id, None, f"{point} is not before {_seconds(seconds)}")))
+    return found
 
 
 def _candidates(clash: Clash) -> Collection[Part]:
@@ -73,16 +85,15 @@ def _reason(clash: Clash, dropped: Part) -> str:
 
 def _relation(relation: Relation) -> str:
     left, sign, right = relation.says
-    part = relation.part
     if sign == "rigid":
         return f"{left} takes exactly {_seconds(relation.seconds)} from its start to {right}"
-    return f"{left} {'is ' if sign != '=' else ''}{sign} {right}{_where(part)}"
+    return f"{left} {'is ' if sign != '=' else ''}{sign} {right}"
 
 
-def _where(part: Part) -> str:
+def _placed(part: Part, line: int | None) -> str:
     words = [f"constraint {part.name}".strip()] if part.is_constraint else []
-    if part.line is not None:
-        words.append(f"line {part.line}")
+    if line is not None:
+        words.append(f"line {line}")
     return f" ({', '.join(words)})" if words else ""
 
 

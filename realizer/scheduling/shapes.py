@@ -136,33 +136,32 @@ def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool,
     Returns:
         (m,) float64.
     """
-    m = len(x)
     free = np.flatnonzero(~fixed)
-    if not len(free):
+    n = len(free)
+    if not n:
         return x
+    # Node n stands for all that are fixed, and falls away.
+    number = np.full(len(x), n)
+    all_free = np.arange(n)
+    number[free] = all_free
     pull = stiffness * (wanted - (x[j] * fixed[j] - x[i] * fixed[i]))
-    right = np.bincount(j, pull, m) - np.bincount(i, pull, m)
-    if len(free) < SPARSE_FROM:
-        matrix = np.bincount(
-            np.concatenate([i * m + j, j * m + i, i * m + i, j * m + j]),
-            np.concatenate([-stiffness, -stiffness, stiffness, stiffness]),
-            m * m,
-        ).reshape(m, m)
-        found = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+    i, j = number[i], number[j]
+    right = (np.bincount(j, pull, n + 1) - np.bincount(i, pull, n + 1))[:n]
+    between = (i < n) & (j < n)
+    one, other, stiff = i[between], j[between], -stiffness[between]
+    whole = (np.bincount(i, stiffness, n + 1) + np.bincount(j, stiffness, n + 1))[:n]
+    rows, columns = np.concatenate([one, other, all_free]), np.concatenate([other, one, all_free])
+    values = np.concatenate([stiff, stiff, whole])
+    if n < SPARSE_FROM:
+        matrix = np.bincount(rows * n + columns, values, n * n).reshape(n, n)
+        found = np.linalg.solve(matrix, right)
     else:
         from scipy.sparse import csc_array
         from scipy.sparse.linalg import splu
 
-        rows = np.concatenate([i, j, i, j])
-        columns = np.concatenate([j, i, i, j])
-        values = np.concatenate([-stiffness, -stiffness, stiffness, stiffness])
-        number = np.cumsum(~fixed) - 1
-        inner = ~fixed[rows] & ~fixed[columns]
-        sparse = csc_array(
-            (values[inner], (number[rows[inner]], number[columns[inner]])), shape=(len(free),) * 2
-        )
+        sparse = csc_array((values, (rows, columns)), shape=(n, n))
         factors = splu(sparse, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        found = factors.solve(right[free])
+        found = factors.solve(right)
     y = x.copy()
     y[free] = found
     return y

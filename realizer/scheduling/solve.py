@@ -18,6 +18,7 @@ from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.paths import components, raise_levels
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.shapes import Shapes, shapes_of
+from realizer.scheduling.shortest import shortest
 from realizer.scheduling.squeeze import squeeze
 
 __all__ = ["Solution", "solve"]
@@ -73,7 +74,7 @@ def _keep_inequalities(model: Model, shapes: Shapes) -> list[Clash]:
     if not cycles:
         return []
     web = Web(model.problem)
-    return [web.cycle(cycle) for cycle in cycles]
+    return shortest(model, web, cycles)
 
 
 def _fits(model: Model, shapes: Shapes, group: Group, begin: Float64) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.scheduling.clash import Link
-from realizer.scheduling.convex import Quadratic, kept, optimum
+from realizer.scheduling.convex import Quadratic, kept, optimum, settled
 from realizer.scheduling.groups import Group
 from realizer.scheduling.model import LOOSE, TIGHT, Index, Model
 from realizer.scheduling.problem import ORIGIN, Relation
@@ -36,12 +36,16 @@ class _Squeeze:
     orders: list[Relation]
     starts: Index
 
-    def keep(self, shapes: Shapes) -> tuple[Float64, list[int] | None]:
-        """From where the shapes are, times that keep every inequality, or the numbers of a cycle of them."""
+    def start(self, shapes: Shapes) -> Float64:
+        """(size,) where the shapes are now."""
         start = np.zeros(self.quadratic.size)
         nodes = np.flatnonzero(self.number)
         start[self.number[nodes]] = shapes.at[nodes]
-        return kept(self.quadratic, start)
+        return start
+
+    def keep(self, shapes: Shapes) -> tuple[Float64, list[int] | None]:
+        """From where the shapes are, times that keep every inequality, or the numbers of a cycle of them."""
+        return kept(self.quadratic, self.start(shapes))
 
     def link(self, model: Model, k: int) -> Link:
         """Inequality k, in terms of the problem."""
@@ -73,15 +77,19 @@ def squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> list[list[
             begin[group.shapes] = shapes.at[_anchor(model, group)]
     shapes.at -= begin[shapes.label[model.owner]]
     whole = _squeeze(model, shapes, groups)
-    level, cycle = whole.keep(shapes)
-    if cycle:
-        links = [links for group in groups if (links := _impossible(model, shapes, group))]
-        if links:
-            return links
-        # All of them had least gaps that gave way.
-        whole = _squeeze(model, shapes, groups)
-        level, _ = whole.keep(shapes)
-    x = optimum(whole.quadratic, level)
+    x = settled(whole.quadratic, whole.start(shapes))
+    if x is None:
+        level, cycle = whole.keep(shapes)
+        if cycle:
+            links = [links for group in groups if (links := _impossible(model, shapes, group))]
+            if links:
+                return links
+            # All of them had least gaps that gave way.
+            whole = _squeeze(model, shapes, groups)
+            x = settled(whole.quadratic, whole.start(shapes))
+            level, _ = whole.keep(shapes)
+        if x is None:
+            x = optimum(whole.quadratic, level)
     shapes.at[whole.points] = x[whole.number[model.root[whole.points]]] + model.shift[whole.points]
     return []
 
@@ -121,6 +129,12 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
         [model.least[gaps], -model.most[ends], [r.seconds for r in orders], model.earliest[owner[starts]]]
     )
     u, v, between = number[root[tail]], number[root[head]], shift[tail] - shift[head]
+    # What springs connect is a shape, or node 0 with all that is held or stands for it.
+    piece = np.zeros(len(nodes) + 1, np.intp)
+    labels = shapes.label[owner[nodes]]
+    anchored = [shapes.label[owner[p]] for p in at_start[1:]]
+    free = ~(shapes.held[labels] | np.isin(labels, anchored))
+    piece[1:][free] = np.unique(labels[free], return_inverse=True)[1] + 1
     quadratic = Quadratic(
         len(nodes) + 1,
         u[:g],
@@ -130,6 +144,7 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
         u,
         v,
         seconds + between,
+        piece,
     )
     return _Squeeze(quadratic, points, number, gaps, ends, orders, starts)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 
-__all__ = ["Schedule", "Timing", "Warning"]
+__all__ = ["Clause", "Schedule", "Timing", "Warning"]
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,35 @@ class Timing:
 
 
 @dataclass(frozen=True)
+class Clause:
+    """One of the things that cannot hold together: who states or needs it, on which line, in words."""
+
+    id: str
+    line: int | None
+    text: str
+
+    def to_json(self) -> dict[str, Any]:
+        return {"id": self.id, "line": self.line, "text": self.text}
+
+
+@dataclass(frozen=True)
 class Warning:  # the standard's word
-    """One BML warning: `id` is a block or "block:behaviour", `type` of the standard's list."""
+    """One BML warning: `id` is a block or "block:behaviour", `type` of the standard's list.
+
+    `clash`: what cannot hold together, where that is why; without any one of it the rest of it could.
+    """
 
     id: str
     type: str
     text: str
+    clash: tuple[Clause, ...] = ()
 
-    def to_json(self) -> dict[str, str]:
-        return {"id": self.id, "type": self.type, "text": self.text}
+    def to_json(self) -> dict[str, Any]:
+        """{"id", "type", "text"}, and "clash": [{"id", "line", "text"}] where there is one."""
+        known: dict[str, Any] = {"id": self.id, "type": self.type, "text": self.text}
+        if self.clash:
+            known["clash"] = [clause.to_json() for clause in self.clash]
+        return known
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,122 @@
+"""A model and a cycle that cannot close in, the cycle of fewest statements through its points out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from realizer.scheduling.clash import Clash, Link, Web
+from realizer.scheduling.model import LOOSE, Model
+from realizer.scheduling.problem import ORIGIN, Relation
+
+__all__ = ["shortest"]
+
+# Steps tried for one clash, some tens of milliseconds; enough for any that a person would read to the end.
+MOST_STEPS = 50_000
+
+# To which point, by how many seconds, and what says so.
+Step: TypeAlias = tuple[int, float, Relation | Link]
+
+
+def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[Clash]:
+    """A clash for each cycle of inequalities, each of the fewest statements that some cycle there has.
+
+    A positive cycle with the fewest statements visits no point twice; so whichever of them is taken away, the
+    others are a path and can hold. Only cycles through points of the given one count: what clashes elsewhere
+    is another clash. Ties among equally short ones go to what comes first in the document.
+    """
+    ways = _Ways(model)
+    found = []
+    for cycle in cycles:
+        clash = web.cycle(cycle)
+        tried = 0
+        points = {end for r in clash.relations for end in (r.u, r.v)}
+        points |= {end for link in cycle for end in (link.u, link.v)}
+        for point in sorted(points):
+            steps, more = ways.back_to(point, clash.statements - 1, MOST_STEPS - tried)
+            tried += more
+            if steps:
+                clash = web.clash(steps)
+        found.append(clash)
+    return found
+
+
+class _Ways:
+    """The steps from point to point that constraints, gaps and bounds are, as a graph of statements."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        problem = model.problem
+        self._stated: dict[int, list[Step]] = {}
+        for relation in problem.equalities:
+            self._stated.setdefault(relation.v, []).append((relation.u, relation.seconds, relation))
+            self._stated.setdefault(relation.u, []).append((relation.v, -relation.seconds, relation))
+        for order in problem.orders:
+            link = Link(order.u, order.v, order.seconds, order)
+            self._stated.setdefault(order.u, []).append((order.v, order.seconds, link))
+        n = len(problem.owner)
+        self._least, self._most = np.zeros(n), np.zeros(n)
+        self._least[model.gap + 1], self._most[model.gap + 1] = model.least, model.most
+        self._rigid = [timing.rigid for timing in problem.timings]
+
+    def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
+        """The steps of a positive cycle through a point of at most so many statements, the fewest there are.
+
+        Returns:
+            The steps, [] where there is no such cycle or it takes more steps than allowed to tell; and how
+            many steps were tried.
+        """
+        best, layer = {start: 0.0}, {start: 0.0}
+        came: list[dict[int, tuple[int, Step]]] = []
+        tried = 0
+        for _ in range(statements):
+            after: dict[int, float] = {}
+            came.append({})
+            for u, so_far in layer.items():
+                for step in self._from(u):
+                    tried += 1
+                    v, seconds, _ = step
+                    total = so_far + seconds
+                    if v == start:
+                        if total > LOOSE:
+                            return _walk(came, u, step), tried
+                    elif total > best.get(v, -np.inf) + LOOSE / 100:
+                        best[v] = after[v] = total
+                        came[-1][v] = (u, step)
+                if tried > steps:
+                    return [], tried
+            layer = after
+        return [], tried
+
+    def _from(self, u: int) -> Iterator[Step]:
+        yield from self._stated.get(u, ())
+        model = self.model
+        if u == ORIGIN:
+            for first, earliest in zip(model.first.tolist(), model.earliest.tolist(), strict=True):
+                if earliest > -np.inf:
+                    yield first, earliest, Link(ORIGIN, first, earliest)
+            return
+        b = int(model.owner[u])
+        if self._rigid[b]:
+            return
+        seconds = 0.0
+        for v in range(u + 1, int(model.last[b]) + 1):
+            seconds += float(self._least[v])
+            yield v, seconds, Link(u, v, seconds)
+        seconds = 0.0
+        for v in range(u - 1, int(model.first[b]) - 1, -1):
+            seconds -= float(self._most[v + 1])
+            if seconds == -np.inf:
+                break
+            yield v, seconds, Link(u, v, seconds)
+
+
+def _walk(came: list[dict[int, tuple[int, Step]]], at: int, last: Step) -> list[Step]:
+    """The steps that led to a point, layer by layer, and the one that closes the cycle."""
+    steps = [last]
+    for layer in reversed(came[:-1]):
+        at, step = layer[at]
+        steps.append(step)
+    return steps[::-1]
