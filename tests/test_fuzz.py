@@ -18,7 +18,7 @@ from websockets.asyncio.client import connect
 
 from bml_schema import Block, BMLError, read
 from realizer.behaviours import VOCABULARY
-from realizer.pipeline import speak
+from realizer.pipeline import submitted
 from realizer.player import Player
 from realizer.server.serve import Server
 from realizer.settings import Settings
@@ -101,7 +101,7 @@ def plays(items: list[Block | BMLError], *, faces: bool) -> None:
     player = Player(idle=False)
     for item in items:
         if isinstance(item, Block):
-            schedule = player.submit(item, 0.0, speak(player.wants(item), SilentVoice()))
+            schedule = submitted(player, item, SilentVoice())
             for points in schedule.times.values():
                 assert np.isfinite(points).all()
                 assert (np.diff(points) >= 0).all()

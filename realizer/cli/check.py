@@ -96,13 +96,13 @@ def examine(block: Block, player: Player) -> tuple[Schedule, list[Warning]]:
     """The schedule of a block, and everything that is wrong with it, also where one fault ends it all."""
     from dataclasses import replace
 
-    from realizer.pipeline import speak
+    from realizer.pipeline import speak, submitted
     from realizer.scheduling.timing import Warning
     from realizer.speech import SilentVoice
 
     warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
-    said = speak(player.wants(block), SilentVoice())
-    world = replace(player.world, utterances=said)
+    voice = SilentVoice()
+    world = replace(player.world, utterances=speak(player.wants(block), voice))
     bad: set[str] = set()
     for node in block.behaviours:
         kind = player.kinds.get(node.tag)
@@ -114,7 +114,7 @@ def examine(block: Block, player: Player) -> tuple[Schedule, list[Warning]]:
             bad.add(node.id)
     # What was told must not end the block before its constraints are looked at.
     whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
-    schedule = player.submit(whole, 0.0, said)
+    schedule = submitted(player, whole, voice)
     told = {(warning.id, warning.text) for warning in warnings}
     return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
 
