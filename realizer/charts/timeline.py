@@ -265,7 +265,9 @@ def _gaps(names: tuple[str, ...], times: list[float], timing: Timing | None) -> 
             for g, p in zip(gaps, timing.preferred.tolist(), strict=True)
         )
     most = [math.inf] * len(gaps) if timing.most is None else timing.most.tolist()
-    wants = zip(timing.preferred.tolist(), timing.least.tolist(), timing.stiffness.tolist(), most, strict=True)
+    wants = zip(
+        timing.preferred.tolist(), timing.least.tolist(), timing.stiffness.tolist(), most, strict=True
+    )
     return tuple(
         g._replace(preferred=p, least=least, stiffness=a, most=limit if math.isfinite(limit) else None)
         for g, (p, least, a, limit) in zip(gaps, wants, strict=True)

@@ -1,0 +1,169 @@
+"""The links of a block in, lines between its rows out: what is tied, and how much room orders leave."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from realizer.charts.colours import HELD, LINK, PAPER, ROOM, TIGHT
+from realizer.charts.rows import ABOVE, BAR
+from realizer.charts.scale import Scale
+from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
+from realizer.charts.timeline import BlockLine, Line, Link
+
+__all__ = ["Place", "draw_links"]
+
+# block, behaviour -> its line, the start of its block, and the top of its row
+Place = Mapping[tuple[str, str], tuple[Line, float, float]]
+BEND = 18  # pieces of a curve
+
+
+def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine, places: Place) -> None:
+    """Draw what ties a block: curves into `picture`, which lies below the bars, ends into `marks`, above."""
+    start = block.start or 0.0
+    for line in block.lines:
+        _, _, top = places[block.block, line.id]
+        when = {point.name: start + point.time for point in line.points}
+        pinned: set[str] = set()
+        for link in line.links:
+            x = scale.x(when[link.sync])
+            there = places.get((link.block or block.block, link.behaviour or ""))
+            if link.kind in ("before", "after"):
+                _room(picture, marks, scale, link, when[link.sync], top, _end_of(scale, link, there))
+            elif there is not None and there[0].id != line.id:
+                _tie(picture, marks, link, (x, top), _end_of(scale, link, there))
+            elif link.sync not in pinned and there is None:
+                pinned.add(link.sync)
+                _pin(marks, x, top, link)
+
+
+def _end_of(scale: Scale, link: Link, there: tuple[Line, float, float] | None) -> tuple[float, float] | None:
+    """Where the other point of a link stands, and the top of its row; None where it is not in the picture."""
+    if there is None:
+        return None
+    line, start, top = there
+    time = next((point.time for point in line.points if point.name == link.other), None)
+    return None if time is None else (scale.x(start + time), top)
+
+
+def _tie(
+    picture: Picture, marks: Picture, link: Link, here: tuple[float, float], there: tuple[float, float] | None
+) -> None:
+    """A curve from the point that is referred to, with a dot, to the one that follows it, with an arrow."""
+    if there is None:
+        return
+    begin, end = _edges(there, here)
+    curve = _curve(begin, end)
+    picture.add(Path(curve, LINK, 1.3, tip=_words(link)))
+    marks.add(Box(begin[0] - 2.5, begin[1] - 2.5, 5, 5, LINK, radius=2.5, tip=_words(link)))
+    if link.kind == "synchronize":
+        marks.add(Box(end[0] - 2.5, end[1] - 2.5, 5, 5, LINK, radius=2.5, tip=_words(link)))
+    else:
+        up = 6.0 if end[1] > begin[1] else -6.0
+        marks.add(Path((end, (end[0] - 3.5, end[1] - up), (end[0] + 3.5, end[1] - up)), fill=LINK))
+    if abs(link.offset) > 5e-4:
+        # Near the end, where the arrow is: many may begin at one point.
+        x, y = curve[int(0.72 * BEND)]
+        words = f"{link.offset:+.2f}".rstrip("0").rstrip(".")
+        marks.add(Text(x, y + 3, words, 8.5, LINK, "middle", PAPER))
+
+
+def _room(
+    picture: Picture,
+    marks: Picture,
+    scale: Scale,
+    link: Link,
+    time: float,
+    top: float,
+    there: tuple[float, float] | None,
+) -> None:
+    """What an order leaves: hatched from the point to where it binds, and a line to what it looks at."""
+    if link.slack is None:
+        _pin(marks, scale.x(time), top, link)
+        return
+    colour = TIGHT if link.binds else ROOM
+    x = scale.x(time)
+    bound = scale.x(time + link.slack if link.kind == "before" else time - link.slack)
+    left, right = min(x, bound), max(x, bound)
+    y, height = top + 1.5, 8.0
+    tip = f"{_words(link)}, {link.slack:.3f} s left" if not link.binds else f"{_words(link)}, binds"
+    if right - left > 1:
+        marks.add(
+            Box(left, y, right - left, height, "#f4f1fb", tip=tip),
+            *hatch(left, y, right - left, height, colour),
+        )
+        words = f"{link.slack:.2f} s"
+        if width_of(words, 8.5) < right - left - 8:
+            marks.add(Text((left + right) / 2, y + 7, words, 8.5, colour, "middle", "#f4f1fb"))
+    # A bracket that opens to where the point may go.
+    turn = -4.0 if link.kind == "before" else 4.0
+    bracket = ((bound + turn, y), (bound, y), (bound, y + height), (bound + turn, y + height))
+    marks.add(Path(bracket, colour, 1.6, tip=tip))
+    if there is not None and abs(there[1] - top) > 1:
+        other, row = there
+        down = row > top
+        begin = (bound, y + height if down else y)
+        end = (other, row + ABOVE if down else row + ABOVE + BAR)
+        picture.add(*_dashes(begin, end, colour, tip))
+        marks.add(Box(end[0] - 2, end[1] - 2, 4, 4, colour, radius=2))
+
+
+def _pin(marks: Picture, x: float, top: float, link: Link) -> None:
+    """A point that is held at a time, or by something that is not in the picture."""
+    y = top + ABOVE - 3
+    inside = HELD if link.behaviour is None else PAPER
+    marks.add(Path(((x, y), (x - 4, y - 7), (x + 4, y - 7)), HELD, 1.0, fill=inside, tip=_words(link)))
+    if link.target is not None:
+        marks.add(Text(x + 7, y - 1, str(link.target), 8.5, HELD, halo=PAPER))
+
+
+def _edges(
+    first: tuple[float, float], last: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The ends of a line between two rows: at the edges of their bars that face each other."""
+    if first[1] < last[1]:
+        return (first[0], first[1] + ABOVE + BAR + 3), (last[0], last[1] + ABOVE - 3)
+    return (first[0], first[1] + ABOVE - 3), (last[0], last[1] + ABOVE + BAR + 3)
+
+
+def _curve(begin: tuple[float, float], end: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """A curve that leaves and comes upright."""
+    (x0, y0), (x1, y1) = begin, end
+    if abs(x0 - x1) < 0.5:
+        return (begin, end)
+    half = (y1 - y0) / 2
+    points = []
+    for k in range(BEND + 1):
+        t = k / BEND
+        a, b, c, d = (1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3
+        points.append(
+            (a * x0 + b * x0 + c * x1 + d * x1, a * y0 + b * (y0 + half) + c * (y1 - half) + d * y1)
+        )
+    return tuple(points)
+
+
+def _dashes(begin: tuple[float, float], end: tuple[float, float], colour: str, tip: str) -> list[Path]:
+    """A dashed line."""
+    (x0, y0), (x1, y1) = begin, end
+    count = max(1, round(math.hypot(x1 - x0, y1 - y0) / 6))
+    step = ((x1 - x0) / count, (y1 - y0) / count)
+    return [
+        Path(
+            (
+                (x0 + k * step[0], y0 + k * step[1]),
+                (x0 + (k + 0.55) * step[0], y0 + (k + 0.55) * step[1]),
+            ),
+            colour,
+            1.1,
+            tip=tip,
+        )
+        for k in range(count)
+    ]
+
+
+def _words(link: Link) -> str:
+    offset = "" if not link.offset else f" {'-' if link.offset < 0 else '+'} {abs(link.offset):g} s"
+    target = f"{link.target}{offset}" if link.target else f"{link.offset:g} s"
+    sign = {"before": "not after", "after": "not before"}.get(link.kind, "=")
+    where = "" if link.line is None else f" (line {link.line})"
+    return f"{link.sync} {sign} {target}{where}"

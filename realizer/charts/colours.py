@@ -1,0 +1,61 @@
+"""A stretch in, a colour out: a diverging scale that does not need red and green told apart."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = [
+    "FAINT",
+    "GRID",
+    "HELD",
+    "INK",
+    "LINK",
+    "LOST",
+    "PAPER",
+    "RIGID",
+    "ROOM",
+    "TIGHT",
+    "colour_of",
+    "on",
+]
+
+PAPER = "#ffffff"
+INK = "#1f2430"
+FAINT = "#6b7280"
+GRID = "#e6e8ec"
+RIGID = "#d5dbe6"  # gaps that cannot give way
+LINK = "#0f766e"  # what is tied
+HELD = "#1f2430"  # a pin: held at a time
+ROOM = "#7c6bb0"  # room before an order binds
+TIGHT = "#c2185b"  # an order that binds
+LOST = "#9aa0aa"  # what was dropped
+
+# (log3 of the stretch, colour): a third of the preferred length, the preferred length, three times it.
+# Blue to orange: told apart with every kind of colour vision, and in grey by how dark the ends are.
+SCALE = (
+    (-1.0, (33, 92, 168)),
+    (-0.45, (128, 178, 226)),
+    (0.0, (237, 235, 228)),
+    (0.45, (246, 178, 107)),
+    (1.0, (179, 84, 6)),
+)
+
+
+def colour_of(stretch: float) -> str:
+    """The colour of a gap that is `stretch` times its preferred length; 0 and inf have the ends' colours."""
+    if stretch <= 0:
+        place = -1.0
+    else:
+        place = min(1.0, max(-1.0, math.log(stretch) / math.log(3.0)))
+    for (low, first), (high, last) in zip(SCALE[:-1], SCALE[1:], strict=True):
+        if place <= high:
+            part = (place - low) / (high - low)
+            mixed = (round(a + (b - a) * part) for a, b in zip(first, last, strict=True))
+            return "#" + "".join(f"{channel:02x}" for channel in mixed)
+    raise AssertionError(place)
+
+
+def on(colour: str) -> str:
+    """Ink that is readable on a colour."""
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 128 else "#ffffff"

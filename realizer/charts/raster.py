@@ -1,0 +1,85 @@
+"""A picture in, PNG bytes out: drawn with Pillow."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+from realizer.charts.shapes import Box, Path, Picture, Text, font
+from realizer.errors import RealizerError
+
+if TYPE_CHECKING:
+    from PIL import Image, ImageDraw
+
+__all__ = ["png"]
+
+SCALE = 2  # pixels of the PNG for one of the picture
+SMOOTH = 2  # and of what it is drawn as, for one of the PNG: Pillow's lines have stairs
+# Pixels that are drawn at once: more would take more memory than a picture is worth.
+MOST = 64_000_000
+
+
+def png(picture: Picture) -> bytes:
+    """PNG bytes, twice the picture's size where that is not too large.
+
+    Raises:
+        RealizerError: the picture is too large at its own size; as SVG it is not.
+    """
+    from PIL import Image, ImageDraw
+
+    area = picture.width * picture.height
+    fitting = [(s, m) for s, m in ((SCALE, SMOOTH), (SCALE, 1), (1, 1)) if area * (s * m) ** 2 <= MOST]
+    if not fitting:
+        raise RealizerError(
+            f"wanted a picture of at most {MOST} pixels, got {picture.width:.0f}x{picture.height:.0f}: "
+            "draw it as .svg"
+        )
+    scale, smooth = fitting[0]
+    size = (round(picture.width * scale), round(picture.height * scale))
+    image: Image.Image = Image.new("RGB", (size[0] * smooth, size[1] * smooth), picture.paper)
+    pen = ImageDraw.Draw(image)
+    for shape in picture.shapes:
+        if not isinstance(shape, Text):
+            _draw(pen, shape, scale * smooth)
+    if smooth > 1:
+        image = image.resize(size, Image.Resampling.BOX)
+        pen = ImageDraw.Draw(image)
+    for shape in picture.shapes:
+        if isinstance(shape, Text):
+            _write(pen, shape, scale)
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def _draw(pen: ImageDraw.ImageDraw, shape: Box | Path, scale: float) -> None:
+    if isinstance(shape, Box):
+        box = (
+            shape.x * scale,
+            shape.y * scale,
+            max(shape.x + shape.width, shape.x) * scale - 1,
+            (shape.y + shape.height) * scale - 1,
+        )
+        if box[2] >= box[0] and box[3] >= box[1]:
+            pen.rounded_rectangle(box, shape.radius * scale, shape.fill, shape.stroke, round(scale))
+        return
+    points = [(x * scale, y * scale) for x, y in shape.points]
+    if shape.fill:
+        pen.polygon(points, fill=shape.fill)
+    if shape.colour:
+        ring = [*points, points[0]] if shape.fill else points
+        pen.line(ring, fill=shape.colour, width=max(1, round(shape.width * scale)), joint="curve")
+
+
+def _write(pen: ImageDraw.ImageDraw, text: Text, scale: float) -> None:
+    anchor = {"start": "ls", "middle": "ms", "end": "rs"}[text.anchor]
+    rim = round(1.5 * scale) if text.halo else 0
+    pen.text(
+        (text.x * scale, text.y * scale),
+        text.text,
+        fill=text.colour,
+        font=font(text.size * scale, text.text.isascii()),
+        anchor=anchor,
+        stroke_width=rim,
+        stroke_fill=text.halo,
+    )

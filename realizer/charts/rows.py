@@ -1,0 +1,156 @@
+"""One behaviour in, its row out: its names, its gaps in colour, its sync points, its words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from realizer.charts.colours import FAINT, INK, LOST, PAPER, RIGID, colour_of, on
+from realizer.charts.scale import Scale
+from realizer.charts.shapes import Box, Path, Picture, Text, cut, fold, hatch, width_of
+from realizer.charts.timeline import Dropped, Gap, Line
+
+__all__ = ["BAR", "HEIGHT", "NAME", "draw_dropped", "draw_line", "height_of"]
+
+HEIGHT = 48.0
+# Above the bar there is room for pins and for what orders leave, below it for the names of the points.
+ABOVE, BAR = 13.0, 18.0
+NAME = 62.0  # where ids begin; kinds stand before them
+SMALL, PLAIN = 9.5, 12.5
+MOST_WHY = 3  # lines of a reason
+
+
+def draw_line(
+    picture: Picture, scale: Scale, line: Line, start: float, top: float, tied: frozenset[str]
+) -> None:
+    """Draw the row of a behaviour.
+
+    Args:
+        start: of its block, seconds on the session clock.
+        top: of the row, in pixels.
+        tied: its points that something is tied to, or that are tied: named before others.
+    """
+    _name(picture, line.id, _about(line), top, INK, FAINT)
+    bar = top + ABOVE
+    xs = [scale.x(start + point.time) for point in line.points]
+    for gap, left, right in zip(line.gaps, xs[:-1], xs[1:], strict=True):
+        picture.add(Box(left, bar, right - left, BAR, colour(gap), tip=_tip(line, gap)))
+    picture.add(Box(xs[0], bar, max(xs[-1] - xs[0], 1.0), BAR, None, "#4b5563"))
+    if line.words:
+        _say(picture, scale, line, start, bar)
+    else:
+        for gap, left, right in zip(line.gaps, xs[:-1], xs[1:], strict=True):
+            _percent(picture, gap, left, right, bar)
+    for point, x in zip(line.points, xs, strict=True):
+        tip = f"{line.id}:{point.name} {point.time:.3f} s"
+        picture.add(Path(((x, bar - 3), (x, bar + BAR + 3)), INK, 1.3, tip=tip))
+    _names(picture, [p.name for p in line.points], xs, bar + BAR + 13, tied, scale.right)
+
+
+def height_of(dropped: Dropped, scale: Scale) -> float:
+    """Of the row of what is not there."""
+    return 22.0 + 13.0 * max(1, len(_why(dropped, scale)))
+
+
+def draw_dropped(picture: Picture, scale: Scale, dropped: Dropped, top: float, height: float) -> None:
+    """Draw what is not there, and why."""
+    where = "" if dropped.line is None else f", line {dropped.line}"
+    _name(picture, dropped.id, f"{dropped.element or 'dropped'}{where}", top - 6, LOST, LOST)
+    width = width_of(cut(dropped.id, PLAIN, scale.left - NAME - 12), PLAIN)
+    picture.add(Path(((NAME, top + 12), (NAME + width, top + 12)), LOST, 1.0))
+    picture.add(Box(scale.left, top + 3, scale.right - scale.left, height - 6, "#f3f4f6", radius=3))
+    picture.add(*hatch(scale.left, top + 3, 16, height - 6, LOST, 6))
+    picture.add(Text(scale.left + 24, top + 17, dropped.type.replace("_", " ").lower(), SMALL, FAINT))
+    for k, words in enumerate(_why(dropped, scale)):
+        picture.add(Text(scale.left + 24, top + 30 + 13 * k, words, 10.5, "#4b5563"))
+
+
+def colour(gap: Gap) -> str:
+    """Grey where a gap cannot give way, otherwise by its stretch."""
+    if gap.rigid or gap.preferred is None:
+        return RIGID
+    if gap.preferred == 0:
+        return colour_of(1.0 if gap.actual < 1e-6 else math.inf)
+    return colour_of(gap.actual / gap.preferred)
+
+
+def _name(picture: Picture, id: str, about: str, top: float, ink: str, faint: str) -> None:
+    room = Scale(0, 1, 1).left - NAME - 12
+    picture.add(Text(NAME, top + 22, cut(id, PLAIN, room), PLAIN, ink))
+    picture.add(Text(NAME, top + 35, cut(about, SMALL, room), SMALL, faint))
+
+
+def _about(line: Line) -> str:
+    words = [line.element]
+    if line.line is not None:
+        words.append(f"line {line.line}")
+    if line.required:
+        words.append("required")
+    return ", ".join(words)
+
+
+def _tip(line: Line, gap: Gap) -> str:
+    words = [f"{line.id}: {gap.begin} to {gap.end} {gap.actual:.3f} s"]
+    if gap.rigid:
+        words.append("rigid")
+    elif gap.preferred is not None:
+        words.append(f"preferred {gap.preferred:.3f} s")
+        if gap.least:
+            words.append(f"least {gap.least:.3f} s")
+        if gap.most is not None:
+            words.append(f"most {gap.most:.3f} s")
+        words.append(f"cost {gap.cost:.4g}")
+    return ", ".join(words)
+
+
+def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) -> None:
+    """How long a gap is; of one that is not as preferred, in parts of its preferred length."""
+    ink = on(colour(gap))
+    seconds = f"{gap.actual:.2f} s"
+    stretched = gap.stretch is not None and not gap.rigid and abs(gap.stretch - 1) >= 0.005
+    percent = f"{gap.stretch or 0:.0%}" if stretched else ""
+    for words in filter(None, (f"{seconds}, {percent}" if percent else "", percent or seconds)):
+        if width_of(words, SMALL) <= right - left - 6:
+            picture.add(Text((left + right) / 2, bar + 12.5, words, SMALL, ink, "middle"))
+            return
+
+
+def _say(picture: Picture, scale: Scale, line: Line, start: float, bar: float) -> None:
+    """The words, each at its time; as one line where they do not fit."""
+    spans = [(scale.x(start + w.start), scale.x(start + w.end), w.text) for w in line.words]
+    if all(width_of(text, 10.5) <= max(right - left, 12) + 3 for left, right, text in spans):
+        for left, right, text in spans:
+            picture.add(Text((left + right) / 2, bar + 13, text, 10.5, INK, "middle"))
+        return
+    left, right = (scale.x(start + line.points[k].time) for k in (0, -1))
+    text = cut(" ".join(w.text for w in line.words), 10.5, right - left - 8)
+    picture.add(Text(left + 4, bar + 13, text, 10.5, INK))
+
+
+def _names(
+    picture: Picture, names: Sequence[str], xs: Sequence[float], y: float, tied: frozenset[str], edge: float
+) -> None:
+    """Names under their ticks, as many as fit: tied points first, then the ends, then the rest."""
+    order = sorted(range(len(names)), key=lambda k: (names[k] not in tied, 0 < k < len(names) - 1, k))
+    taken: list[tuple[float, float]] = []
+    for k in order:
+        wide = width_of(names[k], SMALL)
+        for shift in _shifts(wide, k, len(names)):
+            left = xs[k] + shift
+            if left + wide > edge + 20 or left < Scale(0, 1, 1).left - 8:
+                continue
+            if all(left > b + 3 or left + wide < a - 3 for a, b in taken):
+                taken.append((left, left + wide))
+                ink = INK if names[k] in tied else FAINT
+                picture.add(Text(left, y, names[k], SMALL, ink, halo=PAPER))
+                break
+
+
+def _shifts(wide: float, k: int, count: int) -> Iterable[float]:
+    """Where a name may stand, from its tick: in the middle, to the right, to the left."""
+    first = (-2.0, -wide / 2) if k == 0 else (-wide + 2, -wide / 2) if k == count - 1 else (-wide / 2,)
+    return (*first, -2.0, -wide + 2)
+
+
+def _why(dropped: Dropped, scale: Scale) -> Sequence[str]:
+    return fold(dropped.text, 10.5, scale.right - scale.left - 36, MOST_WHY)

@@ -1,0 +1,74 @@
+"""A span of time and a width in, where a time stands and which times the axis names out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from realizer.charts.timeline import BlockLine
+
+__all__ = ["GUTTER", "Scale", "scale_of"]
+
+GUTTER = 190.0  # where the names stand
+MARGIN = 26.0  # on the right
+WIDTH = 1200.0
+# A second is at least this wide, until the picture is WIDEST.
+SECOND, WIDEST = 64.0, 4000.0
+APART = 64.0  # least distance of two times on the axis
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Session seconds `first` .. `last` on a picture of `width` pixels."""
+
+    first: float
+    last: float
+    width: float
+
+    @property
+    def left(self) -> float:
+        return GUTTER
+
+    @property
+    def right(self) -> float:
+        return self.width - MARGIN
+
+    @property
+    def second(self) -> float:
+        """Pixels."""
+        return (self.right - self.left) / (self.last - self.first)
+
+    def x(self, time: float) -> float:
+        """Where a time stands; what is beyond the picture stands at its edge."""
+        return min(max(self.left + (time - self.first) * self.second, self.left), self.right)
+
+    def ticks(self) -> Iterator[tuple[float, str]]:
+        """Round times and their words."""
+        step = next(s for s in _steps() if s * self.second >= APART)
+        digits = max(0, -math.floor(math.log10(step) + 1e-9))
+        for number in range(math.ceil(self.first / step - 1e-9), math.floor(self.last / step + 1e-9) + 1):
+            yield number * step, f"{number * step:.{digits}f}"
+
+
+def scale_of(blocks: Iterable[BlockLine]) -> Scale:
+    """A scale that has room for all blocks; one that was not started stands at 0."""
+    spans = [(block.start or 0.0, last_of(block)) for block in blocks]
+    first = min((start for start, _ in spans), default=0.0)
+    last = max((end for _, end in spans), default=0.0)
+    last = max(last, first + 0.1)
+    return Scale(first, last, min(WIDEST, max(WIDTH, GUTTER + MARGIN + SECOND * (last - first))))
+
+
+def last_of(block: BlockLine) -> float:
+    """When a block ends, as if one that was not started began at 0."""
+    ends = [line.points[-1].time for line in block.lines]
+    return (block.start or 0.0) + max(ends, default=0.0)
+
+
+def _steps() -> Iterator[float]:
+    """0.01, 0.02, 0.05, 0.1, ..."""
+    power = -2
+    while True:
+        yield from (base * 10.0**power for base in (1, 2, 5))
+        power += 1

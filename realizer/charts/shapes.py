@@ -1,0 +1,143 @@
+"""What a picture is made of, in pixels from its top left corner, and how wide text is."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from PIL.ImageFont import FreeTypeFont, ImageFont
+
+__all__ = ["Box", "Path", "Picture", "Shape", "Text", "cut", "fold", "font", "hatch", "width_of"]
+
+DOTS = "..."
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle, filled or outlined or both; `tip` is shown where one points at it."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    fill: str | None = None
+    stroke: str | None = None
+    radius: float = 0.0
+    tip: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A line through points; with `fill` the shape that it closes."""
+
+    points: tuple[tuple[float, float], ...]
+    colour: str | None = None
+    width: float = 1.0
+    fill: str | None = None
+    tip: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A line of text; `x` is its start, its middle or its end, `y` its baseline.
+
+    Text lies over everything else. `halo` is the colour of a rim that keeps it readable over lines.
+    """
+
+    x: float
+    y: float
+    text: str
+    size: float
+    colour: str
+    anchor: str = "start"
+    halo: str | None = None
+
+
+Shape = Box | Path | Text
+
+
+@dataclass(slots=True)
+class Picture:
+    """Shapes, the first at the bottom; `title` says what is seen."""
+
+    width: float
+    height: float = 0.0
+    title: str = ""
+    paper: str = "#ffffff"
+    shapes: list[Shape] = field(default_factory=list)
+
+    def add(self, *shapes: Shape) -> None:
+        self.shapes += shapes
+
+
+def hatch(x: float, y: float, width: float, height: float, colour: str, step: float = 5.0) -> list[Path]:
+    """Lines that rise to the right, inside of a rectangle."""
+    lines = []
+    at = x - height + step / 2
+    while at < x + width:
+        left, right = max(at, x), min(at + height, x + width)
+        if right > left:
+            lines.append(
+                Path(((left, y + height - (left - at)), (right, y + height - (right - at))), colour, 0.9)
+            )
+        at += step
+    return lines
+
+
+@cache
+def font(size: float, plain: bool = True) -> FreeTypeFont | ImageFont:
+    """The font that text is drawn and measured with: Pillow's own, which is the same everywhere.
+
+    Args:
+        plain: the text is ASCII. Pillow's font has little else; for the rest one of the machine is taken,
+            where there is one.
+    """
+    from PIL import ImageFont
+
+    if not plain:
+        for name in ("DejaVuSans.ttf", "Arial Unicode.ttf", "arial.ttf", "NotoSans-Regular.ttf"):
+            try:
+                return ImageFont.truetype(name, size)
+            except OSError:
+                continue
+    return ImageFont.load_default(size)
+
+
+def width_of(text: str, size: float) -> float:
+    """How wide a line of text is, in pixels; an estimate where it is not ASCII."""
+    if text.isascii():
+        return float(font(100.0).getlength(text)) * size / 100.0
+    wide = sum(1.0 if unicodedata.east_asian_width(c) in "WF" else 0.62 for c in text if not c.isascii())
+    return wide * size + width_of("".join(c for c in text if c.isascii()), size)
+
+
+def cut(text: str, size: float, room: float) -> str:
+    """As much of a text as fits, with dots where some is missing; "" where not even one letter does."""
+    if width_of(text, size) <= room:
+        return text
+    low, high = 0, len(text)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if width_of(text[:middle].rstrip() + DOTS, size) <= room:
+            low = middle
+        else:
+            high = middle - 1
+    return text[:low].rstrip() + DOTS if low else ""
+
+
+def fold(text: str, size: float, room: float, most: int) -> Sequence[str]:
+    """A text in lines of at most `room` pixels, broken at blanks; the last of `most` lines is cut."""
+    words, lines = text.split(), []
+    while words and len(lines) < most - 1:
+        count = 1
+        while count < len(words) and width_of(" ".join(words[: count + 1]), size) <= room:
+            count += 1
+        lines.append(cut(" ".join(words[:count]), size, room))
+        words = words[count:]
+    if words:
+        lines.append(cut(" ".join(words), size, room))
+    return lines
