@@ -13,7 +13,7 @@ from typing import Any, cast
 from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
-from bml_schema.canonical import attributes, canonical
+from bml_schema.canonical import MOST_ATTRIBUTES, attributes, canonical
 from bml_schema.errors import Fault, shown
 from bml_schema.escape import escape
 from bml_schema.nodes import (
@@ -110,7 +110,10 @@ class Elements:
         faults: list[str] = []
         known = shape.attributes
         points = shape.points if timed else ()
-        for name, text in attributes(element):
+        if len(element.attrib) > MOST_ATTRIBUTES:
+            attributes(element)  # which refuses them
+        items: Any = element.items()
+        for name, text in items:
             spec = known.get(name)
             try:
                 if spec is None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from lxml import etree
 
+from bml_schema.asap import FaceKeyframe
 from bml_schema.behaviours import Speech, SpeechText
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
@@ -201,6 +202,8 @@ def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behavi
             for p in node.text.parts
         )
         return replace(node, text=SpeechText(parts=parts))
+    if isinstance(node, FaceKeyframe):
+        return replace(node, interpolator=None)  # thousands of numbers that nobody reads from feedback
     return node
 
 

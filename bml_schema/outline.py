@@ -24,21 +24,23 @@ class Kind(NamedTuple):
     Attributes:
         step: name in paths.
         cls: None for a constraint and for what is unknown.
-        points: what references may name; None if that depends on the element, or nobody knows.
+        points: what references may name; None where nobody knows.
+        varies: that depends on the element: a number of strokes, or marks in what is said.
     """
 
     tag: str
     step: str
     cls: type[Behaviour] | None = None
     points: Points | None = None
+    varies: bool = False
 
 
 def _kind_of(cls: type[Behaviour]) -> Kind:
     kind = _KINDS.get(cls)
     if kind is None:
         shape = shape_of(cls)
-        points = None if cls.marks or shape.strokes else Points(shape.points)
-        kind = _KINDS[cls] = Kind(cls.tag, shape.name, cls, points)
+        varies = cls.marks or shape.strokes
+        kind = _KINDS[cls] = Kind(cls.tag, shape.name, cls, Points(shape.points), varies)
     return kind
 
 
@@ -102,7 +104,7 @@ class Outline:
             # What references may say of it, before any is read.
             if id and id not in owners and kind.tag != Constraint.tag:
                 owners[id] = entry
-                points[id] = kind.points or self.points(element, kind)
+                points[id] = self.points(element, kind) if kind.varies else kind.points
         if loose and not loose.isspace():
             self.loose.append((loose.strip(), parent, path))
         return tree
@@ -114,13 +116,13 @@ class Outline:
         return Kind(tag, local(tag)) if cls is None else _kind_of(cls)
 
     def points(self, element: etree._Element, kind: Kind) -> Points | None:
-        """What references may name of an element whose kind does not tell."""
-        if kind.cls is None:
+        """What references may name of an element of a kind that varies."""
+        if kind.points is None or kind.cls is None:
             return None
-        names = shape_of(kind.cls).points
+        names = frozenset(kind.points.names)
         if not kind.cls.marks:
-            times = element.get("repetition", "1").strip()
-            return Points(names, int(times) if times.isdecimal() and len(times) < 6 else 1)
+            times = element.get("repetition", "").strip()
+            return Points(names, int(times)) if times.isdecimal() and len(times) < 6 else kind.points
         marks: list[str] = []
         for child in element:
             tag = self.elements.tag(child)
@@ -129,7 +131,7 @@ class Outline:
             elif tag == Description.tag:
                 # It may name points that the core text leaves out.
                 marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]
-        return Points(names.union(m for m in marks if ":" not in m) if marks else names)
+        return Points(names.union(m for m in marks if ":" not in m)) if marks else kind.points
 
 
 def flat(tree: list[Entry | list[Entry]]) -> list[Entry]:

@@ -17,6 +17,8 @@ from bml_schema import (
     BlockPrediction,
     BlockProgress,
     BMLError,
+    FaceInterpolator,
+    FaceKeyframe,
     Feedback,
     PredictionFeedback,
     Speech,
@@ -176,6 +178,13 @@ def test_predicted_speech_tells_its_syncs_in_the_text() -> None:
     assert speech.text.parts == ("Hi ", Sync(id="m", ref=SyncRef(offset=2.0)), " you")
     assert not speech.descriptions
     assert '<sync id="m" ref="2"/>' in PredictionFeedback(behaviours=(speech,)).to_xml()
+
+
+def test_what_is_predicted_tells_no_keys_and_nothing_of_others() -> None:
+    keys = FaceInterpolator(parts="31", keys="0 1\n" * 1000)
+    node = FaceKeyframe(id="k", type="FAPS", interpolator=keys, others=('<a xmlns="urn:a"/>',))
+    told = predicted(node, "b", {"start": 0.0, "end": 1.0})
+    assert told == FaceKeyframe(id="b:k", type="FAPS", syncs={"start": SyncRef(), "end": SyncRef(offset=1.0)})
 
 
 def test_unknown_children_of_a_prediction_are_skipped() -> None:
