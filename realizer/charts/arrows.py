@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from realizer.charts.colours import HELD, LINK, PAPER, ROOM, TIGHT
-from realizer.charts.rows import ABOVE, BAR
+from realizer.charts.rows import ABOVE, BAR, SMALL
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
 from realizer.charts.timeline import BlockLine, Line, Link
@@ -25,7 +25,7 @@ def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine,
         _, _, top = places[block.block, line.id]
         when = {point.name: start + point.time for point in line.points}
         pinned: set[str] = set()
-        for link in line.links:
+        for link in sorted(line.links, key=lambda link: link.binds):
             x = scale.x(when[link.sync])
             there = places.get((link.block or block.block, link.behaviour or ""))
             if link.kind in ("before", "after"):
@@ -62,10 +62,10 @@ def _tie(
         up = 6.0 if end[1] > begin[1] else -6.0
         marks.add(Path((end, (end[0] - 3.5, end[1] - up), (end[0] + 3.5, end[1] - up)), fill=LINK))
     if abs(link.offset) > 5e-4:
-        # Near the end, where the arrow is: many may begin at one point.
-        x, y = curve[int(0.72 * BEND)]
         words = f"{link.offset:+.2f}".rstrip("0").rstrip(".")
-        marks.add(Text(x, y + 3, words, 8.5, LINK, "middle", PAPER))
+        left = link.sync == "end"  # it stands over the bar then, not beside it
+        x, anchor = (here[0] - 6, "end") if left else (here[0] + 6, "start")
+        marks.add(Text(x, here[1] + ABOVE - 3.5, words, SMALL, LINK, anchor, PAPER))
 
 
 def _room(
@@ -93,8 +93,10 @@ def _room(
             *hatch(left, y, right - left, height, colour),
         )
         words = f"{link.slack:.2f} s"
-        if width_of(words, 8.5) < right - left - 8:
-            marks.add(Text((left + right) / 2, y + 7, words, 8.5, colour, "middle", "#f4f1fb"))
+        wide, middle = width_of(words, SMALL), (left + right) / 2
+        if wide < right - left - 12:
+            marks.add(Box(middle - wide / 2 - 4, y, wide + 8, height, PAPER))
+            marks.add(Text(middle, y + 7.5, words, SMALL, colour, "middle"))
     # A bracket that opens to where the point may go.
     turn = -4.0 if link.kind == "before" else 4.0
     bracket = ((bound + turn, y), (bound, y), (bound, y + height), (bound + turn, y + height))
@@ -114,7 +116,7 @@ def _pin(marks: Picture, x: float, top: float, link: Link) -> None:
     inside = HELD if link.behaviour is None else PAPER
     marks.add(Path(((x, y), (x - 4, y - 7), (x + 4, y - 7)), HELD, 1.0, fill=inside, tip=_words(link)))
     if link.target is not None:
-        marks.add(Text(x + 7, y - 1, str(link.target), 8.5, HELD, halo=PAPER))
+        marks.add(Text(x + 7, y - 1, str(link.target), SMALL, HELD, halo=PAPER))
 
 
 def _edges(

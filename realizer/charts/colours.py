@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 __all__ = [
@@ -43,11 +44,8 @@ SCALE = (
 
 def colour_of(stretch: float) -> str:
     """The colour of a gap that is `stretch` times its preferred length; 0 and inf have the ends' colours."""
-    if stretch <= 0:
-        place = -1.0
-    else:
-        place = min(1.0, max(-1.0, math.log(stretch) / math.log(3.0)))
-    for (low, first), (high, last) in zip(SCALE[:-1], SCALE[1:], strict=True):
+    place = -1.0 if stretch <= 0 else min(1.0, max(-1.0, math.log(stretch) / math.log(3.0)))
+    for (low, first), (high, last) in itertools.pairwise(SCALE):
         if place <= high:
             part = (place - low) / (high - low)
             mixed = (round(a + (b - a) * part) for a, b in zip(first, last, strict=True))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from realizer.charts.colours import FAINT, HELD, LINK, LOST, RIGID, ROOM, TIGHT, colour_of
+from realizer.charts.rows import NAME
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
 from realizer.charts.timeline import BlockLine
@@ -13,6 +14,7 @@ from realizer.charts.timeline import BlockLine
 __all__ = ["draw"]
 
 SIZE = 10.5
+TITLE = "length of gaps"
 STEPS = 40  # of the colour scale
 WIDE = 168.0
 
@@ -20,24 +22,24 @@ WIDE = 168.0
 def draw(picture: Picture, scale: Scale, top: float, blocks: Sequence[BlockLine]) -> float:
     """Draw the legend; of marks only those that the picture has. Returns where the picture ends."""
     y = top + 14
-    x = scale.left
-    picture.add(Text(x, y + 10, "length of a gap, of what it would like:", SIZE, FAINT))
-    x += width_of("length of a gap, of what it would like:", SIZE) + 14
+    x = NAME
+    picture.add(Text(x, y + 10, TITLE, SIZE, FAINT))
+    x += width_of(TITLE, SIZE) + 14
     for k in range(STEPS):
         stretch = math.exp((2 * (k + 0.5) / STEPS - 1) * math.log(3.0))
         picture.add(Box(x + WIDE * k / STEPS, y, WIDE / STEPS + 0.5, 12, colour_of(stretch)))
     picture.add(Box(x, y, WIDE, 12, None, "#4b5563"))
-    for part, words in ((0.0, "33 %"), (0.5, "100 %"), (1.0, "300 %")):
+    for part, words in ((0.0, "33%"), (0.5, "as preferred"), (1.0, "300%")):
         picture.add(Text(x + WIDE * part, y + 24, words, 9.5, FAINT, "middle"))
     x += WIDE + 34
     row = y
     for mark, words in _marks(blocks):
         if x + 30 + width_of(words, SIZE) > scale.right:
-            x, row = scale.left, row + (34 if row == y else 20)
+            x, row = NAME, row + (38 if row == y else 20)
         mark(picture, x, row)
         picture.add(Text(x + 26, row + 10, words, SIZE, FAINT))
-        x += 26 + width_of(words, SIZE) + 26
-    return row + 40
+        x += 26 + width_of(words, SIZE) + 22
+    return row + (34 if row == y else 22)
 
 
 Mark = Callable[[Picture, float, float], None]

@@ -10,12 +10,13 @@ from realizer.charts.arrows import draw_links
 from realizer.charts.colours import FAINT, GRID, INK, PAPER, TIGHT
 from realizer.charts.rows import HEIGHT, NAME, draw_dropped, draw_line, height_of
 from realizer.charts.scale import Scale, last_of, scale_of
-from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut, width_of
+from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut_inside, width_of
 from realizer.charts.timeline import BlockLine, Line
 
 __all__ = ["timeline"]
 
 AXIS = 30.0
+TALL = 600.0  # a picture that is taller has an axis below too
 HEAD = 34.0  # of a block
 APART = 18.0  # between blocks
 # Element -> what its rows are grouped as, in the order of the groups.
@@ -46,7 +47,7 @@ def timeline(blocks: Sequence[BlockLine]) -> Picture:
     picture.shapes[:0] = _grid(scale, bottom)
     for layer in (below, bars, above):
         picture.add(*layer.shapes)
-    return replace(picture, height=legend.draw(picture, scale, bottom + 26, blocks))
+    return replace(picture, height=legend.draw(picture, scale, bottom + (24 if bottom > TALL else 4), blocks))
 
 
 def _block(
@@ -81,16 +82,19 @@ def _block(
     if block.lines:
         frame.append(Box(left, top + HEAD - 2, right - left, HEIGHT * len(block.lines) + 2, "#f8fafc"))
     picture.shapes[ground:ground] = frame
-    name = cut(block.block, 14, scale.left - 24)
+    name = cut_inside(block.block, 14, scale.left - 24)
     bars.add(Text(14, top + 21, name, 14, INK))
-    bars.add(Text(max(scale.left, 24 + width_of(name, 14)), top + 20.5, _about(block), 11, FAINT))
+    x = scale.left
+    for words in _about(block):
+        bars.add(Text(x, top + 20.5, words, 11, FAINT))
+        x += width_of(words, 11) + 18
     if block.state not in QUIET:
         words = block.state.lower()
         bars.add(Text(scale.right, top + 20.5, words, 11, TIGHT, "end"))
     return y
 
 
-def _about(block: BlockLine) -> str:
+def _about(block: BlockLine) -> list[str]:
     words = []
     if block.start is None:
         words.append(f"not started: {last_of(block):.2f} s long")
@@ -104,16 +108,17 @@ def _about(block: BlockLine) -> str:
         words.append(f"cost {block.cost:.3g}")
     if block.dropped:
         words.append(f"{len(block.dropped)} dropped")
-    return "     ".join(words)
+    return words
 
 
 def _grid(scale: Scale, bottom: float) -> list[Shape]:
     shapes: list[Shape] = []
+    ys = (AXIS - 10, bottom + 14) if bottom > TALL else (AXIS - 10,)
     for time, words in scale.ticks():
         x = scale.x(time)
         shapes.append(Path(((x, AXIS - 4), (x, bottom)), GRID, 1.0))
-        shapes += [Text(x, y, words, 10.5, FAINT, "middle") for y in (AXIS - 10, bottom + 14)]
-    shapes += [Text(NAME, y, "seconds", 10.5, FAINT) for y in (AXIS - 10, bottom + 14)]
+        shapes += [Text(x, y, words, 10.5, FAINT, "middle") for y in ys]
+    shapes += [Text(NAME, y, "seconds", 10.5, FAINT) for y in ys]
     shapes.append(Path(((scale.left, bottom), (scale.right, bottom)), "#c3c8d1", 1.0))
     return shapes
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
-from realizer.charts.shapes import Box, Path, Picture, Text, font
+from realizer.charts.shapes import FINE, Box, Path, Picture, Text, font
 from realizer.errors import RealizerError
 
 if TYPE_CHECKING:
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 __all__ = ["png"]
 
-SCALE = 2  # pixels of the PNG for one of the picture
 SMOOTH = 2  # and of what it is drawn as, for one of the PNG: Pillow's lines have stairs
 # Pixels that are drawn at once: more would take more memory than a picture is worth.
 MOST = 64_000_000
@@ -28,7 +27,7 @@ def png(picture: Picture) -> bytes:
     from PIL import Image, ImageDraw
 
     area = picture.width * picture.height
-    fitting = [(s, m) for s, m in ((SCALE, SMOOTH), (SCALE, 1), (1, 1)) if area * (s * m) ** 2 <= MOST]
+    fitting = [(s, m) for s, m in ((FINE, SMOOTH), (FINE, 1), (1, 1)) if area * (s * m) ** 2 <= MOST]
     if not fitting:
         raise RealizerError(
             f"wanted a picture of at most {MOST} pixels, got {picture.width:.0f}x{picture.height:.0f}: "
@@ -48,7 +47,7 @@ def png(picture: Picture) -> bytes:
         if isinstance(shape, Text):
             _write(pen, shape, scale)
     buffer = io.BytesIO()
-    image.save(buffer, "PNG", optimize=True)
+    image.save(buffer, "PNG", compress_level=6)
     return buffer.getvalue()
 
 

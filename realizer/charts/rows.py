@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from realizer.charts.colours import FAINT, INK, LOST, PAPER, RIGID, colour_of, on
 from realizer.charts.scale import Scale
-from realizer.charts.shapes import Box, Path, Picture, Text, cut, fold, hatch, width_of
+from realizer.charts.shapes import Box, Path, Picture, Text, cut, cut_inside, fold, hatch, width_of
 from realizer.charts.timeline import Dropped, Gap, Line
 
 __all__ = ["BAR", "HEIGHT", "NAME", "draw_dropped", "draw_line", "height_of"]
 
-HEIGHT = 48.0
+HEIGHT = 46.0
 # Above the bar there is room for pins and for what orders leave, below it for the names of the points.
 ABOVE, BAR = 13.0, 18.0
 NAME = 62.0  # where ids begin; kinds stand before them
 SMALL, PLAIN = 9.5, 12.5
-MOST_WHY = 3  # lines of a reason
+SAME = 1e-6  # s; a word at a sync point begins there, however it was rounded
+MOST_WHY = 4  # lines of a reason
+_AT = re.compile(r"line \d+, /\S*: ")
 
 
 def draw_line(
@@ -56,7 +59,7 @@ def draw_dropped(picture: Picture, scale: Scale, dropped: Dropped, top: float, h
     """Draw what is not there, and why."""
     where = "" if dropped.line is None else f", line {dropped.line}"
     _name(picture, dropped.id, f"{dropped.element or 'dropped'}{where}", top - 6, LOST, LOST)
-    width = width_of(cut(dropped.id, PLAIN, scale.left - NAME - 12), PLAIN)
+    width = width_of(cut_inside(dropped.id, PLAIN, scale.left - NAME - 12), PLAIN)
     picture.add(Path(((NAME, top + 12), (NAME + width, top + 12)), LOST, 1.0))
     picture.add(Box(scale.left, top + 3, scale.right - scale.left, height - 6, "#f3f4f6", radius=3))
     picture.add(*hatch(scale.left, top + 3, 16, height - 6, LOST, 6))
@@ -76,7 +79,7 @@ def colour(gap: Gap) -> str:
 
 def _name(picture: Picture, id: str, about: str, top: float, ink: str, faint: str) -> None:
     room = Scale(0, 1, 1).left - NAME - 12
-    picture.add(Text(NAME, top + 22, cut(id, PLAIN, room), PLAIN, ink))
+    picture.add(Text(NAME, top + 22, cut_inside(id, PLAIN, room), PLAIN, ink))
     picture.add(Text(NAME, top + 35, cut(about, SMALL, room), SMALL, faint))
 
 
@@ -116,15 +119,17 @@ def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) 
 
 
 def _say(picture: Picture, scale: Scale, line: Line, start: float, bar: float) -> None:
-    """The words, each at its time; as one line where they do not fit."""
+    """The words, each at its time; where they do not fit, as a line from point to point."""
     spans = [(scale.x(start + w.start), scale.x(start + w.end), w.text) for w in line.words]
     if all(width_of(text, 10.5) <= max(right - left, 12) + 3 for left, right, text in spans):
         for left, right, text in spans:
             picture.add(Text((left + right) / 2, bar + 13, text, 10.5, INK, "middle"))
         return
-    left, right = (scale.x(start + line.points[k].time) for k in (0, -1))
-    text = cut(" ".join(w.text for w in line.words), 10.5, right - left - 8)
-    picture.add(Text(left + 4, bar + 13, text, 10.5, INK))
+    for begin, end in zip(line.points[:-1], line.points[1:], strict=True):
+        left, right = scale.x(start + begin.time), scale.x(start + end.time)
+        said = " ".join(w.text for w in line.words if begin.time - SAME <= w.start < end.time - SAME)
+        if text := cut(said, SMALL, right - left - 6):
+            picture.add(Text(left + 4, bar + 12.5, text, SMALL, INK))
 
 
 def _names(
@@ -153,4 +158,6 @@ def _shifts(wide: float, k: int, count: int) -> Iterable[float]:
 
 
 def _why(dropped: Dropped, scale: Scale) -> Sequence[str]:
-    return fold(dropped.text, 10.5, scale.right - scale.left - 36, MOST_WHY)
+    # The line of the document stands under the name.
+    text = _AT.sub("", dropped.text)
+    return fold(text, 10.5, scale.right - scale.left - 36, MOST_WHY)

@@ -14,7 +14,7 @@ GUTTER = 190.0  # where the names stand
 MARGIN = 26.0  # on the right
 WIDTH = 1200.0
 # A second is at least this wide, until the picture is WIDEST.
-SECOND, WIDEST = 64.0, 4000.0
+SECOND, WIDEST = 90.0, 4000.0
 APART = 64.0  # least distance of two times on the axis
 
 

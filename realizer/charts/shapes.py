@@ -11,9 +11,23 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-__all__ = ["Box", "Path", "Picture", "Shape", "Text", "cut", "fold", "font", "hatch", "width_of"]
+__all__ = [
+    "FINE",
+    "Box",
+    "Path",
+    "Picture",
+    "Shape",
+    "Text",
+    "cut",
+    "cut_inside",
+    "fold",
+    "font",
+    "hatch",
+    "width_of",
+]
 
 DOTS = "..."
+FINE = 2  # text is measured, and drawn in PNG, with this many pixels for one of the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +124,8 @@ def font(size: float, plain: bool = True) -> FreeTypeFont | ImageFont:
 def width_of(text: str, size: float) -> float:
     """How wide a line of text is, in pixels; an estimate where it is not ASCII."""
     if text.isascii():
-        return float(font(100.0).getlength(text)) * size / 100.0
+        # As PNG draws it: letters stand on whole pixels, which a larger font would not show.
+        return float(font(size * FINE).getlength(text)) / FINE
     wide = sum(1.0 if unicodedata.east_asian_width(c) in "WF" else 0.62 for c in text if not c.isascii())
     return wide * size + width_of("".join(c for c in text if c.isascii()), size)
 
@@ -129,9 +144,18 @@ def cut(text: str, size: float, room: float) -> str:
     return text[:low].rstrip() + DOTS if low else ""
 
 
+def cut_inside(text: str, size: float, room: float) -> str:
+    """As `cut`, but the end stays: of names that is where they differ."""
+    if width_of(text, size) <= room:
+        return text
+    kept = text[-5:]
+    return cut(text[:-5], size, room - width_of(kept, size)) + kept
+
+
 def fold(text: str, size: float, room: float, most: int) -> Sequence[str]:
     """A text in lines of at most `room` pixels, broken at blanks; the last of `most` lines is cut."""
-    words, lines = text.split(), []
+    words = text.split()
+    lines: list[str] = []
     while words and len(lines) < most - 1:
         count = 1
         while count < len(words) and width_of(" ".join(words[: count + 1]), size) <= room:
