@@ -110,7 +110,7 @@ def optimum(quadratic: Quadratic, level: Float64) -> Float64:
         number[u],
         number[v],
         quadratic.w + shift[u] - shift[v],
-        number[[ties.find(p) for p in quadratic.piece[first].tolist()]],
+        np.unique([ties.find(p) for p in quadratic.piece[first].tolist()], return_inverse=True)[1],
     )
     if smaller.size == 1:
         return level
