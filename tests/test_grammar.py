@@ -97,13 +97,13 @@ def plays(text: str) -> None:
     if not schedules[0].failed:
         stays(blocks[0], schedules[0])
     calm = not any(map(ends_or_withholds, blocks))
-    if calm:
-        # A later block may have moved an earlier one, and dropped what cannot follow. Nothing is left of one
-        # that had to end at once, because something required failed.
-        schedules = [latest if (latest := player.latest(s)).times else s for s in schedules]
+    latest = [player.latest(schedule) for schedule in schedules]
     faces(player)
     told += run(player, LATEST)
-    for block, schedule in zip(blocks, schedules, strict=True):
+    done = {f.id.rpartition(":")[0] for f in told if isinstance(f, BlockProgress) and f.status == "DONE"}
+    for block, planned, moved in zip(blocks, schedules, latest, strict=True):
+        # A later block may have moved an earlier one, and dropped what cannot follow.
+        schedule = moved if calm and block.id in done else planned
         well_told(block, schedule, told, calm)
         if calm:
             well_predicted(block, told)
