@@ -14,6 +14,7 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from realizer.charts.timeline import BlockLine
     from realizer.player import Player
     from realizer.scheduling.timing import Schedule
 
@@ -120,13 +121,17 @@ def dropped(planned: Schedule) -> bool:
 @options.documents
 @click.option("--json", "as_json", is_flag=True, help="As JSON instead of a table.")
 @click.option("--bml", "as_bml", is_flag=True, help="As the documents themselves, with all times as numbers.")
+@click.option("--detail", is_flag=True, help="With --json: gaps, what ties them, and what was dropped, too.")
 @click.option("-o", "--output", metavar="FILE", help="Where to, instead of here.")
+@click.option("--plot", metavar="FILE", help="Draw the timeline, as .svg or .png, instead of a table.")
 @options.playing
 def schedule(
     documents: tuple[str, ...],
     as_json: bool,
     as_bml: bool,
+    detail: bool,
     output: str | None,
+    plot: str | None,
     voice: str | None,
     scene: str | None,
     media: Path | None,
@@ -136,12 +141,19 @@ def schedule(
 
     With --bml every document comes back with these times, what was dropped left out; scheduling it again
     gives the same times.
+
+    A plot has a row for each behaviour: its sync points, its gaps coloured by how far they are from the
+    length they would like, what ties them, how much room before and after leave, and what was dropped.
     """
     from realizer.pipeline import play
     from realizer.player import Player
 
     if as_json and as_bml:
         raise click.UsageError("--json, --bml: wanted one of them, got both")
+    if detail and not as_json:
+        raise click.UsageError("--detail: wanted --json too")
+    if plot is not None:
+        _check_plot(plot)
     chosen = options.settings(voice=voice, scene=scene, media=media)
     player = Player(
         scene=options.read_scene(chosen.scene), idle=False, language=chosen.language, media=chosen.media
@@ -158,9 +170,13 @@ def schedule(
         words = _as_documents(texts, schedules)
     elif as_json:
         out: Any = [s.to_json() for s in schedules]
+        if detail:
+            out = [told | line.detail() for told, line in zip(out, _lines(player, accepted), strict=True)]
         words = json.dumps(out[0] if len(out) == 1 and len(documents) == 1 else out, indent=1) + "\n"
     else:
-        words = "".join(_table(planned) for planned in schedules)
+        words = "" if plot is not None else "".join(_table(planned) for planned in schedules)
+    if plot is not None:
+        _plot(player, accepted, plot)
     if output in (None, "-"):
         click.echo(words, nl=False)
     elif output is not None:
@@ -175,6 +191,32 @@ def _moved(player: Player, planned: Schedule) -> Schedule:
     """The schedule as later documents moved it; as it was planned where they ended it before its time."""
     latest = player.latest(planned)
     return latest if latest.times.keys() == planned.times.keys() else planned
+
+
+def _check_plot(plot: str) -> None:
+    """Before anything is planned."""
+    from realizer.charts.files import writer_for
+
+    try:
+        writer_for(plot)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--plot") from None
+
+
+def _plot(player: Player, accepted: list[Schedule], plot: str) -> None:
+    from realizer.charts.files import write_timeline
+
+    try:
+        write_timeline(_lines(player, accepted), plot)
+    except OSError as error:
+        raise click.UsageError(f"{plot}: {error.strerror or error}") from None
+
+
+def _lines(player: Player, accepted: list[Schedule]) -> list[BlockLine]:
+    """The blocks of these schedules as charts and their data show them."""
+    from realizer.charts.timeline import lines_of
+
+    return lines_of(player.cast, accepted)
 
 
 def _table(planned: Schedule) -> str:

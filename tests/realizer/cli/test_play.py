@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 
@@ -101,3 +102,53 @@ def test_json_and_bml_at_once_are_wrong_usage(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, ["schedule", "-", "-o", str(tmp_path / "no" / "x")], input=TALK)
     assert done.exit_code == 2
     assert "No such file" in done.stderr
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_a_plot_is_drawn_instead_of_a_table(tmp_path: Path, suffix: str) -> None:
+    out = tmp_path / f"timeline{suffix}"
+    done = schedule("-", "--plot", str(out), text=TALK)
+    assert (done.return_value, done.stdout) == (0, "")
+    assert out.read_bytes().startswith(b"<svg" if suffix == ".svg" else b"\x89PNG")
+
+
+def test_a_plot_and_its_times_come_together_where_both_are_wanted(tmp_path: Path) -> None:
+    out = tmp_path / "timeline.svg"
+    both = schedule("-", "--json", "--plot", str(out), text=TALK)
+    assert json.loads(both.stdout) == json.loads(schedule("-", "--json", text=TALK).stdout)
+    assert ">n<" in out.read_text()
+
+
+def test_several_documents_share_a_plot(tmp_path: Path) -> None:
+    (tmp_path / "a.bml").write_text(TALK)
+    (tmp_path / "b.bml").write_text(TALK.replace('id="b"', 'id="later" composition="APPEND"'))
+    out = tmp_path / "timeline.svg"
+    schedule(str(tmp_path / "a.bml"), str(tmp_path / "b.bml"), "--plot", str(out))
+    assert "Timeline of b, later" in out.read_text()
+
+
+@pytest.mark.parametrize("name", ["timeline.pdf", "timeline"])
+def test_a_plot_of_another_kind_is_refused_before_anything_is_planned(tmp_path: Path, name: str) -> None:
+    with pytest.raises(click.BadParameter, match=r"wanted a suffix of \.svg \.png"):
+        schedule("-", "--plot", str(tmp_path / name), text=TALK)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plot_that_cannot_be_written_is_wrong_usage(tmp_path: Path) -> None:
+    with pytest.raises(click.UsageError, match="No such file or directory"):
+        schedule("-", "--plot", str(tmp_path / "nowhere" / "timeline.svg"), text=TALK)
+
+
+def test_json_in_detail_has_the_fixed_keys_and_more() -> None:
+    plain = json.loads(schedule("-", "--json", text=TALK).stdout)
+    detailed = json.loads(schedule("-", "--json", "--detail", text=TALK).stdout)
+    assert {key: detailed[key] for key in plain} == plain
+    assert set(detailed) - set(plain) == {"state", "cost", "gaps", "links", "dropped"}
+    assert detailed["gaps"].keys() == detailed["links"].keys() == plain["behaviours"].keys()
+    assert [link["to"] for link in detailed["links"]["n"]] == ["s:t"]
+    assert [gone["id"] for gone in detailed["dropped"]] == ["f"]
+
+
+def test_detail_without_json_is_wrong_usage() -> None:
+    with pytest.raises(click.UsageError, match="wanted --json"):
+        schedule("-", "--detail", text=TALK)
