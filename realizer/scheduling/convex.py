@@ -70,7 +70,7 @@ def settled(quadratic: Quadratic, x: Float64) -> Float64 | None:
     if (w[~differ] > LOOSE).any():
         return None
     binding = (x[v] - x[u] < w - TIGHT) & differ
-    seen: set[bytes] = set()
+    seen: list[bytes] = []
     for _ in range(GUESSES):
         exact, force = _bound(quadratic, binding, x)
         broken = (exact[v] - exact[u] < w - TIGHT) & differ
@@ -78,9 +78,11 @@ def settled(quadratic: Quadratic, x: Float64) -> Float64 | None:
         if not wrong.any():
             return exact
         binding = (binding & ~wrong) | broken
-        if (guess := binding.tobytes()) in seen:
+        # From elsewhere the same guess may mean other ties, but not for ever.
+        seen.append(binding.tobytes())
+        if seen.count(seen[-1]) > 2:
             return None
-        seen.add(guess)
+        x = exact
     return None
 
 
@@ -163,6 +165,8 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
     root, shift, whole = np.arange(m), np.zeros(m), quadratic.piece
     beside: dict[int, list[tuple[int, int]]] = {}
     held = np.flatnonzero(binding)
+    # What is farthest from being kept comes first: of several that tie the same nodes the first one counts.
+    held = held[np.argsort((x[quadratic.v] - x[quadratic.u] - quadratic.w)[held], kind="stable")]
     if len(held):
         ties, pieces = Ties(m), Ties(m)
         ends = [end[held].tolist() for end in (quadratic.u, quadratic.v, quadratic.w)]
