@@ -14,7 +14,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.asap import FaceKeyframe
-from bml_schema.behaviours import Speech, SpeechText
+from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.escape import escape, escape_value, legal
@@ -194,14 +194,13 @@ def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behavi
     node = replace(
         node, id=f"{block}:{node.id}", syncs=syncs, descriptions=(), foreign={}, others=(), priority=0.0
     )
-    if isinstance(node, Speech) and node.text is not None:
-        parts = tuple(
-            p
-            if isinstance(p, str)
-            else replace(p, ref=SyncRef(offset=round(times[p.id], 6)) if p.id in times else None)
-            for p in node.text.parts
-        )
-        return replace(node, text=SpeechText(parts=parts))
+    if isinstance(node, Speech):
+        refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}
+        parts = node.text.parts if node.text is not None else ()
+        parts = tuple(p if isinstance(p, str) else replace(p, ref=refs.pop(p.id, None)) for p in parts)
+        # Marks that only a description names stand behind the text.
+        parts += tuple(Sync(id=mark, ref=ref) for mark, ref in refs.items())
+        return replace(node, text=SpeechText(parts=parts) if parts else node.text)
     if isinstance(node, FaceKeyframe):
         return replace(node, interpolator=None)  # thousands of numbers that nobody reads from feedback
     return node

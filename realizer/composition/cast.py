@@ -82,6 +82,11 @@ class Cast:
         newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
         return self._past.get(id) if newest is None else newest.schedule
 
+    def first_of(self, id: str) -> Schedule | None:
+        """Of the newest block of an id, as it was when it was accepted, from where it starts now."""
+        newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
+        return None if newest is None else replace(newest.first, start=newest.start)
+
     def anticipate(self, id: str, syncs: Mapping[str, float]) -> None:
         """Points in time that a client expects, seconds on the session clock."""
         known = {**self._anticipated.behaviours.get(id, {}), **syncs}

@@ -12,8 +12,8 @@ from realizer.composition import relations
 from realizer.composition.calendar import Calendar
 from realizer.composition.cast import Cast
 from realizer.composition.character import Character
-from realizer.composition.playing import Playing
-from realizer.composition.references import references
+from realizer.composition.claims import claims, losses
+from realizer.composition.playing import Playing, Wait
 from realizer.composition.reporting import Reports, State, prediction, progress
 from realizer.composition.retiming import member, touched
 from realizer.planning import Plan
@@ -56,26 +56,46 @@ class Course:
         world: World,
         start: float,
         now: float,
-        without: Collection[Playing],
+        *,
+        waits: Collection[Wait] = (),
+        ended: Collection[Playing] = (),
+        alone: bool = False,
     ) -> tuple[Plan, list[Playing]]:
-        """The plan of a block beside those that are alive, `without` some, and whom it is solved with.
+        """The plan of a block beside those that are alive, and whom it is solved with.
 
         While it is not known when it starts, it is planned as if that were now, and moves nobody.
+
+        Args:
+            waits: what it waits for.
+            ended: whom it ends.
+            alone: it takes the points of others as they are.
         """
         known = start < FOREVER
         origin = start if known else now
-        alive = [p for p in self.cast.alive() if p not in without]
-        others = touched([block], alive, now) if known else []
+        alive = [p for p in self.cast.alive() if p not in ended and p.block.id != block.id]
+        others = touched(block, alive, now, waits) if known and not alone else []
+        schedule_of = relations.stopped(self.cast.schedule_of, ended, now)
         planned = plan_block(
             block,
             self.kinds,
             world,
             start=origin,
-            outside=relations.instants(self.cast.schedule_of, origin),
+            outside=relations.instants(schedule_of, origin, self.cast.first_of),
             held=relations.held(character, alive),
             others=[member(p, origin, now) for p in others],
         )
+        if others and self._disturb(others, planned.moved):
+            return self.plan(block, character, world, start, now, waits=waits, ended=ended, alone=True)
         return planned, others
+
+    def _disturb(self, blocks: Sequence[Playing], schedules: Sequence[Schedule]) -> bool:
+        """Whether blocks with other times would want what the rest holds."""
+        for playing, schedule in zip(blocks, schedules, strict=True):
+            at = replace(schedule, start=playing.start)
+            held = relations.held(playing.character, self.cast.alive(), blocks)
+            if losses(claims(playing.block, at, self.kinds, playing.world), held):
+                return True
+        return False
 
     def set_out(self, playing: Playing) -> None:
         """A block has a new start: it shifts base states then, and its events are due."""
@@ -102,24 +122,34 @@ class Course:
         """A block's times have changed: those that wait for it, and for them, may start at another time."""
         moved = deque([playing])
         while moved:
-            for other in list(moved.popleft().followers):
-                if other.waiting and self.move(other, now):
+            first = moved.popleft()
+            for other in list(first.followers):
+                if other.waiting and self.move(other, now, after=first.block.id):
                     moved.append(other)
 
-    def move(self, playing: Playing, now: float) -> bool:
-        """Let a waiting block start when it now may; False where that is when it was to."""
+    def move(self, playing: Playing, now: float, *, after: str = "") -> bool:
+        """Let a waiting block start when it now may; False where nothing about it changes.
+
+        Args:
+            after: the block that it waits for and that has moved; its points are taken as they are.
+        """
         start = playing.earliest
-        if start == playing.start:
+        named = {ref.block for ref in playing.abroad}
+        if start == playing.start and after not in named:
             return False
         self.calendar.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         planned = playing.plan
         others: list[Playing] = []
-        refers = any(ref.block is not None for ref in references(playing.block))
-        if start < FOREVER and (playing.start == FOREVER or refers):
-            # Its claims were never compared, or its references have other times from the new start.
+        if start < FOREVER and (playing.start == FOREVER or named or self._disturbed(playing, start)):
             planned, others = self.plan(
-                playing.block, playing.character, playing.world, start, now, [playing]
+                playing.block,
+                playing.character,
+                playing.world,
+                start,
+                now,
+                waits=playing.waits,
+                alone=bool(after),
             )
             if planned.schedule.failed:
                 self.reports.warn(planned.schedule.warnings[0], playing.block.character_id)
@@ -135,6 +165,14 @@ class Course:
         if others:
             self.retime(others, planned.moved, now)
         return True
+
+    def _disturbed(self, playing: Playing, start: float) -> bool:
+        """Whether others hold what a block claims when it starts at another time."""
+        if not playing.plan.claims:
+            return False
+        late = start - playing.start
+        wanted = [replace(c, begin=c.begin + late, end=c.end + late) for c in playing.plan.claims]
+        return bool(losses(wanted, relations.held(playing.character, self.cast.alive(), [playing])))
 
     def retime(self, blocks: Sequence[Playing], schedules: Sequence[Schedule], now: float) -> None:
         """Give blocks other times, each from its own start; what follows them follows."""
@@ -155,23 +193,26 @@ class Course:
 
     def tied(self, playing: Playing, now: float) -> list[Playing]:
         """The other blocks that are solved together with one."""
-        return [p for p in touched([playing.block], self.cast.alive(), now) if p is not playing]
+        return touched(playing.block, self.cast.alive(), now, playing.waits)
 
     def solve_again(self, blocks: Sequence[Playing], origin: float, now: float) -> None:
-        """Give blocks that play the times that now fit best."""
+        """Give blocks that play the times that now fit best; where none do, they stay as they are."""
+        if not blocks:
+            return
         members = [member(p, origin, now) for p in blocks]
-        instants = relations.instants(self.cast.schedule_of, origin)
+        instants = relations.instants(self.cast.schedule_of, origin, self.cast.first_of)
         found = schedule_together(members, outside=instants)
-        if not found[0].failed:
+        if not found[0].failed and not self._disturb(blocks, found):
             self.retime(blocks, found, now)
             return
-        why = found[0].warnings[0].text
+        why = found[0].warnings[0].text if found[0].failed else "it would disturb another block"
         for playing in blocks:
             told = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
             self.reports.warn(told, playing.block.character_id)
 
     def stop(self, playing: Playing, now: float) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
+        tied = self.tied(playing, now) if playing.begun else []
         self.calendar.drop(playing)
         state = State.INTERRUPTED if playing.begun else State.REVOKED
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
@@ -180,10 +221,12 @@ class Course:
         self.cast.end(playing)
         self.reports.tell(progress(playing.block, "end", now, state))
         self.changed()
+        self.solve_again([p for p in tied if not p.done], playing.start, now)
         self.follow(playing, now)
 
     def cut(self, playing: Playing, behaviours: Collection[str], now: float) -> None:
         """End some behaviours of a block; the block ends with the last of the others."""
+        tied = self.tied(playing, now)
         pending = self.calendar.pending(playing)
         self.calendar.drop(playing)
         self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
@@ -191,8 +234,7 @@ class Course:
         self.calendar.put(playing, pending)
         self.changed()
         self.predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
-        if others := self.tied(playing, now):
-            self.solve_again([*others], playing.start, now)
+        self.solve_again(tied, playing.start, now)
         self.follow(playing, now)
 
     def predict(self, playing: Playing, now: float, behaviours: Iterable[str] | None = None) -> None:

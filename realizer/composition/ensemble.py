@@ -84,7 +84,7 @@ class Ensemble:
         ended = relations.ended(block, character, self.cast.alive())
         state = State.PENDING if block.preplan and not fate.activated else State.LURKING
         start = FOREVER if state is State.PENDING else max([now, *(w.until for w in waits)])
-        planned, others = self.course.plan(block, character, world, start, now, ended)
+        planned, others = self.course.plan(block, character, world, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
         self._expected.arrive(block)

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bml_schema import Block
+from bml_schema import Block, SyncRef
 from realizer.animation.channel import Channel, Gain, Layer
 from realizer.animation.joints import joined
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Kind, World
 from realizer.composition.character import RELAX, Shift
 from realizer.composition.claims import claims
+from realizer.composition.references import abroad
 from realizer.composition.reporting import State
 from realizer.planning import Plan
 from realizer.scheduling.timing import Schedule
@@ -64,6 +65,7 @@ class Playing:
         waits: nor before these; empty once it has started.
         followers: the blocks that wait for it.
         stopped: when it was cut off.
+        abroad: its references into other blocks.
         first: its schedule as it was when the block was accepted.
         channels, shifts, speech: by behaviour, on the session clock; empty while the start is not known.
     """
@@ -82,10 +84,12 @@ class Playing:
     speech: dict[str, Speaking] = field(default_factory=dict)
     followers: list[Playing] = field(default_factory=list)
     order: int = 0
+    abroad: tuple[SyncRef, ...] = field(init=False)
     first: Schedule = field(init=False)
 
     def __post_init__(self) -> None:
         self.first = self.plan.schedule
+        self.abroad = abroad(self.block)
         for wait in self.waits:
             wait.block.followers.append(self)
 
@@ -152,6 +156,7 @@ class Playing:
         late = start - plan.schedule.start
         held = tuple(replace(c, begin=c.begin + late, end=c.end + late) for c in plan.claims)
         self.plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
+        self.abroad = abroad(self.block)
         self.channels, self.shifts, self.speech = {}, {}, {}
         if start == float("inf"):
             return

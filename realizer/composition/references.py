@@ -6,7 +6,12 @@ from collections.abc import Iterator
 
 from bml_schema import Block, Speech, Synchronize, SyncRef
 
-__all__ = ["references"]
+__all__ = ["abroad", "references"]
+
+
+def abroad(block: Block) -> tuple[SyncRef, ...]:
+    """Those into other blocks."""
+    return tuple(ref for ref in references(block) if ref.block is not None and ref.block != block.id)
 
 
 def references(block: Block) -> Iterator[SyncRef]:

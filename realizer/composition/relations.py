@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import replace
+
+import numpy as np
 
 from bml_schema import Block, SyncRef
 from realizer.composition.claims import Claim
 from realizer.composition.playing import Playing, Wait
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["awaited", "before", "ended", "followers", "held", "instants"]
+__all__ = ["awaited", "before", "ended", "followers", "held", "instants", "stopped"]
 
 FOREVER = float("inf")
 
@@ -47,7 +50,7 @@ def held(character: int, alive: Iterable[Playing], without: Iterable[Playing] = 
     return [
         claim
         for p in alive
-        if p.character == character and p.start < FOREVER and id(p) not in gone
+        if p.plan.claims and p.character == character and p.start < FOREVER and id(p) not in gone
         for claim in p.plan.claims
     ]
 
@@ -64,26 +67,51 @@ def before(waits: Iterable[Wait]) -> set[int]:
 
 
 def instants(
-    schedule_of: Callable[[str], Schedule | None], start: float
+    schedule_of: Callable[[str], Schedule | None],
+    start: float,
+    otherwise: Callable[[str], Schedule | None] = lambda id: None,
 ) -> Callable[[SyncRef], float | None]:
     """Sync points of other blocks: a reference -> seconds from `start`, None where that is not known.
 
     Args:
         schedule_of: block id -> its schedule, `start` on the session clock; None where there is none.
+        otherwise: where the points are looked for that the schedule does not have any more.
     """
 
     def instant(ref: SyncRef) -> float | None:
-        schedule = schedule_of(ref.block or "")
-        if schedule is None or schedule.start == FOREVER:
-            return None
-        if ref.behaviour == "bml":
-            time = {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
-        else:
-            sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
-            try:
-                time = schedule.at(ref.behaviour or "", sync or "")
-            except KeyError:
-                time = None
-        return None if time is None else schedule.start + time + ref.offset - start
+        for look in (schedule_of, otherwise):
+            schedule = look(ref.block or "")
+            if schedule is None or schedule.start == FOREVER:
+                return None
+            if (time := _time(ref, schedule)) is not None:
+                return schedule.start + time + ref.offset - start
+        return None
 
     return instant
+
+
+def _time(ref: SyncRef, schedule: Schedule) -> float | None:
+    """Seconds from the start of a block."""
+    if ref.behaviour == "bml":
+        return {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
+    sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
+    try:
+        return schedule.at(ref.behaviour or "", sync or "")
+    except KeyError:
+        return None
+
+
+def stopped(
+    schedule_of: Callable[[str], Schedule | None], blocks: Iterable[Playing], now: float
+) -> Callable[[str], Schedule | None]:
+    """`schedule_of` as it is when some blocks are stopped at `now`: nothing of them is later."""
+    gone = {p.block.id for p in blocks}
+
+    def of(id: str) -> Schedule | None:
+        schedule = schedule_of(id)
+        if schedule is None or id not in gone:
+            return schedule
+        local = max(0.0, now - schedule.start)
+        return replace(schedule, times={b: np.minimum(t, local) for b, t in schedule.times.items()})
+
+    return of

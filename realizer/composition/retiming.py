@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 
 from bml_schema import Block, SyncRef
 from realizer.composition.cast import ANTICIPATORS
-from realizer.composition.playing import Playing
-from realizer.composition.references import references
+from realizer.composition.playing import Playing, Wait
+from realizer.composition.references import abroad, references
+from realizer.composition.relations import before
 from realizer.scheduling import Member
 
 __all__ = ["anticipated", "lead", "member", "touched"]
@@ -17,40 +18,46 @@ __all__ = ["anticipated", "lead", "member", "touched"]
 FOREVER = float("inf")
 
 
-def touched(blocks: Iterable[Block], alive: Collection[Playing], now: float) -> list[Playing]:
-    """The blocks that are solved together with these, by references to sync points that have not passed.
+def touched(block: Block, alive: Iterable[Playing], now: float, waits: Iterable[Wait] = ()) -> list[Playing]:
+    """The blocks that are solved together with one, by references to sync points that have not passed.
+
+    Of two blocks of which one waits for the other only one can move at a time, or the second would flee from
+    the first for ever: what such a block says of the other's points is taken as it is.
 
     Args:
-        blocks: new ones, or blocks whose times have changed.
-        alive: the blocks that play or wait.
+        block: a new one, or one whose times have changed.
+        alive: the other blocks that play or wait.
+        waits: what the block waits for.
 
     Returns:
-        Those of `alive` that are connected to `blocks` by any chain, themselves included, in order.
+        Those of `alive` that are connected to the block by any chain, in order.
     """
     by_id = {p.block.id: p for p in alive if p.start < FOREVER}
+    named = [(block.id, abroad(block)), *((id, p.abroad) for id, p in by_id.items() if p.abroad)]
     beside: dict[str, set[str]] = {}
-    todo = list(blocks)
-    everyone = {block.id: block for block in todo} | {id: p.block for id, p in by_id.items()}
-    for block in everyone.values():
-        for other in _open(block, by_id, now):
-            beside.setdefault(block.id, set()).add(other)
-            beside.setdefault(other, set()).add(block.id)
+    for own, refs in named:
+        for ref in refs:
+            other = by_id.get(ref.block or "")
+            if other is not None and not _passed(ref, other, now):
+                beside.setdefault(own, set()).add(other.block.id)
+                beside.setdefault(other.block.id, set()).add(own)
     found: set[str] = set()
-    names = [block.id for block in todo]
+    names = [block.id]
     while names:
         for name in beside.get(names.pop(), ()):
             if name not in found:
                 found.add(name)
                 names.append(name)
-    return [p for id, p in by_id.items() if id in found]
-
-
-def _open(block: Block, by_id: dict[str, Playing], now: float) -> Iterator[str]:
-    """The blocks of which a block names a point that is still to come."""
-    for ref in references(block):
-        other = by_id.get(ref.block or "")
-        if other is not None and other.block.id != block.id and not _passed(ref, other, now):
-            yield other.block.id
+    if not found:
+        return []
+    apart = before(waits)
+    together: list[Playing] = []
+    for name, p in by_id.items():
+        if name in found and name != block.id and id(p) not in apart:
+            behind = before(p.waits)
+            if not any(id(other) in behind or id(p) in before(other.waits) for other in together):
+                together.append(p)
+    return together
 
 
 def _passed(ref: SyncRef, playing: Playing, now: float) -> bool:

@@ -13,6 +13,7 @@ from bml_schema import (
     BMLA,
     CORE,
     OWN,
+    Behaviour,
     Blink,
     BlockPrediction,
     BlockProgress,
@@ -222,3 +223,21 @@ def test_times_of_others_may_have_exponents() -> None:
 def test_what_is_no_feedback_is_an_error(text: str, said: str) -> None:
     with pytest.raises(BMLError, match=said):
         parse_feedback(text)
+
+
+def test_marks_that_only_a_description_names_are_predicted_behind_the_text() -> None:
+    node = parse('<bml id="b"><speech id="s"><text>a <sync id="m"/> b</text></speech></bml>')["s"]
+    told = predicted(node, "b", {"start": 0.0, "m": 0.5, "x": 0.75, "end": 1.0})
+    text = text_of(told)
+    assert text == 'a <sync id="m" ref="0.5"/> b<sync id="x" ref="0.75"/>'
+    bare = parse(
+        '<bml id="b"><speech id="s"><description priority="1" type="application/ssml+xml">'
+        '<speak xmlns="http://www.w3.org/2001/10/synthesis">a <mark name="x"/></speak>'
+        "</description></speech></bml>"
+    )["s"]
+    assert text_of(predicted(bare, "b", {"start": 0.0, "x": 0.75, "end": 1.0})) == '<sync id="x" ref="0.75"/>'
+
+
+def text_of(node: Behaviour) -> str:
+    xml = PredictionFeedback(behaviours=(node,)).to_xml()
+    return xml[xml.index("<text>") + 6 : xml.index("</text>")]

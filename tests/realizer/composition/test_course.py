@@ -13,7 +13,7 @@ from realizer.composition.reporting import State
 
 def taken_in(course: Course, id: str, after: Playing | None = None, state: State = State.LURKING) -> Playing:
     block = parse(f'<bml id="{id}"><wait id="w" duration="2"/></bml>')
-    planned, _ = course.plan(block, 0, World(), 0.0, 0.0, [])
+    planned, _ = course.plan(block, 0, World(), 0.0, 0.0)
     waits = [] if after is None else [Wait(after)]
     made = Playing(planned, KINDS, World(), 0, course.cast.next_number, 0.0, waits, state)
     made.lay(planned, made.earliest)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bml_schema import parse
-from realizer.composition.references import references
+from realizer.composition.references import abroad, references
 
 
 def test_references_of_attributes_texts_and_constraints_are_found() -> None:
@@ -14,3 +14,8 @@ def test_references_of_attributes_texts_and_constraints_are_found() -> None:
         <synchronize><sync ref="4"/><sync ref="s:start"/></synchronize></constraint></required></bml>"""
     )
     assert sorted(map(str, references(block))) == ["1", "2", "3", "4", "h:end", "s:start", "x:y:end"]
+
+
+def test_references_abroad_are_those_into_other_blocks() -> None:
+    block = parse('<bml id="b"><head id="h" lexeme="NOD" start="x:y:end" relax="b:h:stroke + 1"/></bml>')
+    assert [str(ref) for ref in abroad(block)] == ["x:y:end"]

@@ -137,9 +137,9 @@ def test_blocks_are_touched_by_any_chain_of_points_to_come() -> None:
     stage.send("c", FACE.format(""))
     new = stage.block("x", '<wait id="w" start="b:n:end"/>')
     alive = stage.player._blocks.cast.alive()
-    assert [p.block.id for p in touched([new], alive, 0.0)] == ["a", "b"]
-    assert touched([new], alive, 60.0) == []
-    assert touched([stage.block("y", FACE.format(""))], alive, 0.0) == []
+    assert [p.block.id for p in touched(new, alive, 0.0)] == ["a", "b"]
+    assert touched(new, alive, 60.0) == []
+    assert touched(stage.block("y", FACE.format("")), alive, 0.0) == []
 
 
 BEAT = '<head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/>'
