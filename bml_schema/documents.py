@@ -21,6 +21,7 @@ __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
 
 MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
 _MOST_RETRIES = 20  # times that a broken document is searched for a good one inside it
+_MOST_AGAIN = 100_000  # characters of one text that are searched so, or a large broken one takes seconds
 MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
@@ -110,7 +111,7 @@ def read(
     counted = 0
     broken = False  # the stretch before was broken XML: what follows it up to the next document is part of it
     todo = deque(found)
-    retries = _MOST_RETRIES
+    retries, again = _MOST_RETRIES, _MOST_AGAIN
     told = 0  # up to here broken XML has been told of
     for n in count():
         if not todo:
@@ -130,11 +131,12 @@ def read(
             broken = isinstance(wrong, BMLSyntaxError)
             if not (broken and stretch.start < told):
                 yield wrong
-            if broken and not stretch.fault and retries:
+            if broken and not stretch.fault and retries and again > 0:
                 # A good document may stand inside the broken one, where their end tags happen to match.
                 inner = NEXT.search(text, stretch.start + len(stretch.tag), stretch.end)
                 if inner is not None:
                     retries -= 1
+                    again -= stretch.end - inner.start()
                     told = max(told, stretch.end)
                     todo.extendleft(reversed(list(stretches(text, inner.start(), stretch.end))))
         else:
