@@ -46,11 +46,11 @@ class _Mail:
     def put(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
             frame = unpack(message)
-            self._frame(STREAM_OF[frame.kind], frame)
+            self.of(STREAM_OF[frame.kind]).append(frame)
         elif message.startswith("{"):
             reply = json.loads(message)
-            if "frame" in reply and reply["type"] in ("fap", "au"):
-                self._frame(reply["type"], reply)
+            if reply["type"] == "schedule" or ("frame" in reply and reply["type"] in ("fap", "au")):
+                self.of(reply["type"]).append(reply)
             else:
                 self.replies.append(reply)
         else:
@@ -60,8 +60,9 @@ class _Mail:
         found = _BLOCK_ID.findall(bml)
         self.last_block = found[-1] if found else None
 
-    def _frame(self, stream: str, frame: Frame) -> None:
-        self.frames.setdefault(stream, deque(maxlen=KEPT)).append(frame)
+    def of(self, stream: str) -> deque[Frame]:
+        """The newest messages of a stream; of `schedule` all, as each says what has changed since another."""
+        return self.frames.setdefault(stream, deque(maxlen=None if stream == "schedule" else KEPT))
 
     def reply(self) -> dict[str, Any]:
         reply = self.replies.popleft()
@@ -121,7 +122,7 @@ class Client:
             return self._mail.reply()
 
     async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
-        """Ask for a stream (fap, au, mesh, audio, video); returns what its values mean.
+        """Ask for a stream (fap, au, mesh, audio, video, schedule); returns what its values mean.
 
         Raises:
             ClientError: there is no such stream, or it cannot be had.
@@ -145,7 +146,7 @@ class Client:
 
     async def frames(self, stream: str) -> AsyncIterator[Frame]:
         """Frames of a stream as they come: WireFrame, or a dictionary where the encoding is JSON."""
-        kept = self._mail.frames.setdefault(stream, deque(maxlen=KEPT))
+        kept = self._mail.of(stream)
         with contextlib.suppress(ClientError):
             while True:
                 await self._wait(lambda: bool(kept))
@@ -222,7 +223,7 @@ class SyncClient:
 
     def frames(self, stream: str) -> Iterator[Frame]:
         """Frames of a stream as they come, until the connection ends."""
-        kept = self._mail.frames.setdefault(stream, deque(maxlen=KEPT))
+        kept = self._mail.of(stream)
         with contextlib.suppress(ClientError):
             while True:
                 self._wait(lambda: bool(kept))

@@ -11,10 +11,12 @@ from realizer.server.connection import (
     Connection,
     FrameSubscription,
     PictureSubscription,
+    PlanSubscription,
     SoundSubscription,
     View,
 )
 from realizer.server.effects import Draw, Effect, Send
+from realizer.server.plans import Plans, message
 from realizer.server.streams import AHEAD, EPSILON, PACKET, Sound, Timeline, encode, first_at, last_at
 from realizer.server.wire import FrameKind, pack
 
@@ -27,6 +29,8 @@ __all__: list[str] = []
 LATE = 0.5  # s
 # A picture that was not drawn by then never will be.
 DRAW_DEADLINE = 10.0  # s
+# How long after a client was too slow for what is planned it is tried again.
+RETRY = 0.1  # s
 
 
 class Broadcast:
@@ -44,6 +48,7 @@ class Broadcast:
         self._timelines: dict[tuple[int, float], Timeline] = {}
         self._sounds: dict[tuple[int | None, int], Sound] = {}
         self._views: dict[tuple[object, ...], View] = {}
+        self._plans = Plans(player.cast)
         self._draws = 0
 
     def timeline(self, index: int, fps: float) -> Timeline:
@@ -88,6 +93,7 @@ class Broadcast:
         """Every frame, packet and drawing whose time has come."""
         connections = list(connections)
         effects: list[Effect] = []
+        self._send_plans(connections, now, effects)
         self._send_sound(connections, now, effects)
         self._send_frames(connections, now, effects)
         self._draw(connections, now, effects)
@@ -103,6 +109,9 @@ class Broadcast:
                         deadlines.append(number / timeline.fps)
                     case SoundSubscription():
                         deadlines += self._sound_deadline(subscription)
+                    case PlanSubscription(behind=behind, again=again):
+                        if behind or self._plans.have_changed():
+                            deadlines.append(again)
                     case PictureSubscription(view=view):
                         busy = view.busy is not None
                         deadlines.append(
@@ -138,6 +147,31 @@ class Broadcast:
         return effects, lookers
 
     # inside -------------------------------------------------------------------------------------
+
+    def _send_plans(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
+        """What has changed, to all who know the rest; all of it to those who do not."""
+        looking = [
+            (connection, s)
+            for connection in connections
+            for s in connection.subscriptions.values()
+            if isinstance(s, PlanSubscription)
+        ]
+        if not looking:
+            self._plans.forget()
+            return
+        changes = self._plans.changes()
+        for connection, s in looking:
+            news = [text for character, text in changes if s.index in (None, character)]
+            if connection.slow:
+                # What is not sent now is in the whole that is sent later.
+                s.behind = s.behind or bool(news)
+                s.again = now + RETRY
+            elif s.behind:
+                s.behind, s.again = False, now
+                text = message(now, self._plans.whole(s.index), s.name, whole=True)
+                effects.append(Send(connection.id, text))
+            elif news:
+                effects.append(Send(connection.id, message(now, ",".join(news), s.name, whole=False)))
 
     def _send_frames(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
         groups: dict[int, list[tuple[Connection, FrameSubscription]]] = {}

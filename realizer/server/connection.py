@@ -75,7 +75,17 @@ class PictureSubscription:
     next: int
 
 
-Subscription = FrameSubscription | SoundSubscription | PictureSubscription
+@dataclass(eq=False)
+class PlanSubscription:
+    """What blocks are planned as: `behind` until it has been sent all of them, `again` when to try that."""
+
+    index: int | None  # of the character; None: all
+    name: str | None
+    behind: bool = True
+    again: float = 0.0
+
+
+Subscription = FrameSubscription | SoundSubscription | PictureSubscription | PlanSubscription
 
 
 @dataclass(frozen=True)

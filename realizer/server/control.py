@@ -10,6 +10,7 @@ from realizer.server.connection import (
     Connection,
     FeedbackFilter,
     FrameSubscription,
+    PlanSubscription,
     SoundSubscription,
     Subscription,
 )
@@ -113,6 +114,14 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
         session.reply(connection.id, Subscribed(stream=stream, encoding=encoding, **told))
         return
     index = index_of(session, message.character)
+    if stream == "schedule":
+        connection.subscriptions[stream, message.character] = PlanSubscription(
+            None if message.character is None else index, message.character
+        )
+        session.reply(
+            connection.id, Subscribed(stream=stream, encoding=encoding, character=message.character)
+        )
+        return
     fps = message.fps or session.settings.fps
     told = {"stream": stream, "encoding": encoding, "index": index}
     old = connection.subscriptions.get((stream, message.character))

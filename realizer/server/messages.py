@@ -35,7 +35,7 @@ PROTOCOL = 1
 # Longest control message: a scene of a few thousand objects.
 MAX_CONTROL = 256 * 1024  # bytes
 
-Stream = Literal["feedback", "fap", "au", "mesh", "audio", "video"]
+Stream = Literal["feedback", "fap", "au", "mesh", "audio", "video", "schedule"]
 FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
 # stream -> the encodings it has, the default first.
 STREAMS: dict[str, tuple[str, ...]] = {
@@ -45,6 +45,7 @@ STREAMS: dict[str, tuple[str, ...]] = {
     "mesh": ("binary",),
     "audio": ("binary",),
     "video": ("binary",),
+    "schedule": ("json",),
 }
 
 

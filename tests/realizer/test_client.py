@@ -49,6 +49,23 @@ def test_a_refused_block_ends_the_waiting() -> None:
     serving(test)
 
 
+def test_what_is_planned_is_followed_and_does_not_mix_with_answers() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.subscribe("schedule")
+            await client.send(WAIT.format("b"))
+            told = []
+            async for message in client.frames("schedule"):
+                assert isinstance(message, dict)
+                told += [block["state"] for block in message["blocks"]]
+                if "DONE" in told:
+                    break
+            assert told[0] != "DONE"
+            assert (await client.ask("ping"))["type"] == "pong"
+
+    serving(test)
+
+
 def test_frames_of_two_streams_do_not_mix() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:

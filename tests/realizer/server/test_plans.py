@@ -1,0 +1,220 @@
+"""The stream `schedule`: the whole state first, then every change, once and in order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+SCHEDULE = {"type": "subscribe", "stream": "schedule"}
+WAIT = '<bml id="{}"{}><wait id="w" duration="{}"/></bml>'
+BMLA = ' xmlns:bmla="http://www.asap-project.org/bmla"'
+
+
+def states(client) -> list[tuple[str, str]]:
+    """(block, state) of all that was told, in order."""
+    return [(b["block"], b["state"]) for m in client.of("schedule") for b in m["blocks"]]
+
+
+def known(client) -> dict[str, dict[str, Any]]:
+    """What a client knows that keeps what it was told last."""
+    blocks: dict[str, dict[str, Any]] = {}
+    for message in client.of("schedule"):
+        if message["whole"]:
+            blocks = {}
+        for block in message["blocks"]:
+            blocks[block["block"]] = blocks.get(block["block"], {}) | block
+    return blocks
+
+
+def ends(block: dict[str, Any]) -> dict[str, float]:
+    return {b["id"]: b["syncs"][-1]["at"] for b in block["behaviours"]}
+
+
+def test_a_subscription_begins_with_what_plays_and_what_waits(driver) -> None:
+    driver.send(WAIT.format("a", "", 3))
+    driver.send(WAIT.format("b", ' composition="APPEND"', 2))
+    driver.run(1.0)
+    client = driver.send(SCHEDULE)
+    assert client.of("subscribed") == [
+        {"type": "subscribed", "stream": "schedule", "encoding": "json", "index": 0}
+    ]
+    (message,) = client.of("schedule")
+    assert (message["whole"], message["time"]) == (True, 1.0)
+    assert states(client) == [("a", "IN_EXEC"), ("b", "LURKING")]
+    second = message["blocks"][1]
+    assert (second["start"], second["end"]) == (3.0, 5.0)
+    assert second["behaviours"][0]["syncs"] == [
+        {"name": "start", "time": 0.0, "at": 3.0},
+        {"name": "end", "time": 2.0, "at": 5.0},
+    ]
+
+
+def test_while_nothing_plays_the_whole_state_is_empty(driver) -> None:
+    client = driver.send(SCHEDULE)
+    assert [m["blocks"] for m in client.of("schedule")] == [[]]
+
+
+def test_a_block_is_told_when_it_is_planned_starts_and_ends(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send(WAIT.format("a", "", 1))
+    driver.send(WAIT.format("b", ' composition="APPEND"', 1))
+    driver.run(5)
+    assert states(client) == [
+        ("a", "IN_EXEC"),
+        ("b", "LURKING"),
+        ("a", "DONE"),
+        ("b", "IN_EXEC"),
+        ("b", "DONE"),
+    ]
+    _, waits, begins, ends = client.of("schedule")[1:]
+    assert waits["blocks"][0]["behaviours"][0]["gaps"][0]["actual"] == 1.0
+    # What has not changed is not told again.
+    assert begins["blocks"][1].keys() == {"block", "character", "state", "start", "end"}
+    assert ends["blocks"] == [{"block": "b", "character": None, "state": "DONE", "start": 1.0, "end": 2.0}]
+    assert (begins["time"], ends["time"]) == pytest.approx((1.0, 2.0), abs=1e-5)
+
+
+def test_what_is_told_comes_when_it_happens_and_nothing_between(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send(WAIT.format("a", "", 1))
+    count = len(client.messages)
+    driver.run(0.9)
+    assert len(client.messages) == count
+
+
+def test_a_block_that_moves_because_another_ends_is_told_with_its_new_times(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send(WAIT.format("a", "", 3))
+    driver.send(WAIT.format("b", ' composition="APPEND"', 2))
+    driver.run(1.0)
+    driver.send({"type": "stop", "blocks": ["a"]})
+    assert states(client)[-3:] == [("b", "LURKING"), ("a", "INTERRUPTED"), ("b", "IN_EXEC")]
+    assert ends(known(client)["b"]) == {"w": 3.0}
+
+
+def test_an_anticipated_point_that_moves_moves_what_is_told(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send({"type": "anticipate", "id": "music", "syncs": {"beat": 2.0}})
+    driver.send('<bml id="a"><head id="n" lexeme="NOD" stroke="anticipators:music:beat"/></bml>')
+    driver.run(0.1)
+    driver.send({"type": "anticipate", "id": "music", "syncs": {"beat": 2.5}})
+    (link,) = known(client)["a"]["behaviours"][0]["links"]
+    assert (link["sync"], link["to"]) == ("stroke", "anticipators:music:beat")
+    syncs = {s["name"]: s["at"] for s in known(client)["a"]["behaviours"][0]["syncs"]}
+    assert syncs["stroke"] == pytest.approx(2.5)
+
+
+def test_the_room_of_an_order_is_told_again_when_the_block_it_looks_at_moves(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send({"type": "anticipate", "id": "music", "syncs": {"beat": 2.0}})
+    driver.send('<bml id="a"><wait id="w" start="anticipators:music:beat" duration="1"/></bml>')
+    driver.send(
+        '<bml id="b"><wait id="v" start="0.5" duration="1"/>'
+        '<constraint><before ref="a:w:start"><sync ref="v:end"/></before></constraint></bml>'
+    )
+    driver.run(0.1)
+
+    def slack() -> float:
+        return known(client)["b"]["behaviours"][0]["links"][1]["slack"]
+
+    assert slack() == pytest.approx(0.5)
+    driver.send({"type": "anticipate", "id": "music", "syncs": {"beat": 3.0}})
+    assert slack() == pytest.approx(1.5)
+
+
+def test_a_behaviour_that_is_cut_off_is_told(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send('<bml id="a"><gaze id="g" target="x" start="0" end="5"/><wait id="w" duration="6"/></bml>')
+    driver.send(f'<bml id="b"{BMLA}><bmla:interrupt id="i" start="2" target="a" include="g"/></bml>')
+    driver.run(3)
+    times = ends(known(client)["a"])
+    assert 2.0 < times["g"] < 4.0
+    assert times["w"] == 6.0
+
+
+def test_a_preplanned_block_has_times_when_it_is_activated(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send(WAIT.format("a", f'{BMLA} bmla:preplan="true"', 1))
+    waits = known(client)["a"]
+    assert (waits["state"], waits["start"], waits["behaviours"][0]["syncs"][0]["at"]) == (
+        "PENDING",
+        None,
+        None,
+    )
+    driver.run(1)
+    driver.send(f'<bml id="b"{BMLA}><bmla:activate id="i" target="a"/></bml>')
+    assert known(client)["a"]["start"] == pytest.approx(1.0)
+
+
+def test_what_was_dropped_is_told_with_its_warning(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send('<bml id="a"><wait id="w" duration="1"/><head id="n" lexeme="NOD" end="0.01"/></bml>')
+    (gone,) = known(client)["a"]["dropped"]
+    assert (gone["id"], gone["element"], gone["type"]) == ("n", "head", "IMPOSSIBLE_TO_SCHEDULE")
+    assert [w["id"] for w in known(client)["a"]["warnings"]] == ["a:n"]
+
+
+def test_blocks_of_one_character_can_be_had_alone(driver) -> None:
+    alice = driver.join(2)
+    driver.send(WAIT.format("a", ' characterId="Alice"', 1))
+    driver.send({**SCHEDULE, "character": "Alice"}, 2)
+    client = driver.send(SCHEDULE)
+    driver.send(WAIT.format("b", ' characterId="Bob"', 2))
+    driver.run(5)
+    assert {block for block, _ in states(alice)} == {"a"}
+    assert {m["character"] for m in alice.of("schedule")} == {"Alice"}
+    assert {block for block, _ in states(client)} == {"a", "b"}
+
+
+def test_a_slow_client_gets_one_whole_state_for_all_it_missed(driver) -> None:
+    fast = driver.join(2)
+    driver.send(SCHEDULE, 2)
+    client = driver.send(SCHEDULE)
+    driver.session.backlog(1, 10**6)
+    for name in "abc":
+        driver.send(WAIT.format(name, ' composition="APPEND"', 2))
+    driver.run(3)
+    assert len(client.of("schedule")) == 1
+    driver.session.backlog(1, 0)
+    driver.run(4.5)
+    assert [m["whole"] for m in client.of("schedule")][:2] == [True, True]
+    # From there on it is told what everybody is told, and has missed nothing.
+    assert {b: s["state"] for b, s in known(client).items()} == {"b": "DONE", "c": "IN_EXEC"}
+    alive = {b: s for b, s in known(fast).items() if s["state"] != "DONE"}
+    assert {b: ends(s) for b, s in known(client).items() if s["state"] != "DONE"} == {
+        b: ends(s) for b, s in alive.items()
+    }
+
+
+def test_a_slow_client_for_whom_there_is_nothing_new_is_not_waited_for(driver) -> None:
+    driver.send(SCHEDULE)
+    driver.session.backlog(1, 10**6)
+    driver.run(5)
+    assert driver.session.next_deadline() is None
+
+
+def test_nothing_is_told_after_the_stream_was_ended(driver) -> None:
+    client = driver.send(SCHEDULE)
+    driver.send({"type": "unsubscribe", "stream": "schedule"})
+    driver.send(WAIT.format("a", "", 1))
+    driver.run(3)
+    assert states(client) == []
+
+
+def test_who_comes_back_begins_with_the_whole_state_again(drive) -> None:
+    driver = drive(named=True)
+    driver.send(SCHEDULE)
+    driver.send(WAIT.format("a", "", 3))
+    driver.run(1)
+    driver.leave(1)
+    driver.run(2)
+    again = driver.join(2)
+    driver.send(SCHEDULE, 2)
+    assert [m["whole"] for m in again.of("schedule")] == [True]
+    assert states(again) == [("a", "IN_EXEC")]
+
+
+def test_the_stream_has_no_other_encoding(driver) -> None:
+    client = driver.send({**SCHEDULE, "encoding": "binary"})
+    assert client.of("error")[0]["where"] == "subscribe.encoding"
