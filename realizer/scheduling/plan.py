@@ -73,12 +73,13 @@ def schedule_together(
     schedules = []
     for member in members:
         times: dict[str, Float64] = {}
+        whole = found.time - member.start
+        whole.setflags(write=False)
         for node in member.block.behaviours:
             n = number.get(f"{member.block.id}:{node.id}")
             if n is not None and node.id not in times:
                 first, k = problem.first[n], len(problem.timings[n].points)
-                times[node.id] = found.time[first : first + k] - member.start
-                times[node.id].setflags(write=False)
+                times[node.id] = whole[first : first + k]
         schedules.append(
             Schedule(
                 member.block.id,

@@ -43,7 +43,7 @@ def shapes_of(model: Model) -> Shapes:
     size = len(model.first)
     ties, strained, held_at = _hang(model)
     label, base = np.arange(size + 1), np.zeros(size + 1)
-    touched = np.unique(model.owner[model.tied])
+    touched = _each(model.owner[model.tied], size)
     label[touched] = [ties.find(b) for b in touched.tolist()]
     base[touched] = [ties.shift[b] for b in touched.tolist()]
     held = np.zeros(size + 1, np.bool_)
@@ -87,7 +87,10 @@ def _hang(model: Model) -> tuple[Ties, list[int], list[tuple[int, float]]]:
         if root == ORIGIN:
             held.append((b, start))
             continue
-        other, there = hook.setdefault(root, (b, start))
+        if (hooked := hook.get(root)) is None:
+            hook[root] = b, start
+            continue
+        other, there = hooked
         if abs(ties.tie(b, other, start - there)) > FITS:
             strained.append(b)
     return ties, strained, held
@@ -103,13 +106,19 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     same = owner[knots[:-1]] == owner[knots[1:]]
     p, q = knots[:-1][same], knots[1:][same]
     length, give = chain[q] - chain[p], slack[q] - slack[p]
-    nodes, number = np.unique(model.root[knots], return_inverse=True)
+    roots = model.root[knots]
+    nodes = _each(roots, len(owner))
+    number = np.empty(len(owner), np.intp)
+    number[nodes] = np.arange(len(nodes))
+    number = number[roots]
     i, j = number[:-1][same], number[1:][same]
     loose = i != j
     # The block's start is at 0. In a shape that is not held any point can be: it is slid to its place later.
     fixed = nodes == ORIGIN
-    names, firsts = np.unique(shapes.label[owner[knots]], return_index=True)
-    fixed[number[firsts[~shapes.held[names]]]] = True
+    labels = shapes.label[owner[knots]]
+    first = np.empty(len(shapes.label), np.intp)
+    first[labels[::-1]] = number[::-1]
+    fixed[first[labels[~shapes.held[labels]]]] = True
     wanted = length - model.shift[q] + model.shift[p]
     x = settle(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
     time = x[number] + model.shift[knots]
@@ -123,6 +132,13 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     knot = knots[place]
     pull = np.where(before, strain[place], 0.0)
     shapes.at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
+
+
+def _each(numbers: Index, size: int) -> Index:
+    """Each of some numbers below a size once, ascending; np.unique takes several times as long for few."""
+    there = np.zeros(size, np.bool_)
+    there[numbers] = True
+    return np.flatnonzero(there)
 
 
 def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64) -> Float64:

@@ -23,22 +23,24 @@ Step: TypeAlias = tuple[int, float, Relation | Link]
 def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[Clash]:
     """A clash for each cycle of inequalities, each of the fewest statements that some cycle there has.
 
-    A positive cycle with the fewest statements visits no point twice; so whichever of them is taken away, the
-    others are a path and can hold. Only cycles through points of the given one count: what clashes elsewhere
-    is another clash. Ties among equally short ones go to what comes first in the document.
+    Such a cycle visits no point twice; so whichever statement is taken away, the others are a path and can
+    hold. No shorter one passes through any of its points; what clashes elsewhere is another clash.
     """
     ways = _Ways(model)
     found = []
     for cycle in cycles:
-        clash = web.cycle(cycle)
-        tried = 0
+        clash, left = web.cycle(cycle), MOST_STEPS
         points = {end for r in clash.relations for end in (r.u, r.v)}
         points |= {end for link in cycle for end in (link.u, link.v)}
-        for point in sorted(points):
-            steps, more = ways.back_to(point, clash.statements - 1, MOST_STEPS - tried)
-            tried += more
+        todo = sorted(points)
+        while todo and left > 0:
+            start = todo.pop()
+            steps, tried = ways.back_to(start, clash.statements - 1, left)
+            left -= tried
             if steps:
+                steps = _simple(start, steps)
                 clash = web.clash(steps)
+                todo = sorted(point for point, _, _ in steps)
         found.append(clash)
     return found
 
@@ -111,6 +113,25 @@ class _Ways:
             if seconds == -np.inf:
                 break
             yield v, seconds, Link(u, v, seconds)
+
+
+def _simple(start: int, steps: list[Step]) -> list[Step]:
+    """A positive cycle among the steps of a positive walk from a point back to it that visits nothing twice.
+
+    The walk through one point that has the fewest steps may go round a cycle elsewhere and come back.
+    """
+    points, trail = [start], list[Step]()
+    for step in steps:
+        trail.append(step)
+        if step[0] in points:
+            begin = points.index(step[0])
+            ring = trail[begin:]
+            if sum(seconds for _, seconds, _ in ring) > LOOSE:
+                return ring
+            del trail[begin:], points[begin + 1 :]
+        else:
+            points.append(step[0])
+    return steps
 
 
 def _walk(came: list[dict[int, tuple[int, Step]]], at: int, last: Step) -> list[Step]:

@@ -132,8 +132,9 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
     # What springs connect is a shape, or node 0 with all that is held or stands for it.
     piece = np.zeros(len(nodes) + 1, np.intp)
     labels = shapes.label[owner[nodes]]
-    anchored = [shapes.label[owner[p]] for p in at_start[1:]]
-    free = ~(shapes.held[labels] | np.isin(labels, anchored))
+    still = shapes.held.copy()
+    still[[shapes.label[owner[p]] for p in at_start[1:]]] = True
+    free = ~still[labels]
     piece[1:][free] = np.unique(labels[free], return_inverse=True)[1] + 1
     quadratic = Quadratic(
         len(nodes) + 1,

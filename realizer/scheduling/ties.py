@@ -41,13 +41,18 @@ class Ties:
         Returns:
             0.0; or, where u and v were tied already, how much farther apart than they are this wants them.
         """
-        a, b = self.find(u), self.find(v)
+        parent = self.parent
+        a, b = parent[u], parent[v]
+        if parent[a] != a:
+            a = self.find(u)
+        if parent[b] != b:
+            b = self.find(v)
         # time[a] + shift[u] = time[b] + shift[v] + seconds
         apart = self.shift[v] + seconds - self.shift[u]
         if a == b:
             return apart
         if a > b:
-            self.parent[a], self.shift[a] = b, apart
+            parent[a], self.shift[a] = b, apart
         else:
-            self.parent[b], self.shift[b] = a, -apart
+            parent[b], self.shift[b] = a, -apart
         return 0.0

@@ -1,0 +1,243 @@
+"""What cannot hold together is told exactly: nothing could be left out of it, and nothing shorter says it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from bml_schema import parse
+from realizer.arrays import Float64
+from realizer.scheduling import Schedule, Timing, schedule_block
+from realizer.scheduling.clash import Clash, Gap
+from realizer.scheduling.explain import in_words
+from realizer.scheduling.problem import ORIGIN, Problem, Relation
+from realizer.scheduling.solve import Solution, solve
+from tests.realizer.scheduling.recipes import Recipe, built, spans, wild
+
+FACE = ("start", "attackPeak", "relax", "end")
+
+# From point to point: the second is not sooner than the first and so many seconds.
+Edge = tuple[int, int, float]
+
+
+def schedule(body: str, timings: dict[str, Timing], **more: object) -> Schedule:
+    """The schedule of a block; its first behaviour is on line 2."""
+    text = f'<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b1">\n{body}</bml>'
+    return schedule_block(parse(text, strict=True), timings, **more)  # type: ignore[arg-type]
+
+
+def lasting(*preferred: float, least: float = 0.02) -> Timing:
+    points = FACE if len(preferred) == 3 else ("start", "end")
+    return Timing(points, np.array(preferred), np.full(len(preferred), least), np.ones(len(preferred)))
+
+
+def statements(problem: Problem, clash: Clash) -> list[list[Edge]]:
+    """What each statement of a clash says, as edges."""
+    equal = {id(r) for r in problem.equalities}
+    said = [both(r) if id(r) in equal else [(r.u, r.v, r.seconds)] for r in clash.relations]
+    for gap in clash.gaps:
+        u, v = (place(problem, gap, name) for name in (gap.begin, gap.end))
+        said.append([(v, u, -gap.seconds)] if gap.most else [(u, v, gap.seconds)])
+    if clash.earliest is not None:
+        part, name, seconds = clash.earliest
+        first = problem.first[problem.behaviours.index(part)]
+        assert problem.name_of(first) == name
+        said.append([(ORIGIN, first, seconds)])
+    return said
+
+
+def both(relation: Relation) -> list[Edge]:
+    return [
+        (relation.v, relation.u, relation.seconds),
+        (relation.u, relation.v, -relation.seconds),
+    ]
+
+
+def place(problem: Problem, gap: Gap, name: str) -> int:
+    b = problem.behaviours.index(gap.part)
+    return problem.first[b] + problem.timings[b].points.index(name)
+
+
+def can_hold(n: int, edges: Iterable[Edge]) -> bool:
+    rows, bounds = [], []
+    for u, v, seconds in edges:
+        row = np.zeros(n)
+        row[u] += 1
+        row[v] -= 1
+        rows.append(row)
+        bounds.append(-seconds)
+    found = linprog(np.zeros(n), A_ub=rows or None, b_ub=bounds or None, bounds=(None, None))
+    return bool(found.status == 0)
+
+
+def clashes_of(recipe: Recipe) -> tuple[Problem, list[Clash]]:
+    problem = built(recipe)
+    found = solve(problem)
+    return problem, [] if isinstance(found, Solution) else found
+
+
+@settings(max_examples=150)
+@given(wild)
+def test_without_any_one_of_what_is_named_the_rest_of_it_can_hold(recipe: Recipe) -> None:
+    problem, clashes = clashes_of(recipe)
+    n = len(problem.owner)
+    for clash in clashes[:2]:
+        said = statements(problem, clash)
+        assert len(said) == clash.statements
+        assert not can_hold(n, (edge for edges in said for edge in edges)), in_words(clash)
+        for left_out in range(len(said)):
+            rest = (edge for k, edges in enumerate(said) if k != left_out for edge in edges)
+            assert can_hold(n, rest), f"{in_words(clash)}; number {left_out} has no part in it"
+
+
+def ways(problem: Problem) -> Float64:
+    """(n, n) by how much a column's point is later than a row's by one statement; -inf where none says."""
+    n = len(problem.owner)
+    found = np.full((n, n), -np.inf)
+    edges = [edge for r in problem.equalities for edge in both(r)]
+    edges += [(r.u, r.v, r.seconds) for r in problem.orders]
+    edges += [(ORIGIN, u, e) for u, e in zip(problem.first, problem.earliest, strict=True)]
+    for s in spans(problem):
+        edges += [(s.point, s.point + 1, s.least), (s.point + 1, s.point, -s.most)]
+    for u, v, seconds in edges:
+        found[u, v] = max(found[u, v], seconds)
+    for first, timing in zip(problem.first, problem.timings, strict=True):
+        for steps in range(2, 0 if timing.rigid else len(timing.points)):
+            for u in range(first, first + len(timing.points) - steps):
+                v = u + steps
+                found[u, v] = max(found[u, v], found[u, v - 1] + found[v - 1, v])
+                found[v, u] = max(found[v, u], found[v, v - 1] + found[v - 1, u])
+    return found
+
+
+@settings(max_examples=150)
+@given(wild)
+def test_no_fewer_statements_clash_at_any_of_its_points(recipe: Recipe) -> None:
+    # A length that the document states wins over least gaps, so that these do not clash.
+    recipe = recipe._replace(bodies=[body._replace(least=0.0) for body in recipe.bodies])
+    problem, clashes = clashes_of(recipe)
+    one = ways(problem)
+    for clash in clashes:
+        said = statements(problem, clash)
+        if all(len(edges) == 2 for edges in said):
+            continue  # equalities alone are looked at before anything else
+        points = {end for edges in said for u, v, _ in edges for end in (u, v)}
+        walk = one.copy()
+        for length in range(1, len(said)):
+            assert all(walk[p, p] <= 1e-7 for p in points), f"{length} would do for {in_words(clash)}"
+            walk = np.maximum(walk, (walk[:, :, None] + one[None, :, :]).max(axis=1))
+
+
+def test_where_there_is_a_short_way_and_a_long_one_the_short_one_is_told() -> None:
+    body = (
+        '<wait id="a" start="1"/>\n<wait id="b" start="a:end"/>\n<wait id="c" start="b:end"/>\n'
+        '<wait id="d" start="c:end"/>\n'
+        '<constraint id="k"><before ref="a:start"><sync ref="d:start"/></before></constraint>\n'
+        '<constraint id="l"><after ref="a:start + 1"><sync ref="d:start"/></after></constraint>\n'
+    )
+    found = schedule(body, {name: lasting(1.0, least=1.0) for name in "abcd"})
+    short, long = found.warnings
+    assert (short.id, long.id) == ("l", "k")
+    assert [clause.id for clause in short.clash] == ["k", "l"]
+    # Three waits, that each of the later ones follows, and what wants the last one not to be after the first.
+    assert len(long.clash) == 7
+
+
+def test_a_clash_goes_out_as_data_too() -> None:
+    body = (
+        '<wait id="a" start="1"/>\n<wait id="b" start="2"/>\n'
+        '<constraint id="same"><synchronize><sync ref="a:start"/><sync ref="b:start"/></synchronize>'
+        "</constraint>"
+    )
+    found = schedule(body, {"a": lasting(1.0), "b": lasting(1.0)})
+    (warning,) = found.to_json()["warnings"]
+    assert warning["id"] == "same"
+    assert warning["type"] == "IMPOSSIBLE_TO_SCHEDULE"
+    assert sorted(warning["clash"], key=lambda clause: clause["line"]) == [
+        {"id": "b1:a", "line": 2, "text": "a:start = 1"},
+        {"id": "b1:b", "line": 3, "text": "b:start = 2"},
+        {"id": "same", "line": 4, "text": "a:start = b:start"},
+    ]
+    for clause in warning["clash"]:
+        assert clause["text"] in warning["text"]
+
+
+def test_what_behaviours_need_names_them_too() -> None:
+    body = '<faceLexeme id="a" lexeme="SMILE" end="0.5"/>\n<wait id="b" start="2" end="a:attackPeak"/>'
+    found = schedule(body, {"a": lasting(1, 1, 1, least=0.3), "b": lasting(1.0)})
+    (warning,) = found.warnings
+    told = {(c.id, c.line, c.text) for c in warning.clash}
+    assert ("b1:a", 2, "a:end = 0.5") in told
+    assert all(id in ("b1:a", "b1:b") for id, _, _ in told)
+
+
+def test_a_warning_without_a_clash_has_three_keys() -> None:
+    found = schedule('<wait id="a" start="b0:x:end"/>', {"a": lasting(1.0)})
+    assert [set(w) for w in found.to_json()["warnings"]] == [{"id", "type", "text"}]
+
+
+def test_a_failing_block_tells_its_clash() -> None:
+    body = '<required><wait id="a" start="b:end"/><wait id="b" start="a:end"/></required>'
+    found = schedule(body, {"a": lasting(1.0), "b": lasting(1.0)})
+    assert found.failed
+    assert {clause.id for clause in found.warnings[0].clash} == {"b1:a", "b1:b"}
+
+
+def test_a_search_that_takes_too_long_leaves_the_clash_that_was_found() -> None:
+    n = 300
+    body = "".join(f'<wait id="w{k}" start="w{(k - 1) % n}:end"/>' for k in range(n))
+    found = schedule(body, {f"w{k}": lasting(1.0) for k in range(n)})
+    (warning,) = found.warnings
+    assert warning.id == f"b1:w{n - 1}"
+    assert len(warning.clash) == 2 * n
+
+
+# Documents of waits whose references are drawn at random.
+references = st.one_of(
+    st.integers(-2, 30).map(lambda k: f"{k / 10:g}"),
+    st.builds(
+        lambda b, p, k: f"w{b}:{p}{k / 10:+g}",
+        st.integers(0, 5),
+        st.sampled_from(["start", "end"]),
+        st.integers(-9, 9).filter(bool),
+    ),
+)
+wait = st.builds(
+    lambda start, end, length: (start, end, length),
+    st.none() | references,
+    st.none() | references,
+    st.integers(1, 20).map(lambda k: k / 10),
+)
+order = st.tuples(st.sampled_from(["before", "after"]), references, references)
+
+
+@settings(max_examples=100)
+@given(st.lists(wait, min_size=6, max_size=6), st.lists(order, max_size=3))
+def test_what_was_dropped_leaves_no_trace_on_the_rest(
+    waits: list[tuple[str | None, str | None, float]], orders: list[tuple[str, str, str]]
+) -> None:
+    """The rest has the times that it has in a document in which nothing else ever was."""
+    nodes = {}
+    for k, (start, end, _) in enumerate(waits):
+        tied = "".join(f' {p}="{ref}"' for p, ref in (("start", start), ("end", end)) if ref is not None)
+        nodes[f"w{k}"] = f'<wait id="w{k}"{tied}/>\n'
+    constraints = {
+        f"c{k}": f'<constraint id="c{k}"><{tag} ref="{ref}"><sync ref="{sync}"/></{tag}></constraint>\n'
+        for k, (tag, ref, sync) in enumerate(orders)
+    }
+    timings = {f"w{k}": lasting(length) for k, (_, _, length) in enumerate(waits)}
+    found = schedule("".join((nodes | constraints).values()), timings)
+    assume(found.warnings)
+    gone = {w.id.removeprefix("b1:") for w in found.warnings}
+    left = "".join([*nodes.values(), *(text for name, text in constraints.items() if name not in gone)])
+    again = schedule(left, {name: timing for name, timing in timings.items() if name not in gone})
+    assert not again.warnings
+    assert again.times.keys() == found.times.keys() == timings.keys() - gone
+    for name in again.times:
+        np.testing.assert_allclose(again.times[name], found.times[name], atol=1e-6, rtol=0)
+    assert again.cost == pytest.approx(found.cost, abs=1e-6)
