@@ -1,0 +1,201 @@
+"""Blocks that are solved together: what has passed stays, the rest is as good as it can be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bml_schema import Block, parse
+from realizer.scheduling import Member, Schedule, Timing, schedule_block, schedule_together
+
+FACE = ("start", "attackPeak", "relax", "end")
+
+# Behaviour, sync point, tenths of a second after it.
+Reference = tuple[int, str, int]
+Faces = list[tuple[list[float], Reference | None, Reference | None]]
+
+
+def block(id: str, body: str) -> Block:
+    return parse(
+        f'<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="{id}">{body}</bml>', strict=True
+    )
+
+
+def lasting(*preferred: float, least: float = 0.05, most: float | None = None) -> Timing:
+    k = len(preferred)
+    points = FACE if k == 3 else ("start", "end")
+    bounds = None if most is None else np.full(k, most)
+    return Timing(points, np.array(preferred), np.full(k, least), np.ones(k), most=bounds)
+
+
+def member(block: Block, timings: dict[str, Timing], **more: object) -> Member:
+    return Member(block, timings, **more)  # type: ignore[arg-type]
+
+
+def running(plays: Schedule, block: Block, timings: dict[str, Timing], origin: float, now: float) -> Member:
+    """A block that plays, as a new block that starts at `origin` sees it; both on one session clock."""
+    passed = {
+        name: {
+            point: plays.start + float(time) - origin
+            for point, time in zip(plays.points[name], times, strict=True)
+            if plays.start + time <= now
+        }
+        for name, times in plays.times.items()
+    }
+    return Member(
+        block,
+        timings,
+        start=plays.start - origin,
+        earliest=max(plays.start, now) - origin,
+        passed={name: when for name, when in passed.items() if when},
+        firm=True,
+    )
+
+
+# Faces that are tied to others before them, at one or both ends.
+tied = st.lists(
+    st.tuples(
+        st.lists(st.integers(1, 12).map(lambda k: k / 10), min_size=3, max_size=3),
+        st.none() | st.tuples(st.integers(0, 5), st.sampled_from(FACE), st.integers(-5, 5)),
+        st.none() | st.tuples(st.integers(0, 5), st.sampled_from(FACE), st.integers(0, 20)),
+    ),
+    min_size=1,
+    max_size=5,
+)
+
+
+def drawn(id: str, faces: Faces) -> tuple[Block, dict[str, Timing]]:
+    body, timings = "", {}
+    for k, (gaps, *ends) in enumerate(faces):
+        refs = ""
+        for point, ref in zip(("start", "end"), ends, strict=True):
+            if ref is not None and k:
+                number, sync, offset = ref
+                refs += f' {point}="f{number % k}:{sync}{offset / 10:+g}"'
+        body += f'<faceLexeme id="f{k}" lexeme="SMILE"{refs}/>'
+        timings[f"f{k}"] = lasting(*gaps)
+    return block(id, body), timings
+
+
+def same(one: Schedule, other: Schedule) -> None:
+    assert one.times.keys() == other.times.keys()
+    for name in one.times:
+        np.testing.assert_allclose(one.times[name], other.times[name], atol=1e-6, rtol=0)
+
+
+@settings(max_examples=80)
+@given(tied, st.integers(0, 30).map(lambda k: k / 10), st.integers(1, 30).map(lambda k: k / 10))
+def test_what_has_passed_stays_and_what_is_to_come_is_not_before_now(
+    faces: Faces, late: float, length: float
+) -> None:
+    """A wait of a new block is tied to the last face of one that plays."""
+    first, timings = drawn("a", faces)
+    plays = schedule_block(first, timings)
+    if not plays.times:
+        return
+    last = list(plays.times)[-1]
+    new = block("b", f'<wait id="w" start="0" end="a:{last}:end"/>')
+    kept = {name: timings[name] for name in plays.times}
+    others = [running(plays, first, kept, late, late)]
+    found = schedule_together([member(new, {"w": lasting(length, least=0.0)}), *others])
+    if found[0].failed or "w" not in found[0].times:
+        assert plays.times[last][-1] <= late, "only what is over can be too early"
+        return
+    assert not found[1].warnings
+    assert found[1].start == -late
+    assert found[1].times.keys() == plays.times.keys()
+    for name, before in plays.times.items():
+        after, over = found[1].times[name], before <= late
+        np.testing.assert_allclose(after[over], before[over], atol=1e-9)
+        assert (after[~over] >= late - 1e-9).all()
+        assert (np.diff(after) >= 0).all()
+    if plays.times[last][-1] > late:
+        assert found[1].at(last, "end") - late == pytest.approx(found[0].at("w", "end"), abs=1e-6)
+
+
+@settings(max_examples=60)
+@given(tied, tied, st.integers(0, 20).map(lambda k: k / 10))
+def test_a_block_that_nobody_ties_to_another_is_as_if_it_were_alone(
+    one: Faces, other: Faces, late: float
+) -> None:
+    a, b = drawn("a", one), drawn("b", other)
+    first, second = schedule_block(*a), schedule_block(*b)
+    both = schedule_together(
+        [member(*b), running(first, a[0], {n: a[1][n] for n in first.times}, late, late)]
+    )
+    same(both[0], second)
+    same(both[1], first)
+    assert both[0].warnings == second.warnings
+    assert both[1].start == -late
+
+
+@settings(max_examples=40)
+@given(tied, st.integers(-50, 5000).map(lambda k: k / 10))
+def test_where_the_clock_began_does_not_matter(faces: Faces, origin: float) -> None:
+    first, timings = drawn("a", faces)
+    new = block("b", '<wait id="w" start="a:f0:end + 0.5"/>')
+    here = schedule_together([member(new, {"w": lasting(1.0)}), member(first, timings)])
+    there = schedule_together(
+        [
+            member(new, {"w": lasting(1.0)}, start=origin, earliest=origin),
+            member(first, timings, start=origin, earliest=origin),
+        ]
+    )
+    for one, other in zip(here, there, strict=True):
+        same(one, other)
+
+
+def test_both_give_alike() -> None:
+    """Paul's figure 3.6 over two blocks: 3 s that play and 2 s that come, tied at both ends."""
+    first = block("a", '<wait id="w"/>')
+    new = block("b", '<wait id="v" start="a:w:start" end="a:w:end"/>')
+    found = schedule_together([member(new, {"v": lasting(2.0)}), member(first, {"w": lasting(3.0)})])
+    assert found[0]["v"] == found[1]["w"] == pytest.approx({"start": 0.0, "end": 2.5})
+
+
+def test_bounds_hold_for_what_plays_already() -> None:
+    first, timings = block("a", '<wait id="w"/>'), {"w": lasting(3.0, most=3.2)}
+    plays = schedule_block(first, timings)
+    new = block("b", '<wait id="v" start="0" end="a:w:end"/>')
+    found = schedule_together(
+        [member(new, {"v": lasting(9.0)}), running(plays, first, timings, origin=1.0, now=1.0)]
+    )
+    assert found[1]["w"] == pytest.approx({"start": 0.0, "end": 3.2}, abs=1e-9)
+    assert found[0]["v"] == pytest.approx({"start": 0.0, "end": 2.2}, abs=1e-9)
+
+
+def test_of_a_clash_the_new_behaviour_goes_and_the_words_name_the_old_one_with_its_block() -> None:
+    first, timings = block("a", '<wait id="w"/>'), {"w": lasting(3.0, most=3.2)}
+    plays = schedule_block(first, timings)
+    new = block("b", '<wait id="v" start="0" end="a:w:end"/><wait id="u"/>')
+    voices = {"v": Timing(("start", "end"), np.array([9.0]), np.array([9.0]), np.ones(1), True)}
+    found = schedule_together(
+        [
+            member(new, {**voices, "u": lasting(1.0)}),
+            running(plays, first, timings, origin=1.0, now=1.0),
+        ]
+    )
+    (warning,) = found[0].warnings
+    assert warning.id == "b:v"
+    assert "a:w takes at most 3.2 s from start to end" in warning.text
+    assert "a:w:start = the time at which it passed" in warning.text
+    assert {clause.id for clause in warning.clash} == {"a:w", "b:v"}
+    same(found[1], plays)
+    assert found[0]["u"] == {"start": 0.0, "end": 1.0}
+
+
+def test_a_new_block_fails_alone_where_it_wants_what_cannot_be() -> None:
+    first, timings = block("a", '<wait id="w" start="0" end="3"/>'), {"w": lasting(3.0)}
+    plays = schedule_block(first, timings)
+    new = block(
+        "b", '<required><wait id="v" start="0" end="a:w:end + 1"/></required><wait id="u" start="v:end"/>'
+    )
+    rigid = Timing(("start", "end"), np.array([9.0]), np.array([9.0]), np.ones(1), True)
+    found = schedule_together(
+        [member(new, {"v": rigid, "u": lasting(1.0)}), running(plays, first, timings, origin=1.0, now=1.0)]
+    )
+    assert [s.block for s in found] == ["b"]
+    assert found[0].failed
+    assert "all of this is required" in found[0].warnings[0].text
