@@ -141,6 +141,34 @@ def test_virtual_conductor_nods_on_every_beat() -> None:
     assert found.cost == pytest.approx(0, abs=1e-12)
 
 
+def test_a_conductor_of_waits_drives_hands_head_and_face() -> None:
+    """Paul 3.3.2 without a speech: beats tied to nothing but each other; what is too long for them gives."""
+    beats = "".join(
+        wait(f"beat{k}", end=f"beat{k}:start + 0.5", **({"start": f"beat{k - 1}:end"} if k else {}))
+        for k in range(6)
+    )
+    nods = "".join(head(f"n{k}", stroke=f"beat{k}:start") for k in range(6))
+    smiles = "".join(face(f"f{k}", start=f"beat{k}:start", end=f"beat{k}:end") for k in range(6))
+    nod = timing([0.1, 0.05, 0.1, 0.1, 0.05, 0.1])
+    found = schedule(
+        smiles + nods + beats,
+        {
+            **{f"beat{k}": timing([9.0]) for k in range(6)},
+            **{f"n{k}": nod for k in range(6)},
+            **{f"f{k}": timing([0.2, 0.5, 0.2]) for k in range(6)},
+        },
+    )
+    assert not found.warnings
+    # The first stroke comes as early as its nod allows, and sets the tempo off.
+    for k in range(6):
+        start = 0.25 + 0.5 * k
+        assert found.at(f"n{k}", "stroke") == pytest.approx(start)
+        np.testing.assert_allclose(np.diff(found.times[f"n{k}"]), nod.preferred)
+        np.testing.assert_allclose(
+            found.times[f"f{k}"], start + np.array([0, 0.2 / 3, 0.5 - 0.2 / 3, 0.5]), atol=1e-9
+        )
+
+
 # Chains, speech, what pushes what.
 
 
@@ -235,6 +263,30 @@ def test_zero_length_behaviours() -> None:
     assert found["c"] == {"start": 0.0, "end": 1.0}
 
 
+def test_zero_length_behaviours_pass_orders_on() -> None:
+    body = wait("a") + wait("b") + wait("c")
+    body += constraint(after("a:end", "b:start") + after("b:end", "c:start"))
+    found = schedule(body, {"a": timing([1.0]), "b": timing([0.0], least=0), "c": timing([1.0])})
+    assert found["b"] == pytest.approx({"start": 1.0, "end": 1.0})
+    assert found["c"] == pytest.approx({"start": 1.0, "end": 2.0})
+
+
+def test_an_end_too_soon_after_the_blocks_start_shortens_what_can_be_shortened() -> None:
+    found = schedule(wait("a", end="0.5") + wait("b", start="a:start"), {k: timing([1.0]) for k in "ab"})
+    assert found["a"] == {"start": 0.0, "end": 0.5}
+    assert found["b"] == {"start": 0.0, "end": 1.0}
+
+
+def test_an_end_too_soon_for_what_cannot_be_shortened_is_a_clash() -> None:
+    found = schedule(
+        saying("s", end="0.5") + wait("b", start="s:start"), {"s": speech(1.0), "b": timing([1.0])}
+    )
+    assert dropped(found) == ["b1:s"]
+    assert "s:end = 0.5 (line 2)" in found.warnings[0].text
+    assert "s:start is not before 0 s" in found.warnings[0].text
+    assert found["b"] == {"start": 0.0, "end": 1.0}
+
+
 def test_a_stated_length_wins_over_the_least_gaps() -> None:
     found = schedule(face("a", start="1", end="1.03"), {"a": timing([0.2, 0.4, 0.4], least=0.1)})
     assert not found.warnings
@@ -267,6 +319,21 @@ def test_after_that_is_idle_changes_nothing() -> None:
     found = schedule(body + constraint(after("a:end", "b:start")), {k: timing([1.0]) for k in "ab"})
     assert found["a"] == {"start": 0.0, "end": 1.0}
     assert found["b"] == {"start": 5.0, "end": 6.0}
+
+
+def test_before_that_is_idle_changes_nothing() -> None:
+    body = wait("a") + wait("b", start="5") + constraint(before("b:end - 1", "a:end"))
+    found = schedule(body, {k: timing([1.0]) for k in "ab"})
+    assert found["a"] == {"start": 0.0, "end": 1.0}
+    assert found["b"] == {"start": 5.0, "end": 6.0}
+
+
+def test_before_that_is_active_between_free_behaviours_moves_the_later_one() -> None:
+    found = schedule(
+        wait("a") + wait("b") + constraint(before("b:start", "a:end")), {k: timing([1.0]) for k in "ab"}
+    )
+    assert found["a"] == {"start": 0.0, "end": 1.0}
+    assert found["b"] == pytest.approx({"start": 1.0, "end": 2.0})
 
 
 def test_after_that_is_active_slides_without_cost() -> None:
