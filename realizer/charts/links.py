@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from bml_schema import After, Before, Block, Constraint, Speech, Synchronize, SyncRef
@@ -93,8 +93,9 @@ class _Links:
 
     def tie(self, behaviour: str, sync: str, kind: str, ref: SyncRef) -> None:
         place = self.block.places.get(behaviour)
-        link = Link(sync, kind, *self._other(ref), ref.offset, line=place.line if place else None)
-        self.add(behaviour, replace(link, required=behaviour in self.block.required))
+        required = behaviour in self.block.required
+        line = place.line if place else None
+        self.add(behaviour, Link(sync, kind, *self._other(ref), ref.offset, line=line, required=required))
 
     def constrain(self, constraint: Constraint) -> None:
         place = self.block.places.get(constraint.id) if constraint.id else constraint.place

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -121,6 +121,7 @@ def font(size: float, plain: bool = True) -> FreeTypeFont | ImageFont:
     return ImageFont.load_default(size)
 
 
+@lru_cache(4096)
 def width_of(text: str, size: float) -> float:
     """How wide a line of text is, in pixels; an estimate where it is not ASCII."""
     if text.isascii():

@@ -1,0 +1,68 @@
+"""Links: lines that end at the points they tie, and the room that orders leave."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.charts.colours import HELD, LINK, ROOM, TIGHT
+from realizer.charts.picture import timeline
+from realizer.charts.scale import scale_of
+from realizer.charts.shapes import Box, Path, Text
+
+TIED = """<bml id="b"><wait id="w" start="1" duration="1"/><head id="n" lexeme="NOD" {}/>{}</bml>"""
+
+
+def drawn(lines, document: str):
+    blocks = lines(document)
+    return timeline(blocks), scale_of(blocks), {line.id: line for line in blocks[0].lines}
+
+
+def paths(picture, colour: str) -> list[Path]:
+    """Lines that are not in the legend."""
+    return [s for s in picture.shapes if isinstance(s, Path) and s.colour == colour and s.tip]
+
+
+@pytest.mark.parametrize("offset", ["", "+0.5", "-0.25"])
+def test_a_curve_leads_from_the_point_that_is_named_to_the_one_that_follows(lines, offset: str) -> None:
+    picture, scale, by_id = drawn(lines, TIED.format(f'stroke="w:end{offset}"', ""))
+    (curve,) = paths(picture, LINK)
+    stroke = next(p.time for p in by_id["n"].points if p.name == "stroke")
+    assert curve.points[0][0] == pytest.approx(scale.x(2.0))
+    assert curve.points[-1][0] == pytest.approx(scale.x(stroke))
+    texts = [s.text for s in picture.shapes if isinstance(s, Text)]
+    assert (offset in texts) or not offset
+
+
+def test_a_point_at_a_time_has_a_pin(lines) -> None:
+    picture, scale, _ = drawn(lines, TIED.format('start="0.5"', ""))
+    tips = [s.points[0][0] for s in picture.shapes if isinstance(s, Path) and s.fill == HELD and s.tip]
+    assert sorted(tips) == pytest.approx([scale.x(0.5), scale.x(1.0)])
+
+
+def test_room_is_hatched_from_the_point_to_where_the_order_binds(lines) -> None:
+    said = '<constraint><before ref="w:end"><sync ref="n:end"/></before></constraint>'
+    picture, scale, by_id = drawn(lines, TIED.format('start="0"', said))
+    end = by_id["n"].points[-1].time
+    (strip,) = [s for s in picture.shapes if isinstance(s, Box) and s.tip.startswith("end not after w:end")]
+    assert (strip.x, strip.x + strip.width) == pytest.approx((scale.x(end), scale.x(2.0)))
+    assert f"{2.0 - end:.3f} s left" in strip.tip
+    assert paths(picture, ROOM)
+
+
+def test_an_order_that_binds_has_a_colour_of_its_own(lines) -> None:
+    said = '<constraint><after ref="w:end"><sync ref="n:start"/></after></constraint>'
+    picture, _, _ = drawn(lines, TIED.format("", said))
+    assert all(line.tip.endswith("binds") for line in paths(picture, TIGHT))
+    assert paths(picture, TIGHT)
+    assert not paths(picture, ROOM)
+
+
+def test_what_is_tied_to_a_block_that_is_not_in_the_picture_says_to_what(lines) -> None:
+    blocks = lines(
+        '<bml id="a"><wait id="x" duration="1"/></bml>',
+        '<bml id="b"><wait id="w" start="a:x:end" duration="1"/></bml>',
+    )
+    alone, both = timeline(blocks[1:]), timeline(blocks)
+    assert "a:x:end" in [s.text for s in alone.shapes if isinstance(s, Text)]
+    assert "a:x:end" not in [s.text for s in both.shapes if isinstance(s, Text)]
+    assert paths(both, LINK)

@@ -1,0 +1,58 @@
+"""Rows: numbers in gaps, names under ticks, reasons beside what was dropped."""
+
+from __future__ import annotations
+
+from realizer.charts.rows import draw_dropped, draw_line, height_of
+from realizer.charts.scale import Scale
+from realizer.charts.shapes import Picture, Text
+from realizer.charts.timeline import Dropped, Gap, Line, Point
+
+SCALE = Scale(0.0, 4.0, 1200.0)
+
+
+def texts(picture: Picture) -> list[str]:
+    return [shape.text for shape in picture.shapes if isinstance(shape, Text)]
+
+
+def row(*gaps: Gap, tied: frozenset[str] = frozenset()) -> list[str]:
+    points = [Point(gaps[0].begin, 0.0, 0.0)]
+    for gap in gaps:
+        time = points[-1].time + gap.actual
+        points.append(Point(gap.end, time, time))
+    picture = Picture(1200)
+    draw_line(picture, SCALE, Line("n", "head", 3, True, tuple(points), gaps), 0.0, 0.0, tied)
+    return texts(picture)
+
+
+def test_a_gap_says_its_length_and_how_much_of_the_preferred_it_is() -> None:
+    assert "1.50 s, 150%" in row(Gap("start", "end", 1.5, 1.0, 0.0, 1.0))
+    assert "1.00 s" in row(Gap("start", "end", 1.0, 1.0, 0.0, 1.0))
+    assert "1.50 s" in row(Gap("start", "end", 1.5))
+
+
+def test_a_short_gap_says_less_and_a_very_short_one_nothing() -> None:
+    assert "150%" in row(Gap("start", "end", 0.15, 0.1, 0.0, 1.0))
+    assert not any("%" in text for text in row(Gap("start", "end", 0.03, 0.02, 0.0, 1.0)))
+
+
+def test_a_row_says_what_it_is() -> None:
+    assert {"n", "head, line 3, required"} <= set(row(Gap("start", "end", 1.0, 1.0, 0.0, 1.0)))
+
+
+def test_of_names_that_do_not_fit_beside_each_other_the_tied_one_stays() -> None:
+    gaps = [Gap("strokeStart", "stroke", 0.02), Gap("stroke", "strokeEnd", 0.02)]
+    shown = row(*gaps, tied=frozenset({"stroke"}))
+    assert "stroke" in shown
+    assert "strokeEnd" in row(Gap("start", "strokeEnd", 2.0), Gap("strokeEnd", "end", 2.0))
+
+
+def test_a_reason_is_folded_and_its_place_is_not_said_twice() -> None:
+    gone = Dropped("f", "faceLexeme", 7, "CANNOT_CREATE_BEHAVIOR", "line 7, /bml/x[1]: " + "why not? " * 100)
+    picture = Picture(1200)
+    height = height_of(gone, SCALE)
+    draw_dropped(picture, SCALE, gone, 0.0, height)
+    shown = texts(picture)
+    assert {"f", "faceLexeme, line 7", "cannot create behavior"} <= set(shown)
+    assert not any("line 7, /bml" in text for text in shown)
+    assert sum(text.startswith("why not?") for text in shown) == 4
+    assert all(0 < s.y < height for s in picture.shapes if isinstance(s, Text))
