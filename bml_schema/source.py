@@ -44,6 +44,7 @@ class Source:
         self.text = _decoded(text) if isinstance(text, bytes) else text
         self.elements, self.slips = scan(self.text)
         self._starts = [0, *(m.end() for m in re.finditer("\n", self.text))]
+        self._line = 0, ""  # the last one asked for
         self._children = {
             (e.parent, e.name.rpartition(":")[2], e.nth): n for n, e in enumerate(self.elements)
         }
@@ -57,8 +58,14 @@ class Source:
         """The text of a line without its end; "" where there is no such line."""
         if not 1 <= number <= len(self._starts):
             return ""
+        if self._line[0] != number:  # one line may hold a whole document, and each of its faults
+            self._line = number, self.text[self._starts[number - 1] : self._end_of(number)]
+        return self._line[1]
+
+    def _end_of(self, number: int) -> int:
+        """Offset of the end of a line."""
         end = self._starts[number] - 1 if number < len(self._starts) else len(self.text)
-        return self.text[self._starts[number - 1] : end].removesuffix("\r")
+        return end - (self.text[end - 1 : end] == "\r" and end > self._starts[number - 1])
 
     def line_of(self, offset: int) -> int:
         return bisect_right(self._starts, offset)
@@ -67,7 +74,7 @@ class Source:
         """The part of text[offset:end] on its first line; at least one character long."""
         number = self.line_of(offset)
         column = offset - self._starts[number - 1]
-        longest = len(self.line(number)) - column
+        longest = self._end_of(number) - offset
         return Spot(number, column + 1, max(1, min(end - offset, longest)))
 
     def locate(

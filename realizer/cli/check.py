@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from realizer.scheduling.timing import Schedule, Warning
 
 __all__: list[str] = []
+
+MOST_ADVICE = 20  # on one block: one slip is often made all over a document
 
 
 @click.command()
@@ -84,7 +87,7 @@ def check(
             for finding in sorted(findings, key=lambda finding: finding.spot or (0,)):
                 show(finding, source)
             if isinstance(item, Block) and schedule is not None and not context.obj["quiet"]:
-                for finding in advice(name, source, item, schedule, player):
+                for finding in islice(advice(name, source, item, schedule, player), MOST_ADVICE):
                     show(finding, source, err=True)
         if not found and not context.obj["quiet"]:
             click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)

@@ -6,18 +6,17 @@ The words are those of realizer/scheduling/explain.py.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from bml_schema.scan import Element
 from bml_schema.source import Spot
 from realizer.cli.diagnostics import Label
 from realizer.cli.draft import Draft
+from realizer.scheduling.timing import Clause, Warning
 
 __all__ = ["explain_clash"]
 
-_CLAUSE = re.compile(
-    r"(\S+) (?:is )?(=|not before|not after) ([^,()]+?) \((?:(constraint)(?: ([^,)]+))?, )?line (\d+)\)"
-)
-_UNPLACED = re.compile(r"\S+ takes (?:at least|at most|exactly) [\d.e+-]+ s from (?:its start|\S+) to [^\s,;]+")
+_STATED = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")
 _CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
 _ASTRAY = re.compile(
     r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
@@ -26,10 +25,14 @@ _REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
 _BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)$|(all of this is required)$")
 
 
-def explain_clash(draft: Draft, text: str) -> bool:
-    """Whether these are the scheduler's words; if so the draft has what they say."""
-    if _CLAUSE.search(text):
-        _clash(draft, text)
+def explain_clash(draft: Draft, warning: Warning, text: str) -> bool:
+    """Whether the scheduler says this; if so the draft has what it says.
+
+    Args:
+        text: of the warning, without its place.
+    """
+    if warning.clash:
+        _clash(draft, warning.clash, text)
         return True
     if (astray := _ASTRAY.fullmatch(text)) is None:
         return False
@@ -38,20 +41,24 @@ def explain_clash(draft: Draft, text: str) -> bool:
     return True
 
 
-def _clash(draft: Draft, text: str) -> None:
+def _clash(draft: Draft, clash: Iterable[Clause], text: str) -> None:
     """Every line that has a part in it, and what the behaviours themselves need."""
     draft.path = draft.path or "/bml"
-    for found in _CLAUSE.finditer(text):
-        left, sign, right, constraint, id, line = found.groups()
-        spot = (
-            _in_constraint(draft, id, (right, left), int(line))
-            if constraint
-            else _in_behaviour(draft, left, int(line))
-        )
-        draft.labels.append(Label(spot, f"{left} {sign} {right}"))
-        if constraint and id == draft.id and (found_one := _constraint(draft, id, int(line))):
-            draft.path = draft.source.path(found_one)
-    draft.notes += [f"note: {found[0]}" for found in _UNPLACED.finditer(text)]
+    for clause in clash:
+        of_behaviour = ":" in clause.id
+        stated = _STATED.fullmatch(clause.text)
+        # Of a behaviour's own points only equalities stand in the document; order lies in its nature.
+        if stated is None or clause.line is None or (of_behaviour and stated[2] != "="):
+            draft.notes.append(f"note: {clause.text}")
+            continue
+        left, _, right = stated.groups()
+        if of_behaviour:
+            spot = _in_behaviour(draft, left, clause.line)
+        else:
+            spot = _in_constraint(draft, clause.id, (right, left), clause.line)
+            own = _constraint(draft, clause.id, clause.line) if clause.id == draft.id else None
+            draft.path = draft.source.path(own) if own is not None else draft.path
+        draft.labels.append(Label(spot, clause.text.replace(" is ", " ", 1)))
     cannot = _CANNOT.match(text)
     draft.head = cannot[0] if cannot else "these cannot all hold"
     if why := _BECAUSE.search(text):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import accumulate, groupby
 from textwrap import wrap
 
 import click
@@ -118,51 +118,69 @@ def _excerpts(
     line: str, labels: Sequence[Label], width: int
 ) -> Iterator[tuple[str, list[tuple[str, Label]]]]:
     """The line with the marks below it; a line that is too long once for each label, cut around it."""
-    cells = [_cell(character) for character in line]
-    first, last = _window(cells, labels, width)
-    if all(first < label.spot.column and _end(label) <= last for label in labels):
-        groups = [labels]
-    else:
-        groups = [[label] for label in labels]
-    for some in groups:
-        first, last = _window(cells, some, width)
-        before, after = (_CUT if first else ""), (_CUT if last < len(cells) else "")
-        row = before + "".join(shown for shown, _ in cells[first:last]) + after
+    first, last = min(label.spot.column for label in labels) - 1, max(map(_end, labels))
+    together = last - first <= width
+    if together:
+        excerpt = _cut(line, first, last, width)
+        together = excerpt.first <= first and last <= excerpt.last
+    for some in [labels] if together else [[label] for label in labels]:
+        excerpt = _cut(line, some[0].spot.column - 1, _end(some[0]), width) if not together else excerpt
         marks = []
         for label in some:
-            start, end = min(label.spot.column - 1, len(cells)), min(_end(label), last)
-            blanks = len(before) + sum(columns for _, columns in cells[first:start])
+            start, end = (excerpt.column(at) for at in (label.spot.column - 1, _end(label)))
             sign = "^" if label.primary else "-"
-            length = max(1, sum(columns for _, columns in cells[start:end]))
-            marks.append((" " * blanks + sign * length, label))
-        yield row, marks
+            marks.append((" " * start + sign * max(1, end - start), label))
+        yield excerpt.text, marks
 
 
 def _end(label: Label) -> int:
     return label.spot.column - 1 + label.spot.length
 
 
-def _window(cells: Sequence[tuple[str, int]], labels: Sequence[Label], width: int) -> tuple[int, int]:
-    """First and last + 1 of the characters that fit, with the labels in their middle."""
-    if sum(columns for _, columns in cells) <= width:
-        return 0, len(cells)
+@dataclass(frozen=True, slots=True)
+class _Excerpt:
+    """Characters first..last of a line as a terminal shows them, and where each begins."""
+
+    text: str
+    first: int
+    last: int
+    columns: Sequence[int]
+
+    def column(self, at: int) -> int:
+        """Where a character of the line is shown; what is cut off is at the nearer end."""
+        return self.columns[min(max(at, self.first), self.last) - self.first]
+
+
+def _cut(line: str, first: int, last: int, width: int) -> _Excerpt:
+    """As much around line[first:last] as fits into `width` columns."""
+    # What is further away cannot fit, whatever its width; a line may be a whole document.
+    begin, end = max(0, first - 2 * width), min(len(line), last + 2 * width)
+    cells = [_cell(character) for character in line[begin:end]]
+    whole = begin == 0 and end == len(line) and sum(columns for _, columns in cells) <= width
+    low, high = (0, len(cells)) if whole else _window(cells, first - begin, last - begin, width)
+    before, after = (_CUT if begin + low > 0 else ""), (_CUT if begin + high < len(line) else "")
+    columns = accumulate((columns for _, columns in cells[low:high]), initial=len(before))
+    text = before + "".join(shown for shown, _ in cells[low:high]) + after
+    return _Excerpt(text, begin + low, begin + high, tuple(columns))
+
+
+def _window(cells: Sequence[tuple[str, int]], first: int, last: int, width: int) -> tuple[int, int]:
+    """First and last + 1 of the characters that fit, with what is meant in their middle."""
     room = width - 2 * len(_CUT)
-    first = last = min(min(label.spot.column for label in labels) - 1, len(cells))
-    most = max(map(_end, labels))
+    low = high = min(first, len(cells))
     columns = 0
-    while last < min(most, len(cells)) and columns + cells[last][1] <= room:
-        columns += cells[last][1]
-        last += 1
+    while high < min(last, len(cells)) and columns + cells[high][1] <= room:
+        columns += cells[high][1]
+        high += 1
     while True:
         grown = False
-        for back in (True, False):
-            at = first - 1 if back else last
+        for at in (low - 1, high):
             if 0 <= at < len(cells) and columns + cells[at][1] <= room:
                 columns += cells[at][1]
-                first, last = (at, last) if back else (first, at + 1)
+                low, high = min(low, at), max(high, at + 1)
                 grown = True
         if not grown:
-            return first, last
+            return low, high
 
 
 def _cell(character: str) -> tuple[str, int]:

@@ -48,7 +48,7 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
     draft = Draft(source, warning.id, line, path)
     lost = _LOST.fullmatch(text)
     said = lost[1] if lost else text
-    if not explain_clash(draft, said):
+    if not explain_clash(draft, warning, said):
         _Sentences(draft, vocabulary).explain(said)
     if lost:
         draft.notes.append(f"note: with it went {lost[2]}")

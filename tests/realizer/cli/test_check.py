@@ -277,6 +277,19 @@ def test_what_is_merely_unknown_gets_no_advice(text: str, tmp_path: Path) -> Non
     assert "ADVICE" not in check(tmp_path, f"{HEAD}{text}</bml>").stderr
 
 
+def test_advice_on_one_block_is_not_endless(tmp_path: Path) -> None:
+    heads = "".join(f'<head id="h{n}" lexeme="NOD" strt="1"/>' for n in range(50))
+    assert check(tmp_path, f"{HEAD}{heads}</bml>").stderr.count("ADVICE") == 20
+
+
+def test_faults_far_apart_in_one_line_are_each_shown(tmp_path: Path) -> None:
+    gap = "<!--" + "-*" * 200 + "-->"
+    text = f'<wait id="a" start="1" end="0.5"/>{gap}<wait id="b" start="a:nd"/>{gap}<wait id="a"/>'
+    first, second, third = blocks(check(tmp_path, f"{HEAD}{text}</bml>", "--long"))
+    assert [marked(first), marked(second), marked(third)] == [["0.5", "1"], ["nd"], ["a", "a"]]
+    assert all(len(line) <= 100 for block in (first, second, third) for line in block[1:])
+
+
 def test_quiet_holds_advice_back(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(f'{HEAD}<head id="h" lexeme="NOD" strt="1"/></bml>')
