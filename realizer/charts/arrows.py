@@ -15,7 +15,7 @@ __all__ = ["Place", "draw_links"]
 
 # block, behaviour -> its line, the start of its block, and the top of its row
 Place = Mapping[tuple[str, str], tuple[Line, float, float]]
-BEND = 18  # pieces of a curve
+BEND = 28  # pieces of a curve
 
 
 def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine, places: Place) -> None:

@@ -102,6 +102,7 @@ class Broadcast:
     def next_deadline(self, connections: Iterable[Connection]) -> float | None:
         """When `due` will next have something; None where nobody gets anything."""
         deadlines: list[float] = []
+        plans: list[PlanSubscription] = []
         for connection in connections:
             for subscription in connection.subscriptions.values():
                 match subscription:
@@ -109,14 +110,15 @@ class Broadcast:
                         deadlines.append(number / timeline.fps)
                     case SoundSubscription():
                         deadlines += self._sound_deadline(subscription)
-                    case PlanSubscription(behind=behind, again=again):
-                        if behind or self._plans.have_changed():
-                            deadlines.append(again)
+                    case PlanSubscription():
+                        plans.append(subscription)
                     case PictureSubscription(view=view):
                         busy = view.busy is not None
                         deadlines.append(
                             view.begun + DRAW_DEADLINE if busy else view.next / view.timeline.fps
                         )
+        changed = bool(plans) and self._plans.have_changed()
+        deadlines += [s.again for s in plans if s.behind or changed]
         return min(deadlines, default=None)
 
     def drawn(

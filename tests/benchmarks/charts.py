@@ -1,0 +1,80 @@
+"""What timelines cost: `python tests/benchmarks/charts.py` prints medians in milliseconds.
+
+The data and JSON of a block are made when it is planned or moved, while others play; a quiet tick is what a
+session pays where somebody follows the stream `schedule` and nothing has changed. On 2 cores, shared:
+
+    blocks alive     quiet tick   whole state
+         5             0.01          0.8
+       100             0.2          30
+
+    behaviours    data + JSON     layout      SVG      PNG
+         5             0.4          1.2        1.3     250
+        40             3           11          8      1900
+       400            44          104        102      4000
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from collections.abc import Callable
+
+from realizer.charts.picture import timeline
+from realizer.charts.raster import png
+from realizer.charts.svg import svg
+from realizer.charts.timeline import lines_of
+from realizer.pipeline import play
+from realizer.player import Player
+from realizer.server.plans import Plans
+
+
+def median(work: Callable[[], object], times: int) -> float:
+    """Milliseconds."""
+    taken = []
+    for _ in range(times):
+        begin = time.perf_counter()
+        work()
+        taken.append(time.perf_counter() - begin)
+    return statistics.median(taken) * 1e3
+
+
+def faces(count: int) -> str:
+    body = "".join(
+        f'<faceLexeme id="f{i}" lexeme="SMILE" start="{i * 0.05:.2f}" end="{i * 0.05 + 2:.2f}"/>'
+        for i in range(count)
+    )
+    return f'<bml id="b">{body}</bml>'
+
+
+def stream(count: int) -> None:
+    player = Player(idle=False)
+    play([f'<bml id="b{i}"><head id="n" lexeme="NOD" start="1"/></bml>' for i in range(count)], player)
+    known = Plans(player.cast)
+    known.changes()
+    quiet = median(known.have_changed, 30)
+    whole = median(lambda: Plans(player.cast).changes(), 5)
+    print(f"{count:6} blocks alive   quiet tick {quiet:8.3f}   whole state {whole:8.1f}")
+
+
+def picture(count: int) -> None:
+    player = Player(idle=False)
+    schedules, _ = play([faces(count)], player)
+    blocks = lines_of(player.cast, schedules)
+    drawn = timeline(blocks)
+    few = 20 if count < 100 else 3
+    data = median(lambda: json.dumps(lines_of(player.cast, schedules)[0].to_json()), few)
+    layout = median(lambda: timeline(blocks), few)
+    text = median(lambda: svg(drawn), few)
+    pixels = median(lambda: png(drawn), 1)
+    print(
+        f"{count:6} behaviours   data + JSON {data:8.2f}   layout {layout:8.1f}   SVG {text:8.1f}"
+        f"   PNG {pixels:8.0f}"
+    )
+
+
+if __name__ == "__main__":
+    for blocks_alive in (5, 100):
+        stream(blocks_alive)
+    for behaviours in (5, 40, 400):
+        picture(behaviours)
