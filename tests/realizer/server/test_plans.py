@@ -5,10 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 SCHEDULE = {"type": "subscribe", "stream": "schedule"}
 WAIT = '<bml id="{}"{}><wait id="w" duration="{}"/></bml>'
 BMLA = ' xmlns:bmla="http://www.asap-project.org/bmla"'
+# Blocks of the first id, some of which refer to a block of the second one, which may be there or not.
+DOCUMENTS = (
+    '<bml id="{0}"><head id="n" lexeme="NOD" start="0.3"/><faceLexeme id="w" lexeme="SMILE"/></bml>',
+    '<bml id="{0}" composition="APPEND"><wait id="w" duration="1"/></bml>',
+    '<bml id="{0}" composition="REPLACE"><wait id="w" duration="2"/></bml>',
+    '<bml id="{0}"><wait id="w" start="anticipators:m:beat" duration="1"/></bml>',
+    '<bml id="{0}"><wait id="w" start="{1}:w:end" duration="1"/></bml>',
+    '<bml id="{0}"><wait id="w" duration="2"/><constraint><after ref="{1}:w:start"><sync ref="w:start"/>'
+    "</after></constraint></bml>",
+)
 
 
 def states(client) -> list[tuple[str, str]]:
@@ -218,3 +230,37 @@ def test_who_comes_back_begins_with_the_whole_state_again(drive) -> None:
 def test_the_stream_has_no_other_encoding(driver) -> None:
     client = driver.send({**SCHEDULE, "encoding": "binary"})
     assert client.of("error")[0]["where"] == "subscribe.encoding"
+
+
+MOVES = st.one_of(
+    st.tuples(st.just("send"), st.integers(0, len(DOCUMENTS) - 1)),
+    st.tuples(st.just("run"), st.floats(0.01, 1.5)),
+    st.tuples(st.just("stop"), st.integers(0, 5)),
+    st.tuples(st.just("beat"), st.floats(0, 4)),
+    st.tuples(st.just("slow"), st.sampled_from([0, 10**6])),
+)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(moves=st.lists(MOVES, max_size=14))
+def test_who_was_told_every_change_knows_what_who_comes_last_is_told(drive, moves) -> None:
+    driver = drive(idle=False)
+    client = driver.send(SCHEDULE)
+    driver.send({"type": "anticipate", "id": "m", "syncs": {"beat": 1.0}})
+    for number, (move, value) in enumerate(moves):
+        if move == "send":
+            driver.send(DOCUMENTS[value].format(f"b{number}", f"b{max(0, number - 2)}"))
+        elif move == "run":
+            driver.run(driver.now + value)
+        elif move == "stop":
+            driver.send({"type": "stop", "blocks": [f"b{value}"]})
+        elif move == "beat":
+            driver.send({"type": "anticipate", "id": "m", "syncs": {"beat": driver.now + value}})
+        else:
+            driver.session.backlog(1, value)
+    driver.session.backlog(1, 0)
+    driver.run(driver.now + 0.2)
+    last = driver.join(2)
+    driver.send(SCHEDULE, 2)
+    over = ("DONE", "INTERRUPTED", "REVOKED")
+    assert {b: s for b, s in known(client).items() if s["state"] not in over} == known(last)
