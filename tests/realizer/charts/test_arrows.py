@@ -39,13 +39,20 @@ def test_a_point_at_a_time_has_a_pin(lines) -> None:
     assert sorted(tips) == pytest.approx([scale.x(0.5), scale.x(1.0)])
 
 
-def test_room_is_hatched_from_the_point_to_where_the_order_binds(lines) -> None:
-    said = '<constraint><before ref="w:end"><sync ref="n:end"/></before></constraint>'
-    picture, scale, by_id = drawn(lines, TIED.format('start="0"', said))
-    end = by_id["n"].points[-1].time
-    (strip,) = [s for s in picture.shapes if isinstance(s, Box) and s.tip.startswith("end not after w:end")]
-    assert (strip.x, strip.x + strip.width) == pytest.approx((scale.x(end), scale.x(2.0)))
-    assert f"{2.0 - end:.3f} s left" in strip.tip
+@pytest.mark.parametrize(
+    ("said", "bound"),
+    [
+        ('<before ref="w:end"><sync ref="n:start"/></before>', 2.0),
+        ('<after ref="w:start"><sync ref="n:start"/></after>', 1.0),
+    ],
+)
+def test_room_is_hatched_from_the_point_to_where_the_order_binds(lines, said: str, bound: float) -> None:
+    document = TIED.format('start="1.6"', f"<constraint>{said}</constraint>")
+    picture, scale, _ = drawn(lines, document)
+    (strip,) = [s for s in picture.shapes if isinstance(s, Box) and s.tip.endswith("s left")]
+    ends = sorted((scale.x(1.6), scale.x(bound)))
+    assert [strip.x, strip.x + strip.width] == pytest.approx(ends)
+    assert f"{abs(bound - 1.6):.3f} s left" in strip.tip
     assert paths(picture, ROOM)
 
 
