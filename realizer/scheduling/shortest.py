@@ -31,7 +31,8 @@ def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[C
     for cycle in cycles:
         clash, left = web.cycle(cycle), MOST_STEPS
         points = {end for r in clash.relations for end in (r.u, r.v)}
-        points |= {end for link in cycle for end in (link.u, link.v)}
+        # Statements meet at points that relations name, or at the first point of what starts too soon.
+        points |= {end for link in cycle if link.u == ORIGIN or not points for end in (link.u, link.v)}
         todo = sorted(points)
         while todo and left > 0:
             start = todo.pop()
@@ -62,6 +63,7 @@ class _Ways:
         self._least, self._most = np.zeros(n), np.zeros(n)
         self._least[model.gap + 1], self._most[model.gap + 1] = model.least, model.most
         self._rigid = [timing.rigid for timing in problem.timings]
+        self._known: dict[int, list[Step]] = {}
 
     def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
         """The steps of a positive cycle through a point of at most so many statements, the fewest there are.
@@ -77,8 +79,10 @@ class _Ways:
             after: dict[int, float] = {}
             came.append({})
             for u, so_far in layer.items():
-                for step in self._from(u):
-                    tried += 1
+                if (ways := self._known.get(u)) is None:
+                    ways = self._known[u] = list(self._from(u))
+                tried += len(ways)
+                for step in ways:
                     v, seconds, _ = step
                     total = so_far + seconds
                     if v == start:
