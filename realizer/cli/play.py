@@ -214,7 +214,7 @@ def _plot(player: Player, accepted: list[Schedule], plot: str) -> None:
 
 def _lines(player: Player, accepted: list[Schedule]) -> list[BlockLine]:
     """The blocks of these schedules as charts and their data show them."""
-    from realizer.charts.timeline import lines_of
+    from realizer.charts.reading import lines_of
 
     return lines_of(player.cast, accepted)
 

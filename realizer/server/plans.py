@@ -6,7 +6,8 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from realizer.charts.timeline import BlockLine, line_of
+from realizer.charts.reading import line_of
+from realizer.charts.timeline import BlockLine
 from realizer.composition.cast import Cast
 from realizer.composition.playing import Playing
 from realizer.composition.references import references

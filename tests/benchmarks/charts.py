@@ -22,8 +22,8 @@ from collections.abc import Callable
 
 from realizer.charts.picture import timeline
 from realizer.charts.raster import png
+from realizer.charts.reading import lines_of
 from realizer.charts.svg import svg
-from realizer.charts.timeline import lines_of
 from realizer.pipeline import play
 from realizer.player import Player
 from realizer.server.plans import Plans

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from realizer.charts.timeline import BlockLine, lines_of
+from realizer.charts.reading import lines_of
+from realizer.charts.timeline import BlockLine
 from realizer.pipeline import play
 from realizer.player import Player
 
