@@ -1,0 +1,46 @@
+"""timing.toml has the sync points of every element, and what it takes from films is what was measured."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from realizer.behaviours import VOCABULARY
+from realizer.tables.templates import templates
+from realizer.tables.timing import Gaps, all_gaps
+
+ROWS = all_gaps()
+MEASURED = re.compile(r"Wojdel 2005 table 6\.4, template (\w+) \(?.*?(\d+) frames, sigma (\d+)")
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_points_are_those_of_the_element(name: str) -> None:
+    row: Gaps = ROWS[name]
+    element = name.partition(".")[0]
+    nodes = [cls for tag, cls in VOCABULARY.items() if tag.rpartition("}")[2] == element]
+    assert nodes, f"no element {element}"
+    assert row.points[0] == "start"
+    assert row.points[-1] == "end"
+    assert len(row.gaps) == len(row.points) - 1
+    assert any(row.points == tuple(cls.sync_points) for cls in nodes)
+
+
+def test_holds_that_were_measured_make_what_was_evident() -> None:
+    """An expression is evident from half of its attack to half of its relaxation."""
+    found = 0
+    for name, row in ROWS.items():
+        for gap in row.gaps:
+            if (said := MEASURED.search(gap.source)) is None:
+                continue
+            found += 1
+            template = templates()[said[1].upper()]
+            assert template.evident == pytest.approx(int(said[2]) / 25), name
+            assert template.deviation == pytest.approx(int(said[3]) / 25), name
+            attack, hold, relax = row.gaps
+            evident = attack.preferred / 2 + hold.preferred + relax.preferred / 2
+            assert evident == pytest.approx(template.evident, abs=0.021), name
+            assert hold.stiffness == pytest.approx(template.deviation**-2, rel=0.05), name
+            least, most = template.possible or (0.0, float("inf"))
+            assert least <= evident <= most, name
+    assert found >= 6
