@@ -2,6 +2,7 @@
 
 from realizer.scheduling.plan import schedule_block, schedule_together
 from realizer.scheduling.problem import Member
+from realizer.scheduling.shapes import warm_up
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
-__all__ = ["Member", "Schedule", "Timing", "Warning", "schedule_block", "schedule_together"]
+__all__ = ["Member", "Schedule", "Timing", "Warning", "schedule_block", "schedule_together", "warm_up"]

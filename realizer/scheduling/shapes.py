@@ -14,7 +14,7 @@ from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
 from realizer.scheduling.ties import Ties
 
-__all__ = ["Shapes", "settle", "shapes_of"]
+__all__ = ["Shapes", "settle", "shapes_of", "warm_up"]
 
 # Lengths that meet as closely as this count as fitting exactly.
 FITS = 1e-9  # s
@@ -132,6 +132,14 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     knot = knots[place]
     pull = np.where(before, strain[place], 0.0)
     shapes.at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
+
+
+def warm_up() -> None:
+    """Load what only large blocks need, a third of a second, which else the first of them would wait for."""
+    chain = np.arange(SPARSE_FROM)
+    ones, fixed = np.ones(SPARSE_FROM), np.zeros(SPARSE_FROM + 1, np.bool_)
+    fixed[0] = True
+    settle(chain, chain + 1, ones, ones, fixed, np.zeros(SPARSE_FROM + 1))
 
 
 def _each(numbers: Index, size: int) -> Index:
