@@ -84,7 +84,7 @@ class Course:
             held=relations.held(character, alive),
             others=[member(p, origin, now) for p in others],
         )
-        if others and self._disturb(others, planned.moved):
+        if planned.moved and self._disturb(others, planned.moved):
             return self.plan(block, character, world, start, now, waits=waits, ended=ended, alone=True)
         return planned, others
 

@@ -221,3 +221,10 @@ def test_a_speech_that_is_over_is_not_spoken_again() -> None:
     stage.until(9.0)
     assert not stage.player.respeak("a", "s", spoken(1.6, 3.0), 9.0)
     assert not stage.player.respeak("nobody", "s", spoken(1.6, 3.0), 9.0)
+
+
+def test_a_block_that_fails_moves_nobody(stage: Stage) -> None:
+    first = stage.send("a", FACE.format(""))
+    refused = stage.send("b", '<required><wait id="w" start="a:f:end" end="0"/></required>', at=0.1)
+    assert refused.failed
+    assert stage.player.latest(first).end == first.end
