@@ -11,6 +11,8 @@ from realizer.scheduling.timing import Clause, Warning
 __all__ = ["IMPOSSIBLE", "choose", "clauses", "fault_warning", "in_words", "refusal", "warning_of"]
 
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
+# Nobody reads on; `Warning.clash` has them all.
+MOST_CLAUSES = 30
 
 
 def choose(clash: Clash) -> Part | None:
@@ -50,7 +52,10 @@ def in_words(clash: Clash) -> str:
     """The clash as the clauses of one sentence, in the order in which they chain."""
     said = [f"{clause.text}{_placed(part, clause.line)}" for part, clause in _clauses(clash)]
     unique = list(dict.fromkeys(said))
-    return f"{_join(unique)} cannot {'all ' if len(unique) > 2 else 'both ' if len(unique) > 1 else ''}hold"
+    how = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
+    if len(unique) > MOST_CLAUSES:
+        unique[MOST_CLAUSES - 1 :] = [f"{len(unique) - MOST_CLAUSES + 1} more such things"]
+    return f"{_join(unique)} cannot {how}hold"
 
 
 def clauses(clash: Clash) -> tuple[Clause, ...]:

@@ -156,17 +156,15 @@ def _anchor(model: Model, group: Group) -> int:
 
 
 def _yield_to_stated(model: Model, gaps: Index) -> bool:
-    """Where the document itself states how long a stretch is, that length wins over the least gaps in it,
-    but for behaviours that are bounded.
-    """
+    """A length that the document itself states wins over the least gaps in it, but where they are bounded."""
     changed = False
     owners, firsts = np.unique(model.owner[model.gap[gaps]], return_index=True)
     for b, k in zip(owners.tolist(), gaps[firsts].tolist(), strict=True):
-        first = int(model.first[b])
-        if model.problem.timings[b].most is not None:
+        first, last = int(model.first[b]), int(model.last[b])
+        if (model.most[k : k + last - first] < np.inf).any():
             continue
         seen: dict[int, int] = {}
-        for p in range(first, int(model.last[b]) + 1):
+        for p in range(first, last + 1):
             begin = seen.get(int(model.root[p]))
             if begin is not None:
                 stretch = slice(k + begin - first, k + p - first)

@@ -195,6 +195,8 @@ def test_a_search_that_takes_too_long_leaves_the_clash_that_was_found() -> None:
     (warning,) = found.warnings
     assert warning.id == f"b1:w{n - 1}"
     assert len(warning.clash) == 2 * n
+    assert "571 more such things cannot all hold" in warning.text, "but nobody has to read all that"
+    assert len(warning.text) < 2000
 
 
 # Documents of waits whose references are drawn at random.
