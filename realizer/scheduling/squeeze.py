@@ -79,17 +79,15 @@ def squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> list[list[
     whole = _squeeze(model, shapes, groups)
     x = settled(whole.quadratic, whole.start(shapes))
     if x is None:
-        level, cycle = whole.keep(shapes)
-        if cycle:
-            links = [links for group in groups if (links := _impossible(model, shapes, group))]
-            if links:
-                return links
-            # All of them had least gaps that gave way.
-            whole = _squeeze(model, shapes, groups)
-            x = settled(whole.quadratic, whole.start(shapes))
-            level, _ = whole.keep(shapes)
-        if x is None:
-            x = optimum(whole.quadratic, level)
+        cycles = [cycle for group in groups if (cycle := _impossible(model, shapes, group))]
+        if cycles:
+            return cycles
+        # Least gaps may have given way.
+        whole = _squeeze(model, shapes, groups)
+        x = settled(whole.quadratic, whole.start(shapes))
+    if x is None:
+        level, _ = whole.keep(shapes)
+        x = optimum(whole.quadratic, level)
     shapes.at[whole.points] = x[whole.number[model.root[whole.points]]] + model.shift[whole.points]
     return []
 

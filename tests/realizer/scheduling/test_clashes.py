@@ -81,7 +81,7 @@ def clashes_of(recipe: Recipe) -> tuple[Problem, list[Clash]]:
     return problem, [] if isinstance(found, Solution) else found
 
 
-@settings(max_examples=150)
+@settings(max_examples=90)
 @given(wild)
 def test_without_any_one_of_what_is_named_the_rest_of_it_can_hold(recipe: Recipe) -> None:
     problem, clashes = clashes_of(recipe)
@@ -115,7 +115,7 @@ def ways(problem: Problem) -> Float64:
     return found
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(wild)
 def test_no_fewer_statements_clash_at_any_of_its_points(recipe: Recipe) -> None:
     # A length that the document states wins over least gaps, so that these do not clash.

@@ -28,7 +28,7 @@ def quadratics(draw: st.DrawFn) -> Quadratic:
     return Quadratic(NODES, i, j, wanted, stiffness, u, v, w, np.zeros(NODES, np.intp))
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(quadratics())
 def test_guesses_end_where_the_interior_point_does(quadratic: Quadratic) -> None:
     start = np.zeros(NODES)

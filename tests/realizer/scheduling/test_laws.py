@@ -98,7 +98,7 @@ def test_times_are_those_of_a_slow_general_solver(recipe: Recipe) -> None:
     np.testing.assert_allclose(found.time, reference, atol=3e-3)
 
 
-@settings(max_examples=200)
+@settings(max_examples=120)
 @given(wild)
 def test_a_clash_is_found_where_a_linear_program_finds_no_times_and_only_there(recipe: Recipe) -> None:
     # No least gaps: a length that the document states wins over them, which a linear program does not know.
@@ -109,7 +109,7 @@ def test_a_clash_is_found_where_a_linear_program_finds_no_times_and_only_there(r
     assert isinstance(solve(problem), Solution) == (there_are.status == 0)
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(anything, st.sampled_from([0.0, 0.5]))
 def test_everything_is_kept_exactly(recipe: Recipe, earliest: float) -> None:
     problem = built(recipe, earliest=earliest)
@@ -169,7 +169,7 @@ def check_any_order(recipe: Recipe, everyone: list[int]) -> None:
             )
 
 
-@settings(max_examples=250)
+@settings(max_examples=180)
 @given(anything, st.permutations(range(MOST_BODIES)))
 @example(CLOSED, [2, 0, 1, 3, 4, 5])
 @example(JOINED, [2, 1, 0, 3, 4, 5])
@@ -178,7 +178,7 @@ def test_document_order_does_not_matter(recipe: Recipe, everyone: list[int]) -> 
     check_any_order(recipe, everyone)
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(possible(stiffness=(1e-3, 1.0, 1e3)), st.permutations(range(MOST_BODIES)))
 def test_nor_does_it_where_some_gaps_are_a_million_times_as_stiff_as_others(
     recipe: Recipe, everyone: list[int]
@@ -248,7 +248,7 @@ def test_a_lone_behaviour_gets_its_preferred_gaps(
     np.testing.assert_allclose(np.diff(time[1:]), gaps, atol=1e-12)
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(anything, spots, spots, tenths)
 @example(Recipe([Body([1.0], 0.0, 1.0, False, None)], [], [], []), (0, 0), (0, 1), 0.0)
 def test_a_constraint_that_already_holds_changes_nothing(
@@ -272,7 +272,7 @@ def test_a_constraint_that_already_holds_changes_nothing(
         np.testing.assert_allclose(again.time, found.time, atol=1e-6, rtol=0)
 
 
-@settings(max_examples=100)
+@settings(max_examples=80)
 @given(wild)
 def test_what_remains_after_dropping_is_feasible(recipe: Recipe) -> None:
     problem = built(recipe)
