@@ -33,7 +33,7 @@ def raise_levels(level: list[float], edges: Sequence[Edge], slack: float) -> lis
                 moved = True
         if not moved:
             return None
-        # To look for a cycle costs as much as a sweep; where there is one, it is there sooner or later to stay.
+        # To look for a cycle costs as much as a sweep; one that is there is there to stay, sooner or later.
         looks = sweep & (sweep - 1) == 0 or sweep % 8 == 0
         if looks and (cycle := _cycle(cause, edges)):
             return cycle
