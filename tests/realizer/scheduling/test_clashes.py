@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings
 from scipy.optimize import linprog
 
 from bml_schema import parse
@@ -197,49 +195,3 @@ def test_a_search_that_takes_too_long_leaves_the_clash_that_was_found() -> None:
     assert len(warning.clash) == 2 * n
     assert "571 more such things cannot all hold" in warning.text, "but nobody has to read all that"
     assert len(warning.text) < 2000
-
-
-# Documents of waits whose references are drawn at random.
-references = st.one_of(
-    st.integers(-2, 30).map(lambda k: f"{k / 10:g}"),
-    st.builds(
-        lambda b, p, k: f"w{b}:{p}{k / 10:+g}",
-        st.integers(0, 5),
-        st.sampled_from(["start", "end"]),
-        st.integers(-9, 9).filter(bool),
-    ),
-)
-wait = st.builds(
-    lambda start, end, length: (start, end, length),
-    st.none() | references,
-    st.none() | references,
-    st.integers(1, 20).map(lambda k: k / 10),
-)
-order = st.tuples(st.sampled_from(["before", "after"]), references, references)
-
-
-@settings(max_examples=100)
-@given(st.lists(wait, min_size=6, max_size=6), st.lists(order, max_size=3))
-def test_what_was_dropped_leaves_no_trace_on_the_rest(
-    waits: list[tuple[str | None, str | None, float]], orders: list[tuple[str, str, str]]
-) -> None:
-    """The rest has the times that it has in a document in which nothing else ever was."""
-    nodes = {}
-    for k, (start, end, _) in enumerate(waits):
-        tied = "".join(f' {p}="{ref}"' for p, ref in (("start", start), ("end", end)) if ref is not None)
-        nodes[f"w{k}"] = f'<wait id="w{k}"{tied}/>\n'
-    constraints = {
-        f"c{k}": f'<constraint id="c{k}"><{tag} ref="{ref}"><sync ref="{sync}"/></{tag}></constraint>\n'
-        for k, (tag, ref, sync) in enumerate(orders)
-    }
-    timings = {f"w{k}": lasting(length) for k, (_, _, length) in enumerate(waits)}
-    found = schedule("".join((nodes | constraints).values()), timings)
-    assume(found.warnings)
-    gone = {w.id.removeprefix("b1:") for w in found.warnings}
-    left = "".join([*nodes.values(), *(text for name, text in constraints.items() if name not in gone)])
-    again = schedule(left, {name: timing for name, timing in timings.items() if name not in gone})
-    assert not again.warnings
-    assert again.times.keys() == found.times.keys() == timings.keys() - gone
-    for name in again.times:
-        np.testing.assert_allclose(again.times[name], found.times[name], atol=1e-6, rtol=0)
-    assert again.cost == pytest.approx(found.cost, abs=1e-6)
