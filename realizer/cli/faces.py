@@ -117,3 +117,25 @@ def build(name: str, data: Path, output: Path | None) -> None:
 
     folder = build_face(name, data, output or Path("faces") / name)
     click.echo(f"{folder}: built")
+
+
+@faces.command()
+@click.argument("name")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), required=True, help="Folder of the face that is made."
+)
+@click.option(
+    "--parameters",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Zones to use (TOML); default the folder's mpeg4.toml, or computed from its feature points.",
+)
+@click.option(
+    "--fap", "only", type=int, multiple=True, help="Only this FAP, the others stay; may be repeated."
+)
+def zones(name: str, output: Path, parameters: Path | None, only: tuple[int, ...]) -> None:
+    """Make a face of a head by MPEG-4 zones: a mesh and feature points are enough."""
+    from realizer.face.load import folder_of
+    from realizer.face.mpeg4.build import copy_with_zones
+
+    setup = copy_with_zones(folder_of(name), output, parameters, only)
+    click.echo(f"{output}: {len(only) or len(setup.zones)} zones")

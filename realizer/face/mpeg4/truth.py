@@ -153,9 +153,10 @@ class _Measure:
         near.data[:] = 1
         count = np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)
         seen: Bool = np.asarray(face.occlusion[first:last] >= INNER)
+        outside: Bool = np.asarray(seen[mine].any(axis=1))
         paired: Bool = np.asarray(off < 3e-4)
         return cls(
-            face, slice(first, last), mine, seen[mine].any(axis=1), seen,
+            face, slice(first, last), mine, outside, seen,
             sp.diags_array(1 / count) @ near, twin, paired,
         )  # fmt: skip
 
