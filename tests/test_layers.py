@@ -15,10 +15,11 @@ import realizer
 ROOTS = {"bml_schema": Path(bml_schema.__path__[0]), "realizer": Path(realizer.__path__[0])}
 
 # What each part may import of ours, the longest matching prefix counts. "*" is anything.
-VALUES = {"realizer.arrays", "realizer.errors", "realizer.units"}
+VALUES = {"realizer.arrays", "realizer.colours", "realizer.errors", "realizer.units"}
 MAY: dict[str, set[str]] = {
     "bml_schema": {"bml_schema"},
     "realizer.arrays": set(),
+    "realizer.colours": {"realizer.arrays"},
     "realizer.errors": set(),
     "realizer.units": set(),
     "realizer.settings": {"realizer.errors"},
@@ -107,7 +108,8 @@ MAY: dict[str, set[str]] = {
 DOORS = {
     "lxml": ("bml_schema",),
     "trimesh": ("realizer.face",),
-    "pyrender": ("realizer.render",),
+    "numba": ("realizer.render.raster",),
+    "pyrender": ("realizer.render.offscreen",),
     "websockets": ("realizer.server", "realizer.client"),
     "av": ("realizer.outputs",),
     "clarabel": ("realizer.scheduling",),

@@ -17,7 +17,7 @@ Finding = tuple[bool, str, str]  # there, what, the fix or a detail
 def doctor() -> int:
     """Say what is there and what is missing, a line each with the fix."""
     missing = 0
-    for look in (_gl, _voices, _film, _node, _faces, _page):
+    for look in (_pictures, _voices, _film, _node, _faces, _page):
         for there, what, words in look():
             missing += not there
             mark = click.style("ok     ", fg="green") if there else click.style("missing", fg="yellow")
@@ -25,11 +25,12 @@ def doctor() -> int:
     return 0
 
 
-def _gl() -> Iterator[Finding]:
-    from realizer.render import available
+def _pictures() -> Iterator[Finding]:
+    from realizer.render.process import asked
 
-    fix = available()
-    yield fix is None, "GL", fix or "pictures are drawn offscreen"
+    says = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
+    way, fix = asked()
+    yield fix is None, "pictures", fix or says[way]
 
 
 def _voices() -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from realizer.colours import linear
 from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals
 
@@ -28,10 +29,8 @@ def to_glb(face: Face) -> bytes:
     # glTF wants unit normals; a vertex without a triangle gets one that points forward.
     ups = normals(face, face.vertices[None])[0]
     ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)
-    srgb = face.colours.astype(np.float64) / 255
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    colours = np.full((len(linear), 4), 65535, np.uint16)
-    colours[:, :3] = np.rint(linear * 65535)
+    colours = np.full((len(face.colours), 4), 65535, np.uint16)
+    colours[:, :3] = np.rint(linear(face.colours) * 65535)
     arrays: dict[str, tuple[Any, int, str, bool]] = {
         "POSITION": (face.vertices.astype("<f4"), FLOAT, "VEC3", False),
         "NORMAL": (ups.astype("<f4"), FLOAT, "VEC3", False),

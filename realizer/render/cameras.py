@@ -76,12 +76,16 @@ class Camera:
 
     def project(self, points: Any, size: tuple[int, int]) -> Float64:
         """(n, 2) pixels, x to the right and y down from the top left corner, of (n, 3) points in metres."""
+        return self.see(points, size)[0]
+
+    def see(self, points: Any, size: tuple[int, int]) -> tuple[Float64, Float64]:
+        """(n, 2) pixels as `project`, and (n,) metres straight ahead, of (n, 3) points in metres."""
         width, height = size
-        local = (np.atleast_2d(np.asarray(points, np.float64)) - self.position) @ self.pose[:3, :3]
+        right, up, back = (
+            self.pose[:3, :3].T @ (np.asarray(points, np.float64) - self.position).reshape(-1, 3).T
+        )
         scale = height / 2 / math.tan(self.fovy / 2)
-        x = width / 2 + scale * local[:, 0] / -local[:, 2]
-        y = height / 2 - scale * local[:, 1] / -local[:, 2]
-        return np.stack([x, y], axis=1)
+        return np.stack([width / 2 - scale * right / back, height / 2 + scale * up / back], axis=1), -back
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers for the page; `fovy` in degrees, vertical, as WebGL libraries take it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from typing import Any
@@ -9,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from realizer.arrays import Float32, UInt8
+from realizer.colours import linear, srgb
+from realizer.errors import RenderError, TableError
 
-__all__ = ["Lamp", "Light", "Shader", "linear", "preset", "srgb"]
+__all__ = ["Lamp", "Light", "Shader", "preset", "presets"]
 
+LAMPS = ("key", "fill", "rim")
 Triple = tuple[float, float, float]
 
 
@@ -66,33 +70,39 @@ class Light:
     def to_json(self) -> dict[str, Any]:
         """The table as plain numbers; lamp directions have length 1."""
         table = asdict(self)
-        for name in ("key", "fill", "rim"):
+        for name in LAMPS:
             table[name]["direction"] = [round(float(x), 6) for x in unit(table[name]["direction"])]
         return {k: list(v) if isinstance(v, tuple) else _lists(v) for k, v in table.items()}
 
 
 @cache
-def preset() -> Light:
-    """A portrait: soft warm key from above and the viewer's left, cool fill, a thin rim from behind."""
-    return Light(
-        key=Lamp((-0.55, 0.62, 0.90), (1.0, 0.945, 0.88), (0.42, 0.30, 0.26)),
-        fill=Lamp((0.80, 0.10, 0.75), (0.15, 0.165, 0.195), (0.50, 0.50, 0.50)),
-        rim=Lamp((0.75, 0.45, -0.60), (0.85, 0.88, 0.95), (0.30, 0.30, 0.30)),
-        rim_power=3.0,
-        sky=(0.22, 0.23, 0.26),
-        ground=(0.13, 0.105, 0.09),
-        shadow=0.8,
-        highlight=0.9,
-        dull=8.0,
-        sharp=160.0,
-        # The mirror's place would be under the upper lid; photographers lower the lamp, we lower its image.
-        glint=2.2,
-        glint_width=0.115,
-        exposure=1.0,
-        knee=0.72,
-        backdrop_middle=(0.36, 0.385, 0.41),
-        backdrop_edge=(0.165, 0.18, 0.20),
-    )
+def presets() -> Mapping[str, Light]:
+    """The lights of `realizer/tables/lights.toml`, by name."""
+    from realizer.tables import read_toml, text_of
+
+    table = read_toml(text_of("lights.toml"), "lights.toml")
+    return {name: _light(name, values) for name, values in table.items()}
+
+
+def preset(name: str = "portrait") -> Light:
+    """The light of that name.
+
+    Raises:
+        RenderError: no such light; the text lists the known ones.
+    """
+    if name not in presets():
+        raise RenderError(f"light: wanted one of {', '.join(presets())}, got {name!r}")
+    return presets()[name]
+
+
+def _light(name: str, values: dict[str, Any]) -> Light:
+    try:
+        table: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+        for lamp in LAMPS:
+            table[lamp] = Lamp(**{part: tuple(v) for part, v in table[lamp].items()})
+        return Light(**table)
+    except (KeyError, TypeError) as error:
+        raise TableError(f"lights.toml: {name}: {error}") from None
 
 
 class Shader:
@@ -147,18 +157,6 @@ class Shader:
 
 
 BRIGHTEST = 4.0  # linear light at the end of the curve; beyond it all is white
-
-
-def linear(colours: UInt8) -> Float32:
-    """Linear light 0..1, float32, of 8-bit sRGB (IEC 61966-2-1)."""
-    c = np.asarray(colours, np.float32) / np.float32(255)
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def srgb(light: Float32) -> Float32:
-    """sRGB 0..1, float32, of linear light; below 0 and above 1 are cut (IEC 61966-2-1)."""
-    c = np.clip(np.asarray(light, np.float32), 0, 1)
-    return np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
 def unit(vector: Any) -> Float32:

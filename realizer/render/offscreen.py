@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, Int32, UInt8
+from realizer.arrays import Float32, UInt8
 from realizer.errors import RenderError
 from realizer.face.model import Face
+from realizer.render.backdrop import backdrop, over
 from realizer.render.cameras import Camera
-from realizer.render.glints import Glints
-from realizer.render.light import Light, Shader
+from realizer.render.figure import Figure
+from realizer.render.light import Light
 
 __all__ = ["Canvas"]
 
@@ -35,18 +36,17 @@ class Canvas:
         """
         pyrender = _pyrender()
         self.size = size
-        self._glints = Glints(face, light, camera.towards)
-        self._shader = Shader(light, face.colours, face.occlusion, face.gloss, camera.towards)
+        self._figure = Figure(face, camera, light)
         self._backdrop = backdrop(size, light)
-        self._count = len(face.vertices)
-        vertices = np.concatenate([face.vertices, self._glints(face.vertices)])
+        vertices = self._figure.points
         # x y z r g b a, as pyrender lays a primitive of positions and colours out in its one buffer.
         self._interleaved = np.ones((len(vertices), 7), np.float32)
-        triangles = np.concatenate([_visible_triangles(face), self._glints.triangles + self._count])
         material = pyrender.MetallicRoughnessMaterial(baseColorFactor=[1.0, 1.0, 1.0, 1.0])
         # Colours must be floats: pyrender takes integers 0/1 for 0..255 and draws black.
         colours = np.ones((len(vertices), 4), np.float32)
-        self._head = pyrender.Primitive(vertices, color_0=colours, indices=triangles, material=material)
+        self._head = pyrender.Primitive(
+            vertices, color_0=colours, indices=self._figure.triangles, material=material
+        )
         self._scene = pyrender.Scene(bg_color=[0.0, 0.0, 0.0, 0.0])
         self._scene.add(pyrender.Mesh([self._head]))
         lens = pyrender.PerspectiveCamera(yfov=camera.fovy, znear=camera.near, zfar=camera.far)
@@ -59,9 +59,9 @@ class Canvas:
         """(h, w, 3) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out` if given."""
         from OpenGL import GL
 
-        self._interleaved[: self._count, :3] = vertices
-        self._interleaved[: self._count, 3:6] = self._shader(normals)
-        self._interleaved[self._count :, :3] = self._glints(vertices)
+        self._figure.pose(vertices, normals)
+        self._interleaved[:, :3] = self._figure.points
+        self._interleaved[:, 3:6] = self._figure.colours
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._head._buffers[0])
         GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._interleaved.nbytes, self._interleaved)
         pixels: UInt8 = self._offscreen.render(self._scene, self._flags)
@@ -72,54 +72,6 @@ class Canvas:
     def close(self) -> None:
         """Free the context."""
         self._offscreen.delete()
-
-
-def backdrop(size: tuple[int, int], light: Light) -> UInt8:
-    """(h, w, 4) uint8, opaque: a soft gradient, lighter in the middle, so that the head stands off."""
-    width, height = size
-    y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
-    out = np.clip(np.hypot(x, y * 0.9 + 0.1) / 1.35, 0, 1)[..., None]
-    mix = out * out * (3 - 2 * out)
-    colours = np.asarray(light.backdrop_middle) * (1 - mix) + np.asarray(light.backdrop_edge) * mix
-    # Half a step of ordered noise hides the bands that 8 bits would make of so slow a gradient.
-    noise = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16 - 0.47
-    tiles = np.tile(noise, (-(-height // 4), -(-width // 4)))[:height, :width, None]
-    rgba = np.full((height, width, 4), 255, np.uint8)
-    rgba[..., :3] = np.rint(colours * 255 + tiles).clip(0, 255)
-    return rgba
-
-
-def over(pixels: UInt8, behind: UInt8, out: UInt8) -> UInt8:
-    """(h, w, 4) premultiplied pixels over (h, w, 4) opaque ones, as (h, w, 3).
-
-    1.0 ms at 512x512, where drawing the backdrop with MSAA took 11.
-    """
-    # A pixel at a time as one integer, then a channel at a time: numpy is slow along an axis of three.
-    height, width = pixels.shape[:2]
-    cover = pixels[..., 3]
-    whole = np.where(cover == 255, pixels.view(np.uint32)[..., 0], behind.view(np.uint32)[..., 0])
-    merged = whole.view(np.uint8).reshape(height, width, 4)
-    for channel in range(3):
-        out[..., channel] = merged[..., channel]
-    outline = np.flatnonzero(cover - np.uint8(1) < np.uint8(254))  # neither 0, which wraps round, nor 255
-    y, x = np.divmod(outline, width)
-    rest = 255 - cover[y, x].astype(np.uint16)[:, None]
-    shows = (behind[y, x, :3] * rest + 127) // 255
-    out[y, x] = np.minimum(pixels[y, x, :3] + shows, 255)
-    return out
-
-
-# Parts with an inside that is never seen; all others (hair, clothes, lashes) may be sheets.
-SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue")
-
-
-def _visible_triangles(face: Face) -> Int32:
-    """The triangles, those of sheets both ways round: culling what faces away saves a quarter."""
-    solid = np.zeros(len(face.vertices), bool)
-    for name in SOLID:
-        solid[slice(*face.parts.get(name, (0, 0)))] = True
-    sheets = face.triangles[~solid[face.triangles].all(axis=1)]
-    return np.concatenate([face.triangles, sheets[:, ::-1]])
 
 
 def _pyrender() -> Any:

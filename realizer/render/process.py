@@ -23,12 +23,13 @@ from realizer.face.model import Face
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from realizer.render.wire import Message, Pixels
+    from realizer.render.wire import Message, Open, Pixels
 
 __all__ = ["Renderer", "available"]
 
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it
+LIGHT, DRAW = "REALIZER_LIGHT", "REALIZER_DRAW"
 PATIENCE = 60.0  # s; the longest answer, a start on a cold disk, takes about 3
 
 
@@ -40,7 +41,13 @@ class Renderer:
     """
 
     def __init__(
-        self, face: str | Face = "default", size: tuple[int, int] = (512, 512), camera: str = "front"
+        self,
+        face: str | Face = "default",
+        size: tuple[int, int] = (512, 512),
+        camera: str = "front",
+        *,
+        light: str | None = None,
+        way: str | None = None,
     ) -> None:
         """Nothing starts yet.
 
@@ -48,11 +55,15 @@ class Renderer:
             face: name of a face folder, or a Face (then it is sent over).
             size: width, height in pixels.
             camera: a preset, or a camera of the face.
+            light: a preset; None is what REALIZER_LIGHT says, or "portrait".
+            way: "gl", "onboard" or "auto"; None is what REALIZER_DRAW says, or "auto".
         """
         width, height = size
         if not (1 <= width <= 8192 and 1 <= height <= 8192):
             raise ValueError(f"size: wanted 1..8192 pixels each way, got {width}x{height}")
         self.face, self.size, self.camera = face, size, camera
+        self.light = light or os.environ.get(LIGHT) or "portrait"
+        self.way = way or os.environ.get(DRAW) or "auto"
         self._half = max(1, min(HALF, HALF_BYTES // (width * height * 3)))
         self._lock = threading.Lock()
         self._process: _Process | None = None
@@ -138,7 +149,12 @@ class Renderer:
 
     def _started(self) -> _Process:
         if self._process is None:
-            self._process = _Process(self.face, self.size, self.camera, 2 * self._half)
+            from realizer.render.wire import Open, Pixels
+
+            slots = 2 * self._half
+            path = Pixels.create(slots, self.size)
+            order = Open(self.face, self.size, self.camera, path, slots, self.light, self.way)
+            self._process = _Process(order)
         return self._process
 
     def _drop(self) -> None:
@@ -152,30 +168,30 @@ class _Process:
 
     pixels: Pixels
 
-    def __init__(self, face: str | Face, size: tuple[int, int], camera: str, slots: int) -> None:
-        from realizer.render.wire import Open, Pixels, connection
+    def __init__(self, order: Open) -> None:
+        from realizer.render.wire import Pixels, connection
 
-        self._popen = subprocess.Popen(
-            _command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
-        )
-        assert self._popen.stdin is not None
-        assert self._popen.stdout is not None
-        self._orders = connection(self._popen.stdin.fileno(), writes=True)
-        self._answers = connection(self._popen.stdout.fileno(), writes=False)
-        self._popen.stdin.close()
-        self._popen.stdout.close()
-        self._end = weakref.finalize(self, _end, self._popen, self._orders, self._answers)
-        self.pid = self._popen.pid
-        path = Pixels.create(slots, size)
         try:
-            self.pixels = Pixels(path, slots, size)
-            self.send(Open(face, size, camera, path, slots))
-            self.receive()
-        except BaseException:
-            self.end()
-            raise
+            self._popen = subprocess.Popen(
+                _command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
+            )
+            assert self._popen.stdin is not None
+            assert self._popen.stdout is not None
+            self._orders = connection(self._popen.stdin.fileno(), writes=True)
+            self._answers = connection(self._popen.stdout.fileno(), writes=False)
+            self._popen.stdin.close()
+            self._popen.stdout.close()
+            self._end = weakref.finalize(self, _end, self._popen, self._orders, self._answers)
+            self.pid = self._popen.pid
+            try:
+                self.pixels = Pixels(order.memory, order.slots, order.size)
+                self.send(order)
+                self.way = self.receive()
+            except BaseException:
+                self.end()
+                raise
         finally:
-            Path(path).unlink()
+            Path(order.memory).unlink()
 
     def send(self, message: Message) -> None:
         try:
@@ -218,16 +234,26 @@ def _end(popen: subprocess.Popen[bytes], orders: Connection, answers: Connection
         popen.wait()
 
 
+def available(way: str | None = None) -> str | None:
+    """None where pictures can be drawn, that way; otherwise a sentence that says what to install."""
+    return asked(way)[1]
+
+
 @cache
-def available() -> str | None:
-    """None where pictures can be drawn; otherwise a sentence that says what to install. Asks once."""
+def asked(way: str | None = None) -> tuple[str, str | None]:
+    """The way pictures are drawn here, and None; or "" and what to install. Asks a new process, once."""
     done = subprocess.run(
-        [*_command(), "--check"], env=_environment(), capture_output=True, text=True, timeout=120, check=False
+        [*_command(), "--check", way or os.environ.get(DRAW) or "auto"],
+        env=_environment(),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
+    said = (done.stdout.strip() or done.stderr.strip()).splitlines()
     if done.returncode == 0:
-        return None
-    fault = (done.stdout.strip() or done.stderr.strip()).splitlines()
-    return fault[-1] if fault else f"the drawing process ended (exit status {done.returncode})"
+        return said[-1], None
+    return "", said[-1] if said else f"the drawing process ended (exit status {done.returncode})"
 
 
 def _command() -> list[str]:

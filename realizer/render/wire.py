@@ -19,13 +19,15 @@ __all__ = ["Draw", "Failed", "Jpeg", "Open", "Pixels"]
 
 @dataclass(frozen=True)
 class Open:
-    """The first message: what to draw, and the file under both sides' memory. Answered with None."""
+    """The first message: what to draw, and the file under both sides' memory. Answered with the way taken."""
 
     face: str | Face
     size: tuple[int, int]
     camera: str
     memory: str
     slots: int
+    light: str
+    way: str
 
 
 @dataclass(frozen=True)

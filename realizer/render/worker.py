@@ -14,7 +14,7 @@ from realizer.errors import RealizerError
 from realizer.face.model import Face
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.offscreen import Canvas
+from realizer.render.ways import open_canvas
 from realizer.render.wire import Draw, Failed, Message, Open, Pixels, connection
 
 __all__: list[str] = []
@@ -30,7 +30,9 @@ class Artist:
 
         self.face = load_face(order.face) if isinstance(order.face, str) else order.face
         self.pixels = Pixels(order.memory, order.slots, order.size)
-        self.canvas = Canvas(self.face, order.size, camera_for(self.face, order.camera), preset())
+        self.way, self.canvas = open_canvas(
+            self.face, order.size, camera_for(self.face, order.camera), preset(order.light), order.way
+        )
 
     def draw(self, rows: Float32, first: int) -> int:
         slots = self.pixels.array[first : first + len(rows)]
@@ -69,10 +71,11 @@ def encode_jpeg(pixels: UInt8, quality: int) -> bytes:
     return encoded
 
 
-def answer(artist: Artist | None, message: Message) -> tuple[Artist, int | bytes | None]:
+def answer(artist: Artist | None, message: Message) -> tuple[Artist, int | bytes | str]:
     """What a message asks for, done."""
     if isinstance(message, Open):
-        return Artist(message), None
+        artist = Artist(message)
+        return artist, artist.way
     if artist is None:
         raise RealizerError(f"wanted Open first, got {type(message).__name__}")
     if isinstance(message, Draw):
@@ -104,25 +107,26 @@ def serve(orders: Connection, answers: Connection) -> None:
         answers.send(result)
 
 
-def check() -> int:
-    """Draw one triangle; say on stdout what is missing, and return 3, where that does not work."""
+def check(way: str) -> int:
+    """Draw one triangle; say on stdout which way was taken, or return 3 and say what is missing."""
     from realizer.errors import RenderError
     from realizer.render.sample import triangle
 
     face = triangle()
     try:
-        canvas = Canvas(face, (16, 16), camera_for(face), preset())
+        taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), way)
         canvas.draw(face.vertices, np.zeros_like(face.vertices))
         canvas.close()
     except RenderError as error:
         print(error)
         return 3
+    print(taken)
     return 0
 
 
 def main(arguments: list[str]) -> int:
-    if arguments == ["--check"]:
-        return check()
+    if arguments[:1] == ["--check"]:
+        return check(*arguments[1:])
     orders = connection(0, writes=False)
     answers = connection(1, writes=True)
     os.dup2(2, 1)  # what a library prints must not get between the answers

@@ -11,7 +11,8 @@ from realizer.render import available
 
 @pytest.fixture(autouse=True)
 def _skip_without_gl(request: pytest.FixtureRequest) -> None:
-    if request.node.get_closest_marker("gl") and (missing := available()):
+    mark = request.node.get_closest_marker("gl")
+    if mark and (missing := available(*mark.args)):
         pytest.skip(missing)
 
 

@@ -9,15 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.render.light import Shader, linear, preset, srgb, unit
+from realizer.colours import linear, srgb
+from realizer.errors import RenderError
+from realizer.render.light import Shader, preset, presets, unit
 
 FRONT = np.array([0, 0, 1], np.float32)
 SKIN = (206, 158, 132)
 
 
-def shade(normal, colour=SKIN, occlusion=1.0, gloss=0.0):
+def shade(normal, colour=SKIN, occlusion=1.0, gloss=0.0, light="portrait"):
     shader = Shader(
-        preset(),
+        preset(light),
         np.array([colour], np.uint8),
         np.array([occlusion], np.float32),
         np.array([gloss], np.float32),
@@ -77,10 +79,11 @@ def test_the_shaded_side_keeps_colour():
     assert red > 0.3
 
 
+@pytest.mark.parametrize("light", list(presets()))
 @pytest.mark.parametrize("colour", [(206, 158, 132), (240, 205, 185), (90, 58, 42)])
-def test_no_skin_is_burnt_out(colour):
+def test_no_skin_is_burnt_out(colour, light):
     around = [(x, y, 1.0) for x in np.linspace(-1, 1, 9) for y in np.linspace(-1, 1, 9)]
-    brightest = np.max([shade(n, colour) for n in around], axis=0)
+    brightest = np.max([shade(n, colour, light=light) for n in around], axis=0)
     assert brightest[0] < 0.985
     assert brightest[2] < brightest[0] - 0.02
 
@@ -96,13 +99,23 @@ def test_a_hidden_corner_is_darker():
     assert (shade(FRONT, occlusion=0.2) < shade(FRONT, occlusion=1.0) - 0.1).all()
 
 
-@given(st.integers(0, 255))
-def test_srgb_to_linear_and_back_is_the_same_byte(value):
-    assert round(float(srgb(linear(np.array([value], np.uint8)))[0] * 255)) == value
-
-
 def test_the_page_gets_every_coefficient_as_plain_numbers():
     table = json.loads(json.dumps(preset().to_json()))
     assert set(table) == set(preset().__dataclass_fields__)
     for lamp in ("key", "fill", "rim"):
         assert np.linalg.norm(table[lamp]["direction"]) == pytest.approx(1, abs=1e-5)
+
+
+def test_there_are_three_lights_and_another_name_lists_them():
+    assert list(presets()) == ["portrait", "daylight", "evening"]
+    with pytest.raises(RenderError, match="wanted one of portrait, daylight, evening, got 'noon'"):
+        preset("noon")
+
+
+def test_daylight_is_even_and_evening_is_not():
+    """Cheek to cheek: what the key's side has over the other."""
+    contrast = {
+        name: shade((-0.7, 0, 0.7), light=name).mean() / shade((0.7, 0, 0.7), light=name).mean()
+        for name in presets()
+    }
+    assert 0.97 < contrast["daylight"] < contrast["portrait"] < contrast["evening"]

@@ -11,7 +11,7 @@ from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.offscreen import Canvas
 
-pytestmark = pytest.mark.gl
+pytestmark = pytest.mark.gl("gl")
 
 SIZE = (320, 240)
 

@@ -172,12 +172,12 @@ def test_a_size_of_nothing_is_refused():
         Renderer("default", (0, 10))
 
 
-def check(tmp_path: Path, site: str, **env: str) -> subprocess.CompletedProcess[str]:
+def check(tmp_path: Path, site: str, way: str = "auto", **env: str) -> subprocess.CompletedProcess[str]:
     """`available()`'s question, asked on a machine that lacks something."""
     (tmp_path / "sitecustomize.py").write_text(site)
     paths = os.pathsep.join([str(tmp_path), str(Path(realizer.__path__[0]).parent)])
     return subprocess.run(
-        [sys.executable, "-P", "-m", "realizer.render.worker", "--check"],
+        [sys.executable, "-P", "-m", "realizer.render.worker", "--check", way],
         env={**os.environ, "PYTHONPATH": paths, **env},
         capture_output=True,
         text=True,
@@ -185,13 +185,33 @@ def check(tmp_path: Path, site: str, **env: str) -> subprocess.CompletedProcess[
     )
 
 
-def test_without_pyrender_the_sentence_names_the_extra(tmp_path):
-    done = check(tmp_path, "import sys; sys.modules['pyrender'] = None")
+def test_with_neither_way_the_sentence_names_the_extra(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['pyrender'] = sys.modules['numba'] = None")
     assert done.returncode == 3
     assert "pip install 'bml-realizer[render]'" in done.stdout
 
 
-@pytest.mark.gl
+@pytest.mark.gl("gl")
+def test_without_numba_opengl_draws(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['numba'] = None")
+    assert (done.returncode, done.stdout.strip()) == (0, "gl"), done.stderr
+
+
+@pytest.mark.gl("onboard")
+def test_without_pyrender_the_processor_draws(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['pyrender'] = None")
+    assert (done.returncode, done.stdout.strip()) == (0, "onboard"), done.stderr
+
+
+@pytest.mark.gl("onboard")
+def test_where_no_folder_can_be_written_the_loops_are_compiled_all_the_same(tmp_path):
+    """Numba keeps machine code beside the source or in the user's cache, and refuses where neither is."""
+    site = "import numba.core.caching as c\nc.CacheImpl._locator_classes = []\n"
+    done = check(tmp_path, site, "onboard")
+    assert (done.returncode, done.stdout.strip()) == (0, "onboard"), done.stderr
+
+
+@pytest.mark.gl("gl")
 def test_without_gl_the_sentence_names_the_packages(tmp_path):
     """A machine whose loader finds no libEGL and no libGL."""
     hide = (
@@ -205,7 +225,7 @@ def test_without_gl_the_sentence_names_the_packages(tmp_path):
         "find = ctypes.util.find_library\n"
         "ctypes.util.find_library = lambda n: None if n in ('EGL', 'GL', 'OpenGL', 'GLESv2') else find(n)\n"
     )
-    done = check(tmp_path, hide)
+    done = check(tmp_path, hide, "gl")
     assert done.returncode == 3, done.stderr
     assert "install Debian packages libegl1 and libgl1" in done.stdout
 

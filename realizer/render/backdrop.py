@@ -1,0 +1,45 @@
+"""What stands behind the head, and the head's pixels laid over it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.arrays import UInt8
+from realizer.render.light import Light
+
+__all__ = ["backdrop", "over"]
+
+
+def backdrop(size: tuple[int, int], light: Light) -> UInt8:
+    """(h, w, 4) uint8, opaque: a soft gradient, lighter in the middle, so that the head stands off."""
+    width, height = size
+    y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
+    out = np.clip(np.hypot(x, y * 0.9 + 0.1) / 1.35, 0, 1)[..., None]
+    mix = out * out * (3 - 2 * out)
+    colours = np.asarray(light.backdrop_middle) * (1 - mix) + np.asarray(light.backdrop_edge) * mix
+    # Half a step of ordered noise hides the bands that 8 bits would make of so slow a gradient.
+    noise = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16 - 0.47
+    tiles = np.tile(noise, (-(-height // 4), -(-width // 4)))[:height, :width, None]
+    rgba = np.full((height, width, 4), 255, np.uint8)
+    rgba[..., :3] = np.rint(colours * 255 + tiles).clip(0, 255)
+    return rgba
+
+
+def over(pixels: UInt8, behind: UInt8, out: UInt8) -> UInt8:
+    """(h, w, 4) premultiplied pixels over (h, w, 4) opaque ones, as (h, w, 3).
+
+    1.0 ms at 512x512, where drawing the backdrop with MSAA took 11.
+    """
+    # A pixel at a time as one integer, then a channel at a time: numpy is slow along an axis of three.
+    height, width = pixels.shape[:2]
+    cover = pixels[..., 3]
+    whole = np.where(cover == 255, pixels.view(np.uint32)[..., 0], behind.view(np.uint32)[..., 0])
+    merged = whole.view(np.uint8).reshape(height, width, 4)
+    for channel in range(3):
+        out[..., channel] = merged[..., channel]
+    outline = np.flatnonzero(cover - np.uint8(1) < np.uint8(254))  # neither 0, which wraps round, nor 255
+    y, x = np.divmod(outline, width)
+    rest = 255 - cover[y, x].astype(np.uint16)[:, None]
+    shows = (behind[y, x, :3] * rest + 127) // 255
+    out[y, x] = np.minimum(pixels[y, x, :3] + shows, 255)
+    return out
