@@ -109,7 +109,7 @@ def check_same(one: Schedule, other: Schedule) -> None:
         np.testing.assert_allclose(one.times[name], other.times[name], atol=1e-6, rtol=0)
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(documents())
 def test_what_was_dropped_leaves_no_trace_on_the_rest(document: Document) -> None:
     """The rest has the times that it has in a document in which nothing else ever was."""
@@ -123,7 +123,7 @@ def test_what_was_dropped_leaves_no_trace_on_the_rest(document: Document) -> Non
     assert again.cost == pytest.approx(found.cost, abs=1e-6)
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(possible(), st.randoms(use_true_random=False))
 def test_elements_may_stand_in_any_order_where_nothing_clashes(document: Document, chance: Random) -> None:
     found = document.schedule()
@@ -135,7 +135,7 @@ def test_elements_may_stand_in_any_order_where_nothing_clashes(document: Documen
     check_same(again, found)
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(documents(fixed=False), st.integers(0, 500).map(lambda k: k / 10))
 def test_without_fixed_times_all_moves_along_with_the_earliest(document: Document, earliest: float) -> None:
     found = document.schedule()
