@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from realizer.cli.fit import fit
+
 if TYPE_CHECKING:
     from realizer.arrays import Float32
 
@@ -19,6 +21,9 @@ HALF, TURN = 512, 34907
 @click.group()
 def faces() -> None:
     """List, check and build faces."""
+
+
+faces.add_command(fit)
 
 
 @faces.command("list")
@@ -127,15 +132,19 @@ def build(name: str, data: Path, output: Path | None) -> None:
 @click.option(
     "--parameters",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Zones to use (TOML); default the folder's mpeg4.toml, or computed from its feature points.",
+    help="Zones to use: TOML, or FaceEditor's XML; default the folder's mpeg4.toml, or computed.",
 )
+@click.option("--xml", type=click.Path(path_type=Path), help="Write the zones as FaceEditor's XML too.")
 @click.option(
     "--fap", "only", type=int, multiple=True, help="Only this FAP, the others stay; may be repeated."
 )
-def zones(name: str, output: Path, parameters: Path | None, only: tuple[int, ...]) -> None:
+def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, only: tuple[int, ...]) -> None:
     """Make a face of a head by MPEG-4 zones: a mesh and feature points are enough."""
     from realizer.face.load import folder_of
+    from realizer.face.mpeg4 import write_faceeditor
     from realizer.face.mpeg4.build import copy_with_zones
 
     setup = copy_with_zones(folder_of(name), output, parameters, only)
+    for lost in write_faceeditor(xml, setup) if xml else ():
+        click.echo(f"{xml}: {lost}", err=True)
     click.echo(f"{output}: {len(only) or len(setup.zones)} zones")

@@ -1,0 +1,215 @@
+"""A face and what its action units were measured to do in, a fitted model and her table 4.3 out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from realizer.arrays import Float64
+from realizer.errors import FaceError
+from realizer.face.au.measure import Measured
+from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
+from realizer.face.au.solve import STILL, Fit
+from realizer.face.au.units import units
+from realizer.face.model import Face
+from realizer.tables import action_units
+
+__all__ = ["FORMS", "Row", "fit_model", "table", "table_text"]
+
+FORMS = {"published": 2, "extended": 4}  # form -> most Gaussians of a density
+MOVES = 0.01  # of the largest move: what moves less does not count as displaced
+NEAR = 0.01  # m around what is displaced; further off, one point in FAR shows whether anything leaks
+FAR = 4
+HIDDEN = 0.1  # weight of what nobody sees
+AWAY = 0.14  # m from the middle of the eyes down to where no face moves
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of her table 4.3, in metres, over points that one sees and that move more than 1 % of d_max."""
+
+    au: int
+    n: int
+    d: float
+    d_max: float
+    e: float
+    e_max: float
+
+    @property
+    def ratio(self) -> float:
+        """e / d_max, what models are compared by."""
+        return self.e / self.d_max
+
+
+def fit_model(
+    face: Face,
+    measured: Mapping[int, Measured],
+    form: str = "extended",
+    say: Callable[[str], None] = lambda _: None,
+    source: str = "",
+) -> Model:
+    """Fit the displacement units that were measured; the turns come from the face's own pivots.
+
+    Each function is fitted by its own cost first (4.8, 4.9), then both are polished together.
+
+    Args:
+        form: "published" (one or two Gaussians) or "extended" (up to four).
+        say: told of each action unit when it is done.
+        source: what was measured, for the model's head.
+
+    Raises:
+        FaceError: an unknown form, or a measurement from which nothing can be fitted.
+    """
+    if form not in FORMS:
+        raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
+    mouth, jaw = _mouth(face), _jaw(face)
+    fitted: dict[int, UnitModel] = {}
+    for au, one in measured.items():
+        fitted[au] = _fit_unit(one, mouth, FORMS[form])
+        if au in (26, 27):
+            fitted[au] = UnitModel(au, fitted[au].motions, _jaw_degrees(face, fitted[au], mouth, jaw))
+        say(f"AU{au}: e/d_max {_row(fitted[au], one, mouth).ratio:.3f}")
+    by_number = {row.au: row for row in action_units()}
+    left, right = (_triple(centre) for _, centre in face.basis["eyes"])
+    return Model(
+        form=form,
+        source=source or face.source,
+        licence=face.licence,
+        mouth=mouth,
+        head=_head(face),
+        eyes=(left, right),
+        jaw=jaw,
+        units=fitted,
+        degrees={
+            unit.au: by_number[unit.au].degrees for unit in units().values() if unit.kind != "displacement"
+        },
+    )
+
+
+def table(model: Model, measured: Mapping[int, Measured]) -> tuple[Row, ...]:
+    """Her table 4.3 for the units that both have."""
+    return tuple(_row(model.units[au], one, model.mouth) for au, one in measured.items() if au in model.units)
+
+
+def table_text(rows: tuple[Row, ...]) -> str:
+    """The table as she prints it, in millimetres."""
+    lines = ["AU        n       d   d_max       e   e_max  e/d_max  e_max/d_max"]
+    for row in rows:
+        lengths = "".join(f"{1000 * value:8.3f}" for value in (row.d, row.d_max, row.e, row.e_max))
+        lines.append(f"AU{row.au:<4}{row.n:5}{lengths}{row.ratio:9.4f}{row.e_max / row.d_max:13.4f}")
+    ratios = [row.ratio for row in rows]
+    worst = max(rows, key=lambda row: row.ratio)
+    lines.append(
+        f"mean e/d_max of {len(rows)} units {np.mean(ratios):.4f}, worst AU{worst.au} {worst.ratio:.4f}; "
+        "lengths in mm"
+    )
+    return "\n".join(lines)
+
+
+def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
+    long = np.linalg.norm(one.moves, axis=1)
+    d_max = float(long[one.seen].max())
+    counts = one.seen & (long > MOVES * d_max)
+    miss = np.linalg.norm(unit.displacement(one.at[counts], mouth) - one.moves[counts], axis=1)
+    return Row(
+        one.au, int(counts.sum()), float(long[counts].mean()), d_max, float(miss.mean()), float(miss.max())
+    )
+
+
+def _fit_unit(one: Measured, mouth: Mouth, most: int) -> UnitModel:
+    # Her units are even: what was measured on one side holds for the other, so all of it is laid on the left.
+    flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
+    at, moves = one.at * flip, one.moves * flip
+    long = np.linalg.norm(moves, axis=1)
+    if not one.seen.any() or not long[one.seen].any():
+        raise FaceError(f"AU{one.au}: wanted a landmark that moves and can be seen, got none")
+    size = float(long[one.seen].max())
+    weight = np.where(one.seen, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
+    # A point in the middle stands for itself alone, any other for its twin too.
+    weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
+    if not units()[one.au].split:
+        return UnitModel(one.au, {"whole": _fit_motion(at, moves, weight, size, most)})
+    upper = mouth.upper(at)
+    return UnitModel(
+        one.au,
+        {
+            "upper": _fit_motion(at, moves, weight * upper, size, most),
+            "lower": _fit_motion(at, moves, weight * (1 - upper), size, most),
+        },
+    )
+
+
+def _fit_motion(at: Float64, moves: Float64, weight: Float64, size: float, most: int) -> Motion:
+    long = np.linalg.norm(moves, axis=1)
+    here = weight > 1e-3
+    moved = here & (long > MOVES * size)
+    if not moved.any():  # this half keeps still
+        bell = np.array([[0, 0, 0, 0, 1, 0, 1, 0, 0, 1.0]])
+        still = np.zeros(19)
+        return Motion(np.zeros(3), bell, still, still)
+    low, high = at[moved].min(axis=0) - NEAR, at[moved].max(axis=0) + NEAR
+    near = here & ((at > low) & (at < high)).all(axis=1)
+    far = np.flatnonzero(here & ~near & (at[:, 1] > -AWAY))[::FAR]
+    use = np.r_[np.flatnonzero(near), far]
+    weight = np.r_[weight[near], weight[far] * FAR]
+    share = weight * long[use]
+    origin = share @ at[use] / share.sum()
+    origin[0] = 0
+    found = Fit((at[use] - origin) / CENTIMETRE, moves[use] / size, weight).best(most)
+    gaussians = found.gaussians.copy()
+    gaussians[:, 0] *= size
+    return Motion(origin, gaussians, found.alpha, found.beta)
+
+
+def _mouth(face: Face) -> Mouth:
+    """The line between the lips through the inner feature points, out to the corner of the lips."""
+    point = face.points
+    line = [
+        (point["2.2"] + point["2.3"]) / 2,
+        (point["2.6"] + point["2.8"]) / 2,
+        point["2.4"],
+        point["8.3"],
+    ]
+    x, y = np.array(line, np.float64)[:, :2].T
+    x[0] = 0
+    if (np.diff(x) <= 0).any():
+        raise FaceError(f"{face.name}: wanted feature points 2.2, 2.6, 2.4 and 8.3 further and further left")
+    return Mouth(x, y)
+
+
+def _head(face: Face) -> HeadTurn:
+    """The smooth step that comes nearest to how the face's own vertices follow its head."""
+    from scipy.optimize import least_squares
+
+    weight = np.asarray(face.basis["head"], np.float64).ravel()
+    at = face.vertices.astype(np.float64)
+    chin = float(face.points["2.1"][1])
+    pivot = _triple(face.points["7.1"])
+
+    def miss(x: Float64) -> Float64:
+        return HeadTurn(pivot, x[0], min(x[1], x[0] - 1e-3), x[2]).density(at) - weight
+
+    found = least_squares(miss, np.array([chin, chin - 0.06, 0.2]), x_scale=[0.01, 0.01, 0.1])
+    top, end, tilt = (float(value) for value in found.x)
+    return HeadTurn(pivot, top, min(end, top - 1e-3), tilt)
+
+
+def _jaw(face: Face) -> tuple[float, float, float]:
+    y, z = (np.asarray(face.points["2.1"][1:], np.float64) - face.basis["chin"]).tolist()
+    return 0.0, float(y), float(z)
+
+
+def _jaw_degrees(face: Face, unit: UnitModel, mouth: Mouth, jaw: tuple[float, float, float]) -> float:
+    """How far the jaw bone turns so that the chin goes where the unit takes it."""
+    chin = np.asarray(face.points["2.1"], np.float64)
+    there = chin + unit.displacement(chin[None], mouth)[0]
+    arms = [place[1:] - np.array(jaw[1:]) for place in (chin, there)]
+    before, after = (np.arctan2(arm[1], arm[0]) for arm in arms)
+    return float(np.degrees((after - before + np.pi) % (2 * np.pi) - np.pi))
+
+
+def _triple(place: object) -> tuple[float, float, float]:
+    x, y, z = np.asarray(place, np.float64).tolist()
+    return x, y, z

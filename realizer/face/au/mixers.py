@@ -1,0 +1,75 @@
+"""Several action units at once: the additive and the successive mixer, and when which (Wojdel 2005, 5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from realizer.arrays import Float64
+from realizer.face.au.model import Model, turned
+from realizer.face.au.units import units
+
+__all__ = ["Thing", "additive", "mix", "successive"]
+
+# What a face is built from. "fixed" moves with the head alone: upper teeth, clothes.
+Thing = Literal["face", "left eye", "right eye", "jaw", "fixed"]
+
+
+def additive(model: Model, at: Float64, values: Mapping[int, float]) -> Float64:
+    """Displacement units, each of the neutral place, summed: their order does not matter.
+
+    Args:
+        at: (n, 3) metres.
+        values: action unit -> intensity 0..1.
+    """
+    moves = np.zeros_like(at)
+    for au, value in values.items():
+        moves += value * model.displacement(au, at)
+    return np.asarray(at + moves)
+
+
+def successive(model: Model, at: Float64, values: Mapping[int, float]) -> Float64:
+    """Displacement units, each of the place where the one before left it: their order matters."""
+    for au, value in values.items():
+        at = at + value * model.displacement(au, at)
+    return np.asarray(at)
+
+
+def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "face") -> Float64:
+    """The places of an object's points under several action units, by her rules.
+
+    Single object and sub-object units are added up, of the neutral places. Turns cannot be: they follow one
+    after the other. A unit that moves several objects comes after those that are an object's own: the eyes
+    look, the jaw opens, then the head turns with all of it.
+
+    Args:
+        at: (n, 3) metres, neutral.
+        values: action unit -> intensity 0..1; those that are not of the model move nothing.
+    """
+    known = units()
+    moved = at
+    if thing == "face":
+        moved = additive(model, at, {au: value for au, value in values.items() if au in model.units})
+    elif thing == "jaw":
+        for au, value in values.items():
+            if au in model.units and model.units[au].jaw_degrees:
+                moved = turned(moved, (1, 0, 0), value * np.radians(model.units[au].jaw_degrees), model.jaw)
+    elif thing in ("left eye", "right eye"):
+        for au in _turns(model, values, "eyes"):
+            angle = values[au] * np.radians(model.degrees[au])
+            moved = turned(moved, known[au].axis, angle, model.eyes[thing == "right eye"])
+    # Which part of the neck follows is a matter of the neutral face: an open jaw does not leave its head.
+    share = model.head.density(at)[:, None]
+    for au in _turns(model, values, "head"):
+        angle = values[au] * np.radians(model.degrees[au])
+        moved = moved + share * (turned(moved, known[au].axis, angle, model.head.pivot) - moved)
+    return np.asarray(moved)
+
+
+def _turns(model: Model, values: Mapping[int, float], kind: str) -> list[int]:
+    """The turns among the units, tilts first, turns to a side last: as FAPs 48 to 50 turn."""
+    known = units()
+    mine = [au for au in values if au in model.degrees and known[au].kind == kind and values[au]]
+    return sorted(mine, key=lambda au: "zxy".index(known[au].turn[1]))

@@ -1,0 +1,151 @@
+"""The face model by action units (Wojdel 2005, chapter 4): places in, how an action unit moves them out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from realizer.arrays import Float64
+from realizer.face.au.functions import angle, density, direction
+
+__all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "turned"]
+
+CENTIMETRE = 0.01  # m; the unit of the functions' coordinates, in which their parameters are near 1
+SIDES = 0.008  # m; the halves of an action unit shown on one side fade into each other over twice this
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A density and a direction function.
+
+    Attributes:
+        origin: (3,) metres, where their coordinates begin.
+        gaussians: (k, 10): height in metres, the rest in centimetres from the origin (`functions.density`).
+        alpha, beta: (19,) each (`functions.angle`), radians.
+    """
+
+    origin: Float64
+    gaussians: Float64
+    alpha: Float64
+    beta: Float64
+
+    def density(self, at: Float64) -> Float64:
+        """(n,) metres that points (n, 3), metres, are moved with full intensity."""
+        return density(self.gaussians, (at - self.origin) / CENTIMETRE)[0]
+
+    def direction(self, at: Float64) -> Float64:
+        """(n, 3) unit vectors they are moved along."""
+        near = (at - self.origin) / CENTIMETRE
+        return direction(angle(self.alpha, near)[0], angle(self.beta, near)[0])[0]
+
+    def __call__(self, at: Float64) -> Float64:
+        """(n, 3) metres: equation 4.1 with full intensity."""
+        moved = self.density(at)
+        # Far off, polynomials are large and mean nothing; the density is nought there.
+        return np.where(np.abs(moved)[:, None] > 1e-7, moved[:, None] * self.direction(at), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Mouth:
+    """Where the upper half of the face ends: her plane through the corners of the mouth, bent along the lips.
+
+    Attributes:
+        x: (k,) metres from the middle, from 0 to the corner; y: (k,) height of the line between the lips.
+    """
+
+    x: Float64
+    y: Float64
+
+    def upper(self, at: Float64) -> Float64:
+        """(n,) 1 above, 0 below; beyond the corners the halves fade over, or the cheek would tear."""
+        across = np.abs(at[:, 0])
+        high = at[:, 1] - np.interp(across, self.x, self.y)
+        fade = np.maximum(across - self.x[-1], 0) + 1e-9
+        share = np.clip(high / fade / 2 + 0.5, 0, 1)
+        return np.asarray(share * share * (3 - 2 * share))
+
+
+@dataclass(frozen=True, eq=False)
+class UnitModel:
+    """A displacement unit: one motion, or one for each half of the face.
+
+    Attributes:
+        motions: "whole", or "upper" and "lower".
+        jaw_degrees: how far the lower jaw (teeth and tongue) turns with full intensity.
+    """
+
+    au: int
+    motions: Mapping[str, Motion]
+    jaw_degrees: float = 0.0
+
+    def displacement(self, at: Float64, mouth: Mouth) -> Float64:
+        """(n, 3) metres that points (n, 3) of the face are moved with full intensity."""
+        if "whole" in self.motions:
+            return self.motions["whole"](at)
+        share = mouth.upper(at)[:, None]
+        return np.asarray(share * self.motions["upper"](at) + (1 - share) * self.motions["lower"](at))
+
+
+@dataclass(frozen=True)
+class HeadTurn:
+    """The head's turns: the density is a smooth step between chin and collar, in a plane that tilts (4.2.3).
+
+    Attributes:
+        pivot: (3,) metres; top, end: metres, where the step is 1 and 0; tilt: how much z counts as height.
+    """
+
+    pivot: tuple[float, float, float]
+    top: float
+    end: float
+    tilt: float
+
+    def density(self, at: Float64) -> Float64:
+        """(n,) 0..1: how far points turn with the head."""
+        share = np.clip((at[:, 1] + self.tilt * at[:, 2] - self.end) / (self.top - self.end), 0, 1)
+        return np.asarray(share * share * (3 - 2 * share))
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A person's face by action units.
+
+    Attributes:
+        form: "published" (one or two Gaussians) or "extended" (up to four).
+        source, licence: of what it was fitted to.
+        units: number -> displacement unit.
+        degrees: number -> degrees that a unit of turning turns with full intensity.
+        eyes: (3,) metres, centres of the left and the right eyeball; jaw: (3,) metres, the jaw's joint.
+    """
+
+    form: str
+    source: str
+    licence: str
+    mouth: Mouth
+    head: HeadTurn
+    eyes: tuple[tuple[float, float, float], tuple[float, float, float]]
+    jaw: tuple[float, float, float]
+    units: Mapping[int, UnitModel]
+    degrees: Mapping[int, float] = field(default_factory=dict)
+
+    def displacement(self, au: int, at: Float64, side: str = "") -> Float64:
+        """(n, 3) metres that a displacement unit moves points (n, 3) of the face with full intensity.
+
+        Args:
+            side: "L" or "R" for one side alone, as the character has it.
+        """
+        moves = self.units[au].displacement(at, self.mouth)
+        if not side:
+            return moves
+        share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
+        return np.asarray(moves * (share * share * (3 - 2 * share))[:, None])
+
+
+def turned(at: Float64, axis: tuple[float, float, float], radians: float, pivot: object) -> Float64:
+    """Points (n, 3) turned right-handed about an axis through the pivot."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.eye(3) + np.sin(radians) * cross + (1 - np.cos(radians)) * cross @ cross
+    centre = np.asarray(pivot, np.float64)
+    return np.asarray((at - centre) @ turn.T + centre)

@@ -1,0 +1,45 @@
+"""Her 32 action units: what kind of movement each is, and which shapes a face measures it by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+from realizer.tables import read_csv
+
+__all__ = ["Unit", "units"]
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A row of units.csv."""
+
+    au: int
+    kind: Literal["displacement", "head", "eyes"]
+    split: bool
+    turn: str
+    shapes: str
+
+    @property
+    def mixture(self) -> dict[str, float]:
+        """Face unit -> weight."""
+        pairs = (pair.split(":") for pair in self.shapes.split())
+        return {name: float(weight) for name, weight in pairs}
+
+    @property
+    def axis(self) -> tuple[float, float, float]:
+        """Unit vector that a turn goes about, right-handed; (0, 0, 0) for a displacement."""
+        if not self.turn:
+            return 0.0, 0.0, 0.0
+        sign = -1.0 if self.turn[0] == "-" else 1.0
+        x, y, z = (sign if letter == self.turn[1] else 0.0 for letter in "xyz")
+        return x, y, z
+
+
+@cache
+def units() -> dict[int, Unit]:
+    """Number -> unit, ascending."""
+    path = Path(__file__).with_name("units.csv")
+    return {row.au: row for row in read_csv(path.read_text("utf-8"), Unit, path.name)}
