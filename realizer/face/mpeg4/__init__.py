@@ -2,6 +2,7 @@
 
 from realizer.face.mpeg4.build import apply_zones, setup_of
 from realizer.face.mpeg4.defaults import default_setup
+from realizer.face.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
 from realizer.face.mpeg4.fields import zone_fields
 from realizer.face.mpeg4.parameters import read_setup, write_setup
 from realizer.face.mpeg4.truth import PEERS, Truth, face_truth, mean_score
@@ -15,10 +16,13 @@ __all__ = [
     "apply_zones",
     "default_setup",
     "face_truth",
+    "fitted",
     "mean_score",
+    "read_faceeditor",
     "read_setup",
     "setup_of",
     "synchronised",
+    "write_faceeditor",
     "write_setup",
     "zone_fields",
 ]

@@ -18,6 +18,7 @@ from realizer.face.features import read_features
 from realizer.face.load import MESH, read_head
 from realizer.face.mpeg4 import rigid
 from realizer.face.mpeg4.defaults import default_setup, split_sides
+from realizer.face.mpeg4.faceeditor import fitted, read_faceeditor
 from realizer.face.mpeg4.fields import zone_fields
 from realizer.face.mpeg4.parameters import FILE, read_setup, write_setup
 from realizer.face.mpeg4.zones import Setup, synchronised
@@ -38,7 +39,8 @@ def copy_with_zones(
 
     Args:
         source: a face folder; folder: the new one, whose name is the face's.
-        parameters: a TOML file of zones; None for what `setup_of` says.
+        parameters: a file of zones, TOML or FaceEditor's XML, which is moved and sized to the face's feature
+            points; None for what `setup_of` says.
         only: as for `apply_zones`.
 
     Returns:
@@ -54,7 +56,10 @@ def copy_with_zones(
             shutil.copy(source / file, folder / file)
     head = (folder / "face.toml").read_text("utf-8")
     (folder / "face.toml").write_text(head.replace(f'name = "{name}"', f'name = "{folder.name}"', 1), "utf-8")
-    if parameters is not None and parameters.resolve() != (folder / FILE).resolve():
+    if parameters is not None and parameters.suffix.lower() == ".xml":
+        points = _read(folder)[3]
+        write_setup(folder / FILE, fitted(read_faceeditor(parameters), points))
+    elif parameters is not None and parameters.resolve() != (folder / FILE).resolve():
         shutil.copy(parameters, folder / FILE)
     setup = setup_of(folder)
     apply_zones(folder, setup, only)

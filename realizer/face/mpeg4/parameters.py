@@ -20,6 +20,7 @@ HEAD = """\
 # The zones of the MPEG-4 deformer (Paul 2010, 4.3.3). `realizer faces zones NAME` makes fields.npz from them.
 # size and pivot in metres; points override those of features.csv; a mask's vertices as ranges, last included
 """
+KEYS = ("joined", "synced", "whole", "points", "zone", "masks")
 LISTED = ("scale", "pivot")
 
 
@@ -35,9 +36,11 @@ def read_setup(path: Path) -> Setup:
         raise FaceError(f"{path}: wanted this file with the deformer's zones, found none") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FaceError(f"{path}: {error}") from None
-    unknown = sorted(set(read) - {"joined", "synced", "points", "zone", "masks"})
+    unknown = sorted(set(read) - {"joined", "synced", "whole", "points", "zone", "masks"})
     if unknown:
-        raise FaceError(f"{path}: wanted joined, synced, points, zone, masks; got {', '.join(unknown)}")
+        raise FaceError(
+            f"{path}: wanted joined, synced, whole, points, zone, masks; got {', '.join(unknown)}"
+        )
     zones: dict[int, Zone] = {}
     for number, entry in enumerate(_list(path, read, "zone"), 1):
         zone = _zone(f"{path}: zone {number}", entry)
@@ -52,7 +55,8 @@ def read_setup(path: Path) -> Setup:
     for name, place in _dict(path, read, "points").items():
         points[name] = _triple(f"{path}: points: {name}", place)
     synced = frozenset(_whole(f"{path}: synced", fap) for fap in _list(path, read, "synced"))
-    return Setup(points, zones, masks, synced, bool(read.get("joined", True)))
+    whole = frozenset(_whole(f"{path}: whole", fap) for fap in _list(path, read, "whole"))
+    return Setup(points, zones, masks, synced, bool(read.get("joined", True)), whole)
 
 
 def write_setup(path: Path, setup: Setup, points: bool = False) -> None:
@@ -65,6 +69,8 @@ def write_setup(path: Path, setup: Setup, points: bool = False) -> None:
     lines.append(
         f"synced = [{', '.join(map(str, sorted(setup.synced)))}]  # FAPs whose two sides go together"
     )
+    if setup.whole:
+        lines.append(f"whole = [{', '.join(map(str, sorted(setup.whole)))}]")
     if points:
         lines += ["", "[points]"]
         lines += [f'"{name}" = {_numbers(place)}' for name, place in setup.points.items()]

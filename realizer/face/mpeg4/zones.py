@@ -98,6 +98,7 @@ class Setup:
         masks: FAP -> (k,) vertices that move, ascending.
         synced: FAPs whose zone the other side shares.
         joined: neighbours whose zones overlap share what they both move, so that equal FAPs make no w.
+        whole: FAPs that are listed without a zone: their part moves as a whole.
     """
 
     points: Mapping[str, Triple]
@@ -105,6 +106,7 @@ class Setup:
     masks: Mapping[int, Int32] = field(default_factory=dict)
     synced: frozenset[int] = frozenset()
     joined: bool = True
+    whole: frozenset[int] = frozenset()
 
 
 def synchronised(setup: Setup, vertices: Float64 | None = None, margin: float = 5e-4) -> Setup:

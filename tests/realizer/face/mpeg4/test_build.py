@@ -118,7 +118,7 @@ def test_parameters_survive_the_file(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("zone = 3", "zone: wanted a list, got 3"),
-        ("zones = []", "wanted joined, synced, points, zone, masks; got zones"),
+        ("zones = []", "wanted joined, synced, whole, points, zone, masks; got zones"),
         ('[[zone]]\nfap = 31\nfalloff = "cosine"', "zone 1: size is missing"),
         ('[[zone]]\nfap = 31\nfalloff = "cosine"\nsize = "x"', "zone 1: size: wanted a number, got 'x'"),
         ('[[zone]]\nfap = 31\nfalloff = "cosine"\nsize = 1\nscale = [1]', "scale: wanted three numbers"),
