@@ -84,7 +84,7 @@ class _Until:
                 return id == f"{self.block}:end"
             case WarningFeedback(id=id):
                 # A warning on the block itself refuses it, unless its prediction is already out.
-                return not self._planned and id in (self.block, "<no id>")
+                return not self._planned and id == (self.block or "<no id>")
         blocks = getattr(feedback, "blocks", ())
         self._planned |= any(b.id == self.block and b.global_end is not None for b in blocks)
         return False

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bml_schema import Block, BMLError, read
+from bml_schema import Block, BMLError, WarningFeedback, read
 from realizer.animation.curves import gain_at
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
@@ -175,7 +175,7 @@ def realize(
     player = Player(scene=scene, seed=seed, idle=idle, language=language, media=media, history=float("inf"))
     accepted, refused = play(texts, player, voice)
     # Blocks act on each other while they play: what is seen and heard is known when all of them have ended.
-    feedback = tuple(f.to_xml() for f in player.due(float("inf")))
+    told = player.due(float("inf"))
     schedules = [player.latest(s) for s in accepted]
     end = player.end
     count = frame_count(end, fps)
@@ -192,15 +192,17 @@ def realize(
         aus = AUFrames(times, np.concatenate([w.values for w in windows]))
         characters[name] = Performance(aus, to_fap(aus))
     speaking = player.speech()
-    warnings = tuple(w for s in schedules for w in s.warnings)
-    warnings += tuple(w for w in refused if w not in warnings)
+    # Those of planning say more than what is told of them; others arise while blocks play.
+    planned = {(w.id, w.type, w.text): w for w in (*refused, *(w for s in schedules for w in s.warnings))}
+    known = ((f.id, f.type, f.text) for f in told if isinstance(f, WarningFeedback))
+    warnings = tuple(planned.get(key) or Warning(*key) for key in known)
     return Realization(
         fps=fps,
         duration=end,
         face_name=face_name(face),
         characters=characters,
         schedules=tuple(schedules),
-        feedback=feedback,
+        feedback=tuple(f.to_xml() for f in told),
         warnings=warnings,
         refused=tuple(w.text for w in refused),
         speaking=speaking,

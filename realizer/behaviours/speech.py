@@ -20,6 +20,8 @@ __all__ = ["KINDS"]
 SSML = "application/ssml+xml"
 # 1/s: a second of speech resists as much as a stiff gap of the face; shorter gaps than SHORT count as such.
 BEND, SHORT = 1000.0, 0.01
+# s; what has no word in it, such as a full stop, takes a moment all the same.
+LEAST = 0.1
 LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
@@ -59,7 +61,7 @@ def timing(node: Speech, world: World) -> Timing:
     order = {name: i for i, name in enumerate((*spoken.marks, *guessed))}
     names = sorted(times, key=lambda name: (times[name], order.get(name, len(order))))
     points = ("start", *names, "end")
-    gaps = np.diff([0.0, *(times[name] for name in names), utterance.duration])
+    gaps = np.diff([0.0, *(times[name] for name in names), max(utterance.duration, LEAST)])
     return Timing(points, gaps, gaps, np.ones(len(gaps)), rigid=True)
 
 
@@ -101,6 +103,8 @@ def check(node: Speech, world: World) -> tuple[Fault, ...]:
 
 def _spoken(node: Speech) -> Spoken | None:
     for description in sorted(node.descriptions, key=lambda d: -d.priority):
+        if description.priority < 0 and node.text is not None:
+            break  # the core form has priority 0
         if description.type == SSML and (spoken := _inside(description.content)) is not None:
             return spoken
     if node.text is None:

@@ -231,7 +231,8 @@ class Course:
         self.calendar.drop(playing)
         self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
         playing.cut(behaviours, now)
-        self.calendar.put(playing, pending)
+        if playing.start < FOREVER:
+            self.calendar.put(playing, pending)
         self.changed()
         self.predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
         self.solve_again(tied, playing.start, now)

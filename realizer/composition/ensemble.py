@@ -54,7 +54,7 @@ class Ensemble:
 
     def announce(self, block: Block, character: int, now: float) -> None:
         """Acknowledge a block, once."""
-        if block.id in self._expected or self._in_use(block):
+        if block.id in self._expected or self._in_use(block, character):
             return
         self._expected.add(block)
         start = max([now, *(w.until for w in self._waits(block, character))])
@@ -70,7 +70,7 @@ class Ensemble:
         self.advance(now)
         self.announce(block, character, now)
         try:
-            if self._in_use(block):
+            if self._in_use(block, character):
                 text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
                 raise _Refused(Warning(block.id, "PARSING_FAILURE", text))
             waits, behind = self._links(block, character)
@@ -98,7 +98,7 @@ class Ensemble:
         playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
         self.cast.add(playing)
         self.course.set_out(playing)
-        for follower, subsiding in behind:
+        for follower, subsiding in ((p, s) for p, s in behind if not p.done):
             follower.await_too(Wait(playing, subsiding))
             self.course.line_up(follower)
         for name, subsiding in relations.followers(block):
@@ -267,9 +267,10 @@ class Ensemble:
         ahead = [w for w in fate.waits if not w.block.done] if fate is not None else []
         return relations.awaited(block, character, self.cast.alive()) + ahead
 
-    def _in_use(self, block: Block) -> bool:
-        """Its id belongs to a block that plays or waits, and it is not there to replace that."""
-        return block.composition != "REPLACE" and self.cast.find(block.id) is not None
+    def _in_use(self, block: Block, character: int) -> bool:
+        """Its id belongs to a block that plays or waits, and that it does not end."""
+        other = self.cast.find(block.id)
+        return other is not None and other not in relations.ended(block, character, [other])
 
     def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
         self.reports.warn(warning, block.character_id)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bml_schema import Block, SyncRef
+from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel, Gain, Layer
 from realizer.animation.joints import joined
 from realizer.arrays import Float64
@@ -261,10 +261,12 @@ class Playing:
         relaxed (at once with `ends`, where the whole block is cut off).
         """
         points, times = dict(self.schedule.points), dict(self.schedule.times)
+        never: list[str] = []
         for behaviour in behaviours:
             names, at = points[behaviour], times[behaviour]
             local = now - self.start
             if local <= at[0]:
+                never.append(behaviour)
                 for table in (points, times, self.channels, self.speech):
                     table.pop(behaviour, None)
             elif local < at[-1]:
@@ -279,7 +281,9 @@ class Playing:
         left = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
         timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
         schedule = replace(self.schedule, points=points, times=times)
-        self.plan = replace(self.plan, schedule=schedule, claims=left, timings=timings)
+        # A block that waits may be planned anew.
+        block = without(self.block, never).block if never and self.waiting else self.block
+        self.plan = replace(self.plan, block=block, schedule=schedule, claims=left, timings=timings)
 
     def _cut_times(
         self, behaviour: str, names: tuple[str, ...], at: Float64, local: float, ends: bool
@@ -287,7 +291,8 @@ class Playing:
         kept = {name: float(time) for name, time in zip(names, at, strict=True) if time <= local}
         if "relax" in names:
             kept.setdefault("relax", local)
-        relax = 0.0 if ends else HUSH if behaviour in self.speech else RELAX
+        shown = "relax" in names or behaviour in self.channels or behaviour in self.shifts
+        relax = 0.0 if ends else HUSH if behaviour in self.speech else RELAX if shown else 0.0
         kept["end"] = min(local + relax, float(at[-1]))
         return tuple(kept), np.array(list(kept.values()))
 

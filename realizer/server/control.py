@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from realizer.animation.targets import AU_NAMES
-from realizer.errors import FaceError
+from realizer.errors import FaceError, VoiceError
 from realizer.server.connection import (
     Connection,
     FeedbackFilter,
@@ -87,6 +87,9 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
     except FaceError as error:
         where = f"{message.type}.face"
         session.reply(connection.id, ErrorMessage(code="face", message=str(error), where=where))
+    except VoiceError as error:
+        where = f"{message.type}.voice"
+        session.reply(connection.id, ErrorMessage(code="voice", message=str(error), where=where))
 
 
 def _hello(session: Session, connection: Connection, message: Hello, t: float) -> None:
@@ -177,6 +180,10 @@ def _mesh_of(session: Session, index: int) -> dict[str, Any]:
 def _character(session: Session, message: CharacterMessage) -> None:
     if message.face is not None:
         session.load_face(message.face)
+    if message.voice is not None:
+        from realizer.speech import find_voice
+
+        find_voice(message.voice).close()  # one that is not there is said before anything is spoken
     index = index_of(session, message.id)
     if message.face is not None:
         session.faces[index] = message.face

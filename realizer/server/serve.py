@@ -7,6 +7,7 @@ import contextlib
 import signal
 from types import TracebackType
 
+from realizer.scheduling import warm_up
 from realizer.server.doors.asap import AsapDoor
 from realizer.server.doors.door import Door
 from realizer.server.doors.stomp import StompDoor
@@ -105,6 +106,8 @@ class Server:
         except BaseException:
             await self.close()
             raise
+        # What large blocks need is loaded while the first clients come, not while the first block waits.
+        asyncio.get_running_loop().run_in_executor(None, warm_up)
         return self
 
     async def drain(self) -> None:

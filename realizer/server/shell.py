@@ -8,7 +8,7 @@ import itertools
 import logging
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from realizer.behaviours.kind import Position
 from realizer.server.doors.door import Client
@@ -26,6 +26,13 @@ log = logging.getLogger(__name__)
 SWEEP = 5.0  # s
 
 
+class _Timer(NamedTuple):
+    """When a session is woken. Not every loop's handles say that: uvloop's for what is due at once do not."""
+
+    when: float
+    handle: asyncio.TimerHandle
+
+
 class Shell:
     """All sessions of the service with their timers and engines. Doors let their clients `join` here.
 
@@ -38,7 +45,7 @@ class Shell:
         self._hub = Hub(self._make, settings.max_sessions)
         self._studio = Studio()
         self._clients: dict[int, Client] = {}
-        self._timers: dict[Session, asyncio.TimerHandle] = {}
+        self._timers: dict[Session, _Timer] = {}
         self._numbers = itertools.count(1)
         self._sweeper: asyncio.TimerHandle | None = None
         self._scene: Mapping[str, Position] | None = None
@@ -79,7 +86,7 @@ class Shell:
     async def close(self) -> None:
         """End every session and every engine."""
         self._closed = True
-        for timer in (*self._timers.values(), self._sweeper):
+        for timer in (*(t.handle for t in self._timers.values()), self._sweeper):
             if timer is not None:
                 timer.cancel()
         self._timers.clear()
@@ -157,16 +164,15 @@ class Shell:
     def _arm(self, session: Session) -> None:
         """One timer a session."""
         deadline = session.next_deadline()
-        timer = self._timers.get(session)
-        if timer is not None:
+        if (armed := self._timers.get(session)) is not None:
             # One that is due is left alone: messages in quick succession must not put it off for ever.
-            if deadline is not None and timer.when() <= max(deadline, self._loop.time()):
+            if deadline is not None and armed.when <= max(deadline, self._loop.time()):
                 return
-            timer.cancel()
+            armed.handle.cancel()
             del self._timers[session]
         if deadline is not None and not self._closed:
             when = max(deadline, self._loop.time())
-            self._timers[session] = self._loop.call_at(when, self._tick, session)
+            self._timers[session] = _Timer(when, self._loop.call_at(when, self._tick, session))
 
     def _tick(self, session: Session) -> None:
         self._timers.pop(session, None)

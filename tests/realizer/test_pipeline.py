@@ -177,3 +177,12 @@ def test_the_lips_meet_in_every_p_b_m_as_streamed() -> None:
         )
         assert gap[inside].min() < 0.03 * 1024, phoneme
     assert gap.max() > 150, "between them the mouth opens"
+
+
+def test_warnings_that_arise_while_blocks_play_are_among_the_warnings() -> None:
+    bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+    played = realize(f'<bml id="b" {bmla} bmla:onStart="q"><bmla:interrupt id="i" target="nobody"/></bml>')
+    assert [(w.id, w.type) for w in played.warnings] == [
+        ("b", "EXECUTION_FAILURE"),
+        ("b:i", "EXECUTION_FAILURE"),
+    ]

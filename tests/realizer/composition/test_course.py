@@ -1,4 +1,4 @@
-"""What becomes of accepted blocks: they are laid, moved, cut off and stopped, and their followers with them."""
+"""What becomes of accepted blocks: they are laid, moved, cut off, stopped, and their followers with them."""
 
 from __future__ import annotations
 

@@ -359,3 +359,38 @@ def test_a_thousand_appended_blocks_follow_one_another_and_move_together(stage: 
     ends = [line for line in stage.progress() if ":end" in line]
     assert ends[:2] == ["b0:end INTERRUPTED 0.5", "b1:end DONE 1.5"]
     assert ends[-1] == "b999:end DONE 999.5"
+
+
+@pytest.mark.parametrize("said", [{"interrupt": "b"}, {"composition": "REPLACE"}])
+@pytest.mark.parametrize("before", ["prependBefore", "chunkBefore"])
+def test_a_block_that_is_ended_by_the_one_put_before_it_stays_ended(
+    stage: Stage, said: dict[str, str], before: str
+) -> None:
+    stage.send("a", wait(0.5))
+    stage.send("b", wait(0.5), composition="APPEND")
+    assert not stage.send("c", wait(1), **said, **{before: "b"}).failed
+    told = stage.progress()
+    assert "b:end REVOKED 0" in told
+    assert "c:end DONE 1" in told
+    assert not any(line.startswith("b:start") for line in told)
+
+
+def test_replace_does_not_take_the_id_of_another_characters_block(stage: Stage) -> None:
+    stage.send("b", wait(0.5), characterId="Ann")
+    stage.send("x", wait(0.5), characterId="Bob")
+    assert stage.send("x", wait(1), composition="REPLACE", characterId="Ann").failed
+    assert "still in use" in stage.texts[0]
+    assert "x:end DONE 0.5" in stage.progress()
+
+
+def test_what_is_interrupted_of_a_preplanned_block_does_not_come_when_it_is_activated(stage: Stage) -> None:
+    stage.send("p", wait(0.5) + wait(0.2, id="s"), preplan="true")
+    stage.send("i", '<bmla:interrupt id="x" target="p" include="w"/>')
+    stage.send("a", '<bmla:activate id="k" target="p"/>', at=1.0)
+    assert "p:end DONE 1.2" in stage.progress()
+
+
+def test_a_wait_that_is_interrupted_ends_at_once(stage: Stage) -> None:
+    stage.send("a", wait(2) + wait(1, id="v"))
+    stage.send("i", '<bmla:interrupt id="x" target="a" include="w" start="0.3"/>')
+    assert "a:end DONE 1" in stage.progress()

@@ -37,14 +37,15 @@ POINTS = {
 LIMIT = 30  # s; a hung test ends
 
 
-def serving(test: Callable[[Server], Awaitable[None]], **settings) -> None:
-    """Run a test against a service of its own."""
+def serving(test: Callable[[Server], Awaitable[None]], loop=None, **settings) -> None:
+    """Run a test against a service of its own, in an event loop of a kind."""
 
     async def run() -> None:
         async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent", **settings)) as server:
             await test(server)
 
-    asyncio.run(run())
+    with asyncio.Runner(loop_factory=loop) as runner:
+        runner.run(run())
 
 
 async def until(socket, last: str) -> list[str | bytes]:
@@ -277,3 +278,20 @@ def test_a_client_that_keeps_sending_does_not_keep_its_own_blocks_from_playing()
             flooding.cancel()
 
     serving(test)
+
+
+@pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
+def test_messages_in_quick_succession_all_play(loop) -> None:
+    factory = None
+    if loop == "uvloop":
+        factory = pytest.importorskip("uvloop", reason="needs the fast extra").new_event_loop
+
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            for n in range(20):
+                await socket.send(f'<bml id="b{n}"/>')
+                await socket.send('{"type":"ping"}')
+            messages = await until(socket, "b19:end")
+            assert sum(":end" in m for m in messages) == 20
+
+    serving(test, factory)

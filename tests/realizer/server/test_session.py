@@ -719,3 +719,10 @@ def test_a_voice_that_comes_back_with_another_length_is_not_asked_a_third_time()
     assert len(driver.spoken) == 2
     assert [w.id for w in told.feedback if isinstance(w, WarningFeedback)] == ["a:s"]
     assert "a:end" in told.ids
+
+
+def test_a_voice_that_is_not_there_is_an_error_at_once(driver) -> None:
+    told = driver.send({"type": "character", "id": "Z", "voice": "nope"})
+    (error,) = told.of("error")
+    assert (error["code"], error["where"]) == ("voice", "character.voice")
+    assert "nope" in error["message"]
