@@ -221,6 +221,8 @@ def _lines(player: Player, accepted: list[Schedule]) -> list[BlockLine]:
 
 def _table(planned: Schedule) -> str:
     """A line for the block, and one for each behaviour."""
+    if planned.failed:
+        return f"{planned.block}  refused\n"
     lines = [f"{planned.block}  {planned.start:.3f} .. {planned.end:.3f} s"]
     width = max((len(b) for b in planned.times), default=0)
     for behaviour, times in planned.behaviours.items():

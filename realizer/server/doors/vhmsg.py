@@ -32,6 +32,8 @@ class _Speak:
     started: bool = False
     interrupted: bool = False
     error: str = ""
+    plays: bool = False  # a behaviour of it
+    dropped: str = ""  # why the first behaviour that went did
 
     def says(self, verb: str, rest: str = "") -> str:
         return f"{verb} {self.agent} {self.recipient} {self.id} {rest}".rstrip()
@@ -116,10 +118,13 @@ class Vhmsg:
                 if id not in speak.planned:
                     speak.error = text
                     return self._ended(speak, id)
-            case PredictionFeedback(blocks=blocks):
+            case PredictionFeedback(blocks=blocks, behaviours=behaviours):
                 for told in blocks:
                     if told.global_end is not None and told.id in self._speaks:
                         self._speaks[told.id].planned.add(told.id)
+                        self._speaks[told.id].plays |= bool(behaviours)
+            case WarningFeedback(id=id, text=text) if speak := self._speaks.get(id.partition(":")[0]):
+                speak.dropped = speak.dropped or text
         return []
 
     def _ended(self, speak: _Speak, block: str) -> list[Message]:
@@ -128,7 +133,9 @@ class Vhmsg:
         return [] if speak.blocks else self._over(speak)
 
     def _over(self, speak: _Speak) -> list[Message]:
-        """Its last block has ended, or it never had one."""
+        """Its last block has ended, or it never had one. Where nothing of it played, that is an error."""
+        if not speak.plays and not speak.interrupted:
+            speak.error = speak.error or speak.dropped
         if speak.error:
             said = " ".join(speak.error.split())
             return [

@@ -133,6 +133,16 @@ def test_a_dropped_behaviour_or_a_late_warning_is_no_error_of_the_block() -> Non
     assert said(dialect.outgoing(progress("m1", "end", "DONE")))[0].endswith("end complete")
 
 
+def test_a_vrspeak_of_which_nothing_plays_ends_with_the_reason() -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    dialect.outgoing(WarningFeedback(id="m1:x", type="X", text="id: wanted one, got none").to_xml())
+    dialect.outgoing(planned("m1"))
+    assert said(dialect.outgoing(progress("m1", "end", "DONE")))[0].endswith(
+        "end error id: wanted one, got none"
+    )
+
+
 @pytest.mark.parametrize("xml", ["", "hello", "speech_01.xml", "<act/>", "<bml><head", "<?xml?>"])
 def test_a_vrspeak_without_a_document_ends_with_an_error(xml: str) -> None:
     first, second = said(vhmsg().incoming(f"vrSpeak Brad ALL m1 {xml}".encode()))
