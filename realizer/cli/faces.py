@@ -139,12 +139,14 @@ def build(name: str, data: Path, output: Path | None) -> None:
     "--fap", "only", type=int, multiple=True, help="Only this FAP, the others stay; may be repeated."
 )
 def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, only: tuple[int, ...]) -> None:
-    """Make a face of a head by MPEG-4 zones: a mesh and feature points are enough."""
+    """Make a face of a head by MPEG-4 zones: a mesh is enough, its feature points are found."""
     from realizer.face.load import folder_of
     from realizer.face.mpeg4 import write_faceeditor
     from realizer.face.mpeg4.build import copy_with_zones
 
-    setup = copy_with_zones(folder_of(name), output, parameters, only)
+    setup, guesses = copy_with_zones(folder_of(name), output, parameters, only)
+    if guesses:
+        click.echo(f"{output / 'features.csv'}: guessed, look at them: {', '.join(guesses)}", err=True)
     for lost in write_faceeditor(xml, setup) if xml else ():
         click.echo(f"{xml}: {lost}", err=True)
     click.echo(f"{output}: {len(only) or len(setup.zones)} zones")

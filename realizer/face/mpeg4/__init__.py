@@ -4,6 +4,7 @@ from realizer.face.mpeg4.build import apply_zones, setup_of
 from realizer.face.mpeg4.defaults import default_setup
 from realizer.face.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
 from realizer.face.mpeg4.fields import zone_fields
+from realizer.face.mpeg4.landmarks import find_points
 from realizer.face.mpeg4.parameters import read_setup, write_setup
 from realizer.face.mpeg4.truth import PEERS, Truth, face_truth, mean_score
 from realizer.face.mpeg4.zones import Setup, Zone, synchronised
@@ -16,6 +17,7 @@ __all__ = [
     "apply_zones",
     "default_setup",
     "face_truth",
+    "find_points",
     "fitted",
     "mean_score",
     "read_faceeditor",

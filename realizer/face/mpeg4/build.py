@@ -14,12 +14,13 @@ from realizer.arrays import Float64
 from realizer.errors import FaceError
 from realizer.face.archive import read_arrays
 from realizer.face.basis import ARRAYS, pack
-from realizer.face.features import read_features
+from realizer.face.features import read_features, write_features
 from realizer.face.load import MESH, read_head
 from realizer.face.mpeg4 import rigid
 from realizer.face.mpeg4.defaults import default_setup, split_sides
 from realizer.face.mpeg4.faceeditor import fitted, read_faceeditor
 from realizer.face.mpeg4.fields import zone_fields
+from realizer.face.mpeg4.landmarks import find_points
 from realizer.face.mpeg4.parameters import FILE, read_setup, write_setup
 from realizer.face.mpeg4.zones import Setup, synchronised
 
@@ -34,8 +35,8 @@ PRECISION = 1e-9
 
 def copy_with_zones(
     source: Path, folder: Path, parameters: Path | None = None, only: Collection[int] = ()
-) -> Setup:
-    """Another face of the same head, moved by zones.
+) -> tuple[Setup, tuple[str, ...]]:
+    """Another face of the same head, moved by zones; where it has no features.csv its points are found.
 
     Args:
         source: a face folder; folder: the new one, whose name is the face's.
@@ -44,7 +45,7 @@ def copy_with_zones(
         only: as for `apply_zones`.
 
     Returns:
-        The parameters, which the new folder's mpeg4.toml holds too.
+        The parameters, which the new folder's mpeg4.toml holds too, and the feature points that are guesses.
 
     Raises:
         FaceError: the source or the parameters are broken.
@@ -54,6 +55,7 @@ def copy_with_zones(
     for file in FILES:
         if (source / file).is_file() and source.resolve() != folder.resolve():
             shutil.copy(source / file, folder / file)
+    guesses = () if (folder / "features.csv").is_file() else _mark(folder)
     head = (folder / "face.toml").read_text("utf-8")
     (folder / "face.toml").write_text(head.replace(f'name = "{name}"', f'name = "{folder.name}"', 1), "utf-8")
     if parameters is not None and parameters.suffix.lower() == ".xml":
@@ -64,7 +66,15 @@ def copy_with_zones(
     setup = setup_of(folder)
     apply_zones(folder, setup, only)
     write_setup(folder / FILE, setup)
-    return setup
+    return setup, guesses
+
+
+def _mark(folder: Path) -> tuple[str, ...]:
+    """Find the feature points and write features.csv; which of them are guesses."""
+    at, mesh, parts = _head(folder)
+    points, guesses = find_points(at, np.asarray(mesh["triangles"], np.int32), parts)
+    write_features(folder / "features.csv", points)
+    return guesses
 
 
 def setup_of(folder: Path) -> Setup:
@@ -136,18 +146,22 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
 
 
 def _read(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]], dict[str, Any]]:
+    points = {name: point.place for name, point in read_features(folder / "features.csv").items()}
+    return *_head(folder), points
+
+
+def _head(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
     head = read_head(folder)
     mesh = read_arrays(folder / "mesh.npz", MESH)
     parts = {name: (int(a), int(b)) for name, (a, b) in head["parts"].items()}
     for name in ("skin", "left_eye", "right_eye"):
         if name not in parts:
             raise FaceError(f"{folder / 'face.toml'}: parts: wanted {name!r}, got {', '.join(parts)}")
-    points = {name: point.place for name, point in read_features(folder / "features.csv").items()}
     at = np.asarray(mesh["vertices"], np.float64)
     if not np.isfinite(at).all():
         bad = int(np.flatnonzero(~np.isfinite(at).all(axis=1))[0])
         raise FaceError(f"{folder / 'mesh.npz'}: vertex {bad} is not finite; build the face again")
-    return at, mesh, parts, points
+    return at, mesh, parts
 
 
 def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:
