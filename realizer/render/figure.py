@@ -9,6 +9,7 @@ from realizer.face.model import Face
 from realizer.render.cameras import Camera
 from realizer.render.glints import Glints
 from realizer.render.light import Light, Shader
+from realizer.render.wrinkles import Wrinkles
 
 __all__ = ["Figure"]
 
@@ -24,20 +25,30 @@ class Figure:
 
     def __init__(self, face: Face, camera: Camera, light: Light) -> None:
         self._glints = Glints(face, light, camera.towards)
+        self._wrinkles = Wrinkles(face)
         self._shader = Shader(light, face.colours, face.occlusion, face.gloss, camera.towards)
-        self._head = slice(0, len(face.vertices))
-        self._caps = slice(len(face.vertices), None)
-        self.points: Float32 = np.concatenate([face.vertices, self._glints(face.vertices)])
+        count = len(face.vertices)
+        self._head = slice(0, count)
+        self._furrows = slice(count, count + self._wrinkles.count)
+        self._caps = slice(self._furrows.stop, None)
+        glints = self._glints(face.vertices)
+        furrows = np.zeros((self._wrinkles.count, 3), np.float32)
+        self.points: Float32 = np.concatenate([face.vertices, furrows, glints])
         self.colours: Float32 = np.ones_like(self.points)
         self.triangles: Int32 = np.concatenate(
-            [_visible_triangles(face), self._glints.triangles + len(face.vertices)]
+            [
+                _visible_triangles(face),
+                self._wrinkles.triangles + self._furrows.start,
+                self._glints.triangles + self._caps.start,
+            ]
         ).astype(np.int32)
 
     def pose(self, vertices: Float32, normals: Float32) -> None:
         """Move `points` and `colours` to the head's (n_vertices, 3) vertices and unit normals."""
-        self.points[self._head] = vertices
+        colours = self._shader(normals)
+        self.points[self._head], self.colours[self._head] = vertices, colours
+        self.points[self._furrows], self.colours[self._furrows] = self._wrinkles(vertices, normals, colours)
         self.points[self._caps] = self._glints(vertices)
-        self.colours[self._head] = self._shader(normals)
 
 
 # Parts with an inside that is never seen; all others (hair, clothes, lashes) may be sheets.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -15,6 +16,7 @@ from realizer.errors import RenderError, TableError
 
 __all__ = ["Lamp", "Light", "Shader", "preset", "presets"]
 
+LIGHT = "REALIZER_LIGHT"
 LAMPS = ("key", "fill", "rim")
 Triple = tuple[float, float, float]
 
@@ -84,12 +86,13 @@ def presets() -> Mapping[str, Light]:
     return {name: _light(name, values) for name, values in table.items()}
 
 
-def preset(name: str = "portrait") -> Light:
-    """The light of that name.
+def preset(name: str | None = None) -> Light:
+    """The light of that name; None is the one that the variable REALIZER_LIGHT names, or "portrait".
 
     Raises:
         RenderError: no such light; the text lists the known ones.
     """
+    name = name or os.environ.get(LIGHT) or "portrait"
     if name not in presets():
         raise RenderError(f"light: wanted one of {', '.join(presets())}, got {name!r}")
     return presets()[name]

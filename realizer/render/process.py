@@ -29,7 +29,7 @@ __all__ = ["Renderer", "available"]
 
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it
-LIGHT, DRAW = "REALIZER_LIGHT", "REALIZER_DRAW"
+DRAW = "REALIZER_DRAW"
 PATIENCE = 60.0  # s; the longest answer, a start on a cold disk, takes about 3
 
 
@@ -62,7 +62,7 @@ class Renderer:
         if not (1 <= width <= 8192 and 1 <= height <= 8192):
             raise ValueError(f"size: wanted 1..8192 pixels each way, got {width}x{height}")
         self.face, self.size, self.camera = face, size, camera
-        self.light = light or os.environ.get(LIGHT) or "portrait"
+        self.light = light
         self.way = way or os.environ.get(DRAW) or "auto"
         self._half = max(1, min(HALF, HALF_BYTES // (width * height * 3)))
         self._lock = threading.Lock()

@@ -26,7 +26,7 @@ class Open:
     camera: str
     memory: str
     slots: int
-    light: str
+    light: str | None
     way: str
 
 

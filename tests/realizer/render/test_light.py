@@ -119,3 +119,10 @@ def test_daylight_is_even_and_evening_is_not():
         for name in presets()
     }
     assert 0.97 < contrast["daylight"] < contrast["portrait"] < contrast["evening"]
+
+
+def test_a_variable_names_the_light_of_who_names_none(monkeypatch):
+    monkeypatch.setenv("REALIZER_LIGHT", "evening")
+    assert preset() == preset("evening") != preset("portrait")
+    monkeypatch.delenv("REALIZER_LIGHT")
+    assert preset() == preset("portrait")

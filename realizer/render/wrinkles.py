@@ -1,0 +1,210 @@
+"""A face in; furrows on its skin out, as strips that darken as the skin beneath is pushed together.
+
+What pushes is seen from the shape itself, two feature points that come nearer, so furrows follow whatever
+moves a face: FAPs, action units or shapes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Float32, Float64, Int32
+from realizer.face.model import Face
+from realizer.render.skin import on_skin
+
+__all__ = ["Wrinkles"]
+
+STEP = 0.03  # of ES0, along a furrow
+LIFT = 0.006  # of ES0, above the skin: 0.4 mm, or the strip sinks where the skin is curved
+COARSE = 0.18  # of ES0: where triangles are longer than that, the skin cannot move as a furrow does
+ACROSS = np.array([-1, -0.55, -0.2, 0, 0.2, 0.55, 1])  # of the width, from above a furrow to below it
+# Blood shows where skin is in shade: red is darkened less than blue.
+SHADE = np.array([0.82, 1.03, 1.10], np.float32)
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """How near two vertices have come: 0 at `start`, 1 at `full` (relative changes of their distance)."""
+
+    a: int
+    b: int
+    rest: float
+    start: float
+    full: float
+
+    def __call__(self, vertices: Float32) -> float:
+        change = float(np.linalg.norm(vertices[self.a] - vertices[self.b])) / self.rest - 1
+        reached = min(max((change - self.start) / (self.full - self.start), 0.0), 1.0)
+        return reached * reached * (3 - 2 * reached)
+
+
+class Wrinkles:
+    """Forehead, glabella, crow's feet and nasolabial folds.
+
+    Attributes:
+        triangles: (m, 3) int32 of its own points, seen from outside.
+    """
+
+    def __init__(self, face: Face) -> None:
+        """Furrows whose feature points the face lacks, or whose skin is too coarse, are left out."""
+        table = _table()
+        size = face.fapu.es0
+        drawn = [
+            strip
+            for line in table["lines"]
+            for side in (1, -1)
+            if (strip := _strip(face, line, table["drives"], side, size)) is not None
+        ]
+        self._drives = sorted({d for strip in drawn for d in strip.drives}, key=lambda d: (d.a, d.b, d.full))
+        place = {drive: k for k, drive in enumerate(self._drives)}
+        self._corners: Int32 = _joined([s.corners for s in drawn], (0, 3)).astype(np.int32)
+        self._weights: Float32 = _joined([s.weights for s in drawn], (0, 3)).astype(np.float32)[..., None]
+        self._lift = np.float32(LIFT * size)
+        # Points x drives: how much a drive darkens a point.
+        self._tone: Float32 = np.zeros((len(self._corners), len(self._drives)), np.float32)
+        triangles, first = [], 0
+        for strip in drawn:
+            for drive, tone in zip(strip.drives, strip.tones, strict=True):
+                self._tone[first : first + len(tone), place[drive]] += tone
+            triangles.append(_grid(len(strip.corners) // len(ACROSS), strip.turned) + first)
+            first += len(strip.corners)
+        self.triangles: Int32 = _joined(triangles, (0, 3)).astype(np.int32)
+        self.count = first
+
+    def __call__(self, vertices: Float32, normals: Float32, colours: Float32) -> tuple[Float32, Float32]:
+        """(count, 3) points in metres and (count, 3) sRGB 0..1, of the head's vertices, normals and colours.
+
+        A face without furrows gives points without extent, which cost nothing to draw.
+        """
+        amounts = np.array([drive(vertices) for drive in self._drives], np.float32)
+        if not self.count or not amounts.any():
+            return np.zeros((self.count, 3), np.float32), np.zeros((self.count, 3), np.float32)
+        points = (vertices[self._corners] * self._weights).sum(axis=1)
+        points += self._lift * (normals[self._corners] * self._weights).sum(axis=1)
+        tone = self._tone @ amounts
+        skin = (colours[self._corners] * self._weights).sum(axis=1)
+        shaded = skin * (
+            1 - np.where(tone > 0, tone, 0)[:, None] * SHADE + np.where(tone < 0, -tone, 0)[:, None]
+        )
+        return points, np.minimum(shaded, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """One furrow: (k, 3) vertices and weights of each point, and per drive how dark it makes each, (k,)."""
+
+    corners: Int32
+    weights: Float64
+    drives: tuple[_Drive, ...]
+    tones: tuple[Float64, ...]
+    turned: bool
+
+
+@cache
+def _table() -> dict[str, Any]:
+    from realizer.tables import read_toml, text_of
+
+    return read_toml(text_of("wrinkles.toml"), "wrinkles.toml")
+
+
+def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, size: float) -> _Strip | None:
+    """The furrow on the character's left (side 1) or right (-1); None where the face cannot show it."""
+    named = [point for point, _, _ in line["through"]]
+    pairs = {name: drives[name]["between"] for name in line["drives"]}
+    wanted = {*named, *(p for pair in pairs.values() for p in pair)}
+    if not wanted <= set(face.points) or not wanted <= set(face.feature_points):
+        return None
+    from scipy.interpolate import PchipInterpolator
+
+    yaw = math.radians(line["yaw"]) * side
+    right = np.array([math.cos(yaw), 0, -math.sin(yaw)])
+    towards = np.array([math.sin(yaw), 0, math.cos(yaw)])
+    twin = {name: _twin(face, name) if side < 0 else name for name in wanted}
+    # Seen from `towards`, steps outwards are steps along the turned picture.
+    knots = np.array(
+        [
+            (
+                side * out * size + float(np.asarray(face.points[twin[p]], float) @ right),
+                up * size + face.points[twin[p]][1],
+            )
+            for p, out, up in line["through"]
+        ]
+    )
+    if line.get("meets"):
+        knots[-1, 0] = 0.0
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
+    count = max(4, math.ceil(along[-1] / (STEP * size)) + 1)
+    where = np.linspace(0, along[-1], count)
+    path = PchipInterpolator(along, knots)(where)
+    tangent = np.gradient(path, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    # Across: from above to below, and where a furrow runs down, from its outer side to its inner one.
+    across = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    level = abs(across[:, 1].mean()) > abs(across[:, 0].mean())
+    if (across[:, 1].mean() > 0) if level else (side * across[:, 0].mean() > 0):
+        across = -across
+    spread = path[:, None] + across[:, None] * (ACROSS * line["width"] * size)[None, :, None]
+    found = on_skin(face, spread.reshape(-1, 2), right, towards, COARSE * size)
+    if found is None:
+        return None
+    ends = [drives[name] for name in line["drives"]]
+    made = [_drive(face, [twin[p] for p in drive["between"]], drive) for drive in ends]
+    tone = (
+        _profile(line["depth"], line["lit"])[None]
+        * _taper(where / along[-1], bool(line.get("meets")))[:, None]
+    )
+    tones = []
+    for k in range(len(made)):
+        share = np.interp(where, along, np.eye(len(made))[k])
+        tones.append((tone * share[:, None]).ravel())
+    turn = np.cross(np.append(tangent[0], 0), np.append(across[0], 0))[2]
+    return _Strip(*found, tuple(made), tuple(tones), bool(turn < 0))
+
+
+def _profile(depth: float, lit: float) -> Float64:
+    """How dark a furrow is across: a groove with soft walls, and below it a ridge that catches light."""
+    groove = np.exp(-((ACROSS / 0.36) ** 2)) * depth
+    ridge = np.exp(-(((ACROSS - 0.6) / 0.3) ** 2)) * lit
+    out = groove - ridge
+    out[[0, -1]] = 0
+    return out
+
+
+def _taper(t: Float64, meets: bool) -> Float64:
+    """Furrows begin and end gently; those of the forehead meet their mirror image in the middle."""
+    start = np.clip(t / 0.3, 0, 1)
+    end = np.clip((1 - t) / 0.3, 0, 1) if not meets else np.ones_like(t)
+    ease = start * end
+    out: Float64 = ease * ease * (3 - 2 * ease)
+    return out
+
+
+def _drive(face: Face, pair: list[str], drive: dict[str, Any]) -> _Drive:
+    a, b = sorted(face.feature_points[p] for p in pair)
+    rest = max(float(np.linalg.norm(face.vertices[a] - face.vertices[b])), 1e-6)
+    return _Drive(a, b, rest, drive["from"], drive["full"])
+
+
+def _twin(face: Face, name: str) -> str:
+    """The feature point of the same group that lies where this one's mirror image does."""
+    flipped = np.asarray(face.points[name], float) * (-1, 1, 1)
+    group = [p for p in face.points if p.split(".")[0] == name.split(".")[0] and p in face.feature_points]
+    return min(group, key=lambda p: float(np.linalg.norm(np.asarray(face.points[p], float) - flipped)))
+
+
+def _grid(rows: int, turned: bool) -> Int32:
+    """Triangles of a strip of `rows` x len(ACROSS) points."""
+    width = len(ACROSS)
+    corner = (np.arange(rows - 1)[:, None] * width + np.arange(width - 1)).ravel()
+    a, b, c, d = corner, corner + 1, corner + width, corner + width + 1
+    out = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
+    return (out[:, ::-1] if turned else out).astype(np.int32)
+
+
+def _joined(parts: list[Any], empty: tuple[int, int]) -> Any:
+    return np.concatenate(parts) if parts else np.zeros(empty)
