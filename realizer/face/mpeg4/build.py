@@ -23,6 +23,7 @@ from realizer.face.mpeg4.fields import zone_fields
 from realizer.face.mpeg4.landmarks import find_points
 from realizer.face.mpeg4.parameters import FILE, read_setup, write_setup
 from realizer.face.mpeg4.zones import Setup, synchronised
+from realizer.tables import faps
 
 __all__ = ["apply_zones", "copy_with_zones", "setup_of"]
 
@@ -31,6 +32,8 @@ FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "
 DRESSED = ("brows", "lashes")  # parts that lie on the skin and go along with it
 NEAR = 3  # vertices of the skin that one of theirs follows
 PRECISION = 1e-9
+PUPILS = {"3.5", "3.6"}  # points that lie on no skin
+SOFTENED = 1  # times
 
 
 def copy_with_zones(
@@ -111,7 +114,7 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
             f"{folder}: no zone for FAP {', '.join(map(str, missing))}; add one to the parameters"
         )
     whole = _with_masks_of_skin(setup, parts["skin"])
-    made = zone_fields(whole, at[skin])
+    made = _softened(zone_fields(whole, at[skin]), whole, at[skin], mesh["triangles"], parts["skin"])
     rows = {fap: _dressed(at, parts, made[fap]) for fap in chosen}
     if only:
         stored = read_arrays(path, ARRAYS)
@@ -162,6 +165,33 @@ def _head(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
         bad = int(np.flatnonzero(~np.isfinite(at).all(axis=1))[0])
         raise FaceError(f"{folder / 'mesh.npz'}: vertex {bad} is not finite; build the face again")
     return at, mesh, parts
+
+
+def _softened(
+    fields: Mapping[int, Float64], setup: Setup, at: Float64, triangles: Any, skin: tuple[int, int]
+) -> dict[int, Float64]:
+    """The fields with their kinks taken off: half a vertex's own move, half the mean of its neighbours'.
+
+    Feature points keep theirs, so that they still go as far as they are asked.
+    """
+    import scipy.sparse as sp
+
+    first, last = skin
+    mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
+    i, j = np.concatenate([mine[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]).T
+    near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (last - first,) * 2)
+    near.data[:] = 1
+    mean = sp.diags_array(1 / np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)) @ near
+    ends = {faps()[fap - 1].feature_point for fap in fields} - PUPILS
+    fixed = [int(np.argmin(np.linalg.norm(at - np.array(setup.points[name]), axis=1))) for name in ends]
+    out = {}
+    for fap, field in fields.items():
+        soft = field
+        for _ in range(SOFTENED):
+            soft = 0.5 * soft + 0.5 * np.asarray(mean @ soft)
+            soft[fixed] = field[fixed]
+        out[fap] = soft
+    return out
 
 
 def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:

@@ -147,6 +147,8 @@ def _settled(
         chosen = np.flatnonzero(middle) if middle.any() else np.arange(len(mine))
         vertex = first + int(chosen[np.argmax(way * mine[chosen, 1])])
         return vertex, _triple(at[vertex]), 0.0
+    if name.startswith("4.") and "brows" in parts:
+        place = _on_brow(at[slice(*parts["brows"])], place, origin, unit)
     part = "tongue" if name.startswith("6.") and "tongue" in parts else "skin"
     vertex = nearest(part)
     if name in FACING:
@@ -154,6 +156,16 @@ def _settled(
         right = np.flatnonzero(head.ups[:, 1] * FACING[name] > -0.1)
         vertex = first + int(right[np.argmin(np.linalg.norm(at[first:last][right] - place, axis=1))])
     return vertex, _triple(at[vertex]), float(np.linalg.norm(at[vertex] - place))
+
+
+def _on_brow(brows: Float64, place: Float64, origin: Float64, unit: float) -> Float64:
+    """The place moved to the height of the brow, and not beyond its ends."""
+    mine = brows[(brows[:, 0] > origin[0]) == (place[0] > origin[0])]
+    if not len(mine):
+        return place
+    x = float(np.clip(place[0], mine[:, 0].min(), mine[:, 0].max()))
+    near = mine[np.abs(mine[:, 0] - x) < 0.06 * unit]
+    return np.asarray(near.mean(axis=0)) if len(near) else place
 
 
 def _triple(place: Float64) -> tuple[float, float, float]:

@@ -51,6 +51,10 @@ def jaw_rows(
     mouth = (place["2.4"] + place["2.5"]) / 2
     below = np.zeros(len(at))
     below[lower] = 1
+    # At the corners above and below are one.
+    corners = [place[name] for name in ("2.4", "2.5", "8.3", "8.4")]
+    meet = smooth(np.min([np.linalg.norm(at - c, axis=1) for c in corners], axis=0), 0.010, 0.002)
+    below = below * (1 - meet) + 0.5 * meet
     # Flat and wide: over the whole jaw, not above the mouth.
     wide, deep = 1.25 * abs(corner[0] - chin[0]), 1.25 * abs(corner[2] - chin[2])
     tall = abs(mouth[1] - chin[1]) * 1.45
