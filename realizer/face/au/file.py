@@ -35,9 +35,11 @@ def write_model(path: Path, model: Model) -> None:
         HEAD.format(source=model.source, licence=model.licence),
         f'form = "{model.form}"',
         "",
-        "[mouth]  # the line between the lips, from the middle to the corner",
+        "[mouth]  # where the lips meet, from the middle to the corner, and how that plane rises with z",
         f"x = {_list(model.mouth.x)}",
         f"y = {_list(model.mouth.y)}",
+        f"z = {_list(model.mouth.z)}",
+        f"slope = {_list(model.mouth.slope)}",
         "",
         "[pivots]",
         f"head = {_list(model.head.pivot)}",
@@ -89,7 +91,7 @@ def read_model(path: Path) -> Model:
     at = _Reader(path)
     mouth, pivots, neck = (at.table(table, key) for key in ("mouth", "pivots", "neck"))
     x = at.numbers(mouth, "mouth.x", len(mouth.get("x", ())) or 2)
-    y = at.numbers(mouth, "mouth.y", len(x))
+    y, z, slope = (at.numbers(mouth, f"mouth.{key}", len(x)) for key in ("y", "z", "slope"))
     if len(x) < 2 or (np.diff(x) <= 0).any():
         raise FaceError(f"{path}: mouth.x: wanted two or more ascending numbers, got {x.tolist()}")
     places = {key: at.place(pivots, f"pivots.{key}") for key in ("head", "left_eye", "right_eye", "jaw")}
@@ -101,7 +103,7 @@ def read_model(path: Path) -> Model:
         form=str(table.get("form", "published")),
         source=head["source"],
         licence=head["licence"],
-        mouth=Mouth(x, y),
+        mouth=Mouth(x, y, z, slope),
         head=HeadTurn(places["head"], top, end, tilt),
         eyes=(places["left_eye"], places["right_eye"]),
         jaw=places["jaw"],
@@ -194,7 +196,7 @@ def _gaussian(row: Float64) -> str:
 
 
 def _number(value: Any) -> str:
-    text = f"{float(value):.6g}"
+    text = f"{float(value):.8g}"
     return "0.0" if text == "-0" else text if "." in text or "e" in text else text + ".0"
 
 

@@ -11,6 +11,7 @@ from realizer.arrays import Float64
 from realizer.errors import FaceError
 from realizer.face.au.measure import Measured
 from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
+from realizer.face.au.mouth import fit_mouth
 from realizer.face.au.solve import STILL, Fit
 from realizer.face.au.units import units
 from realizer.face.model import Face
@@ -22,6 +23,7 @@ FORMS = {"published": 2, "extended": 4}  # form -> most Gaussians of a density
 MOVES = 0.01  # of the largest move: what moves less does not count as displaced
 NEAR = 0.01  # m around what is displaced; further off, one point in FAR shows whether anything leaks
 FAR = 4
+THIN = 3  # one in so many of the points that do not count
 HIDDEN = 0.1  # weight of what nobody sees
 AWAY = 0.14  # m from the middle of the eyes down to where no face moves
 
@@ -64,7 +66,7 @@ def fit_model(
     """
     if form not in FORMS:
         raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
-    mouth, jaw = _mouth(face), _jaw(face)
+    mouth, jaw = fit_mouth(face), _jaw(face)
     fitted: dict[int, UnitModel] = {}
     for au, one in measured.items():
         fitted[au] = _fit_unit(one, mouth, FORMS[form])
@@ -112,7 +114,8 @@ def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
     long = np.linalg.norm(one.moves, axis=1)
     d_max = float(long[one.seen].max())
     counts = one.seen & (long > MOVES * d_max)
-    miss = np.linalg.norm(unit.displacement(one.at[counts], mouth) - one.moves[counts], axis=1)
+    upper = None if one.upper is None else one.upper[counts]
+    miss = np.linalg.norm(unit.displacement(one.at[counts], mouth, upper) - one.moves[counts], axis=1)
     return Row(
         one.au, int(counts.sum()), float(long[counts].mean()), d_max, float(miss.mean()), float(miss.max())
     )
@@ -131,7 +134,7 @@ def _fit_unit(one: Measured, mouth: Mouth, most: int) -> UnitModel:
     weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
     if not units()[one.au].split:
         return UnitModel(one.au, {"whole": _fit_motion(at, moves, weight, size, most)})
-    upper = mouth.upper(at)
+    upper = mouth.upper(at) if one.upper is None else one.upper
     return UnitModel(
         one.au,
         {
@@ -151,9 +154,12 @@ def _fit_motion(at: Float64, moves: Float64, weight: Float64, size: float, most:
         return Motion(np.zeros(3), bell, still, still)
     low, high = at[moved].min(axis=0) - NEAR, at[moved].max(axis=0) + NEAR
     near = here & ((at > low) & (at < high)).all(axis=1)
-    far = np.flatnonzero(here & ~near & (at[:, 1] > -AWAY))[::FAR]
-    use = np.r_[np.flatnonzero(near), far]
-    weight = np.r_[weight[near], weight[far] * FAR]
+    # What does not count in the table is there to keep the functions tame: a part of it does.
+    tells = moved & (weight >= STILL)
+    near = np.flatnonzero(near & ~tells)[::THIN]
+    far = np.flatnonzero(here & (at[:, 1] > -AWAY) & ~((at > low) & (at < high)).all(axis=1))[::FAR]
+    use = np.r_[np.flatnonzero(tells), near, far]
+    weight = np.r_[weight[tells], weight[near] * THIN, weight[far] * FAR]
     share = weight * long[use]
     origin = share @ at[use] / share.sum()
     origin[0] = 0
@@ -161,22 +167,6 @@ def _fit_motion(at: Float64, moves: Float64, weight: Float64, size: float, most:
     gaussians = found.gaussians.copy()
     gaussians[:, 0] *= size
     return Motion(origin, gaussians, found.alpha, found.beta)
-
-
-def _mouth(face: Face) -> Mouth:
-    """The line between the lips through the inner feature points, out to the corner of the lips."""
-    point = face.points
-    line = [
-        (point["2.2"] + point["2.3"]) / 2,
-        (point["2.6"] + point["2.8"]) / 2,
-        point["2.4"],
-        point["8.3"],
-    ]
-    x, y = np.array(line, np.float64)[:, :2].T
-    x[0] = 0
-    if (np.diff(x) <= 0).any():
-        raise FaceError(f"{face.name}: wanted feature points 2.2, 2.6, 2.4 and 8.3 further and further left")
-    return Mouth(x, y)
 
 
 def _head(face: Face) -> HeadTurn:

@@ -18,7 +18,7 @@ from realizer.tables import read_csv
 __all__ = ["Measured", "read_measured", "read_shapes", "write_shapes"]
 
 FINE = 1e-5  # m; the shapes are stored in whole multiples of it
-ARRAYS = {"at": 2, "seen": 1, "au": 1, "moves": 3}
+ARRAYS = {"at": 2, "seen": 1, "upper": 1, "au": 1, "moves": 3}
 FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided
 
 
@@ -31,12 +31,14 @@ class Measured:
         at: (n, 3) metres, the landmarks on the neutral face.
         moves: (n, 3) metres, where each goes.
         seen: (n,) whether one can see it: what is hidden counts little in a fit and not in its table.
+        upper: (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
     """
 
     au: int
     at: Float64
     moves: Float64
     seen: Bool
+    upper: Float64 | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +96,15 @@ def read_shapes(path: Path) -> dict[int, Measured]:
     """
     stored = read_arrays(path, ARRAYS)
     at, moves = stored["at"].astype(np.float64), stored["moves"]
-    if moves.shape != (len(stored["au"]), *at.shape) or len(stored["seen"]) != len(at):
+    if moves.shape != (len(stored["au"]), *at.shape) or {len(stored["seen"]), len(stored["upper"])} != {
+        len(at)
+    }:
         raise FaceError(
             f"{path}: wanted moves of {(len(stored['au']), *at.shape)}, got {moves.shape}; make it again"
         )
+    seen, upper = stored["seen"].astype(bool), stored["upper"].astype(np.float64)
     return {
-        int(au): Measured(int(au), at, move.astype(np.float64) * FINE, stored["seen"].astype(bool))
+        int(au): Measured(int(au), at, move.astype(np.float64) * FINE, seen, upper)
         for au, move in zip(stored["au"], moves, strict=True)
     }
 
@@ -107,9 +112,12 @@ def read_shapes(path: Path) -> dict[int, Measured]:
 def write_shapes(path: Path, measured: Mapping[int, Measured]) -> None:
     """Store measurements that share their landmarks."""
     first = next(iter(measured.values()))
+    if first.upper is None:
+        raise ValueError("wanted shapes whose halves are known, got landmarks")
     arrays: dict[str, Any] = {
         "at": first.at.astype(np.float32),
         "seen": first.seen,
+        "upper": np.asarray(first.upper, np.float32),
         "au": np.array(list(measured), np.int32),
         "moves": np.stack([np.rint(one.moves / FINE) for one in measured.values()]).astype(np.int16),
     }

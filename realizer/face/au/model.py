@@ -10,9 +10,10 @@ import numpy as np
 from realizer.arrays import Float64
 from realizer.face.au.functions import angle, density, direction
 
-__all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "turned"]
+__all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "rotation", "turned"]
 
 CENTIMETRE = 0.01  # m; the unit of the functions' coordinates, in which their parameters are near 1
+BENT = 0.008  # m before and behind the line between the lips; beyond it the mouth's plane is level
 SIDES = 0.008  # m; the halves of an action unit shown on one side fade into each other over twice this
 
 
@@ -52,18 +53,26 @@ class Mouth:
     """Where the upper half of the face ends: her plane through the corners of the mouth, bent along the lips.
 
     Attributes:
-        x: (k,) metres from the middle, from 0 to the corner; y: (k,) height of the line between the lips.
+        x: (k,) metres from the middle, from 0 to the corner.
+        y, z: (k,) metres, where the lips meet in front; slope: (k,) how the plane rises from there with z.
     """
 
     x: Float64
     y: Float64
+    z: Float64
+    slope: Float64
+
+    def above(self, at: Float64) -> Float64:
+        """(n,) metres that points (n, 3) lie above it."""
+        across = np.abs(at[:, 0])
+        y, z, slope = (np.interp(across, self.x, line) for line in (self.y, self.z, self.slope))
+        # Deep in the mouth, and on the cheeks' bulge, the plane goes on level.
+        return np.asarray(at[:, 1] - y - slope * np.clip(at[:, 2] - z, -BENT, BENT))
 
     def upper(self, at: Float64) -> Float64:
         """(n,) 1 above, 0 below; beyond the corners the halves fade over, or the cheek would tear."""
-        across = np.abs(at[:, 0])
-        high = at[:, 1] - np.interp(across, self.x, self.y)
-        fade = np.maximum(across - self.x[-1], 0) + 1e-9
-        share = np.clip(high / fade / 2 + 0.5, 0, 1)
+        fade = np.maximum(np.abs(at[:, 0]) - self.x[-1], 0) + 1e-9
+        share = np.clip(self.above(at) / fade / 2 + 0.5, 0, 1)
         return np.asarray(share * share * (3 - 2 * share))
 
 
@@ -80,11 +89,15 @@ class UnitModel:
     motions: Mapping[str, Motion]
     jaw_degrees: float = 0.0
 
-    def displacement(self, at: Float64, mouth: Mouth) -> Float64:
-        """(n, 3) metres that points (n, 3) of the face are moved with full intensity."""
+    def displacement(self, at: Float64, mouth: Mouth, upper: Float64 | None = None) -> Float64:
+        """(n, 3) metres that points (n, 3) of the face are moved with full intensity.
+
+        Args:
+            upper: (n,) how far each belongs to the upper half, where a mesh's topology tells.
+        """
         if "whole" in self.motions:
             return self.motions["whole"](at)
-        share = mouth.upper(at)[:, None]
+        share = (mouth.upper(at) if upper is None else upper)[:, None]
         return np.asarray(share * self.motions["upper"](at) + (1 - share) * self.motions["lower"](at))
 
 
@@ -129,23 +142,28 @@ class Model:
     units: Mapping[int, UnitModel]
     degrees: Mapping[int, float] = field(default_factory=dict)
 
-    def displacement(self, au: int, at: Float64, side: str = "") -> Float64:
+    def displacement(self, au: int, at: Float64, side: str = "", upper: Float64 | None = None) -> Float64:
         """(n, 3) metres that a displacement unit moves points (n, 3) of the face with full intensity.
 
         Args:
             side: "L" or "R" for one side alone, as the character has it.
+            upper: (n,) how far each point belongs to the upper half; None: by the mouth's plane.
         """
-        moves = self.units[au].displacement(at, self.mouth)
+        moves = self.units[au].displacement(at, self.mouth, upper)
         if not side:
             return moves
         share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
         return np.asarray(moves * (share * share * (3 - 2 * share))[:, None])
 
 
+def rotation(axis: tuple[float, float, float], radians: float) -> Float64:
+    """(3, 3) right-handed turn about a unit vector."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], np.float64)
+    return np.asarray(np.eye(3) + np.sin(radians) * cross + (1 - np.cos(radians)) * cross @ cross)
+
+
 def turned(at: Float64, axis: tuple[float, float, float], radians: float, pivot: object) -> Float64:
     """Points (n, 3) turned right-handed about an axis through the pivot."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turn = np.eye(3) + np.sin(radians) * cross + (1 - np.cos(radians)) * cross @ cross
     centre = np.asarray(pivot, np.float64)
-    return np.asarray((at - centre) @ turn.T + centre)
+    return np.asarray((at - centre) @ rotation(axis, radians).T + centre)

@@ -11,6 +11,7 @@ from realizer.arrays import Float64
 from realizer.errors import FaceError
 from realizer.face import hm08
 from realizer.face.au.measure import Measured
+from realizer.face.au.mouth import fit_mouth, shares
 from realizer.face.au.units import units
 from realizer.face.ground import Ground
 from realizer.face.lips import Lips, close_lips
@@ -57,6 +58,7 @@ def measure_shapes(face: Face, folder: Path, data: Path) -> dict[int, Measured]:
     known = (off < 1e-4)[:, None]
     lips = Lips(even)
     seen = (face.occlusion[first:last][half] > OPEN) | (lips.lips[index] > 0.5)
+    upper = shares(face, fit_mouth(face))[first:last][half]
     out = {}
     for unit in units().values():
         if unit.kind == "displacement":
@@ -65,7 +67,7 @@ def measure_shapes(face: Face, folder: Path, data: Path) -> dict[int, Measured]:
                 for side in _sides(data, name):
                     shape += weight * hm08.read_target(data, side, len(at)) * hm08.DECIMETRE
             shape = (shape + shape[twin] * EVEN) / 2
-            out[unit.au] = Measured(unit.au, skin, np.where(known, shape[index], 0), seen)
+            out[unit.au] = Measured(unit.au, skin, np.where(known, shape[index], 0), seen, upper)
     return out
 
 

@@ -1,0 +1,49 @@
+"""The two halves of a face: told apart by its topology, and by a plane."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realizer.errors import FaceError
+from realizer.face import load_face
+from realizer.face.au.mouth import LOWER, UPPER, fit_mouth, halves
+
+
+def test_the_lips_feature_points_fall_on_their_own_sides() -> None:
+    face = load_face()
+    index, upper = halves(face)
+    side = dict(zip(index.tolist(), upper.tolist(), strict=True))
+    assert all(side[face.feature_points[name]] for name in UPPER)
+    assert not any(side[face.feature_points[name]] for name in LOWER)
+
+
+def test_the_plane_tells_the_lips_apart_nearly_as_well_as_the_topology() -> None:
+    face = load_face()
+    mouth = fit_mouth(face)
+    index, upper = halves(face)
+    at = face.vertices[index].astype(np.float64)
+    inner = np.abs(at[:, 0]) < mouth.x[-1]
+    wrong = (mouth.upper(at) > 0.5) != upper
+    assert (wrong & inner).sum() < 0.05 * inner.sum()
+    # Those that it gets wrong lie on the line itself.
+    assert np.abs(mouth.above(at[wrong & inner])).max() < 0.0015
+
+
+def test_beyond_the_corners_the_halves_fade_over() -> None:
+    mouth = fit_mouth(load_face())
+    x, y, z = mouth.x[-1] + 0.01, mouth.y[-1], mouth.z[-1]
+    steps = np.array([[x, y + d, z] for d in np.linspace(-0.012, 0.012, 25)])
+    share = mouth.upper(steps)
+    assert share[0] == 0
+    assert share[-1] == 1
+    assert (np.diff(share) >= 0).all()
+    assert np.diff(share).max() < 0.12
+
+
+def test_feature_points_in_the_wrong_order_are_told() -> None:
+    face = load_face()
+    points = dict(face.points)
+    points["2.4"], points["2.5"] = points["2.5"], points["2.4"]
+    with pytest.raises(FaceError, match=r"further and further left"):
+        fit_mouth(replace(face, points=points))
