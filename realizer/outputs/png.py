@@ -65,7 +65,7 @@ def row_at(realization: Realization, seconds: float) -> Float32:
 
 
 def encode_png(pixels: UInt8) -> bytes:
-    """PNG bytes of (h, w, 3) uint8."""
+    """PNG bytes of (h, w, 3) uint8, or of (h, w, 4) with alpha."""
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -79,7 +79,7 @@ def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
     from realizer.render.sheets import sheet
 
     if drawing.at is not None:
-        with Renderer(realization.face_name, drawing.size, drawing.camera) as renderer:
+        with Renderer(realization.face_name, drawing.size, drawing.camera, alpha=True) as renderer:
             (picture,) = renderer.draw(row_at(realization, drawing.at)[None])
         write_bytes(path, encode_png(picture))
         return

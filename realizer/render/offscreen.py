@@ -10,7 +10,7 @@ import numpy as np
 from realizer.arrays import Float32, UInt8
 from realizer.errors import RenderError
 from realizer.face.model import Face
-from realizer.render.backdrop import backdrop, over
+from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera
 from realizer.render.figure import Figure
 from realizer.render.light import Light
@@ -28,8 +28,15 @@ class Canvas:
     out a vertex, in numpy, and drawn flat: four times as fast as a lit shader on a software GL.
     """
 
-    def __init__(self, face: Face, size: tuple[int, int], camera: Camera, light: Light) -> None:
-        """Opens a GL context.
+    def __init__(
+        self,
+        face: Face,
+        size: tuple[int, int],
+        camera: Camera,
+        light: Light,
+        background: str | None = None,
+    ) -> None:
+        """Opens a GL context; `background` as `backdrop` takes it.
 
         Raises:
             RenderError: no pyrender or no GL; the text says what to install.
@@ -37,7 +44,8 @@ class Canvas:
         pyrender = _pyrender()
         self.size = size
         self._figure = Figure(face, camera, light)
-        self._backdrop = backdrop(size, light)
+        self._backdrop = backdrop(size, light, background)
+        self._channels = channels(background)
         vertices = self._figure.points
         # x y z r g b a, as pyrender lays a primitive of positions and colours out in its one buffer.
         self._interleaved = np.ones((len(vertices), 7), np.float32)
@@ -56,7 +64,7 @@ class Canvas:
         self._offscreen.render(self._scene, self._flags)  # uploads the buffers that `draw` overwrites
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """(h, w, 3) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out` if given."""
+        """(h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out`."""
         from OpenGL import GL
 
         self._figure.pose(vertices, normals)
@@ -66,7 +74,7 @@ class Canvas:
         GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._interleaved.nbytes, self._interleaved)
         pixels: UInt8 = self._offscreen.render(self._scene, self._flags)
         if out is None:
-            out = np.empty((*pixels.shape[:2], 3), np.uint8)
+            out = np.empty((*pixels.shape[:2], self._channels), np.uint8)
         return over(pixels, self._backdrop, out)
 
     def close(self) -> None:

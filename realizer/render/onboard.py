@@ -6,7 +6,7 @@ import numpy as np
 
 from realizer.arrays import Float32, UInt8
 from realizer.face.model import Face
-from realizer.render.backdrop import backdrop, over
+from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera
 from realizer.render.figure import Figure
 from realizer.render.light import Light
@@ -19,17 +19,30 @@ class OnboardCanvas:
     """A head drawn by the processor: the same points, colours, camera and backdrop as by OpenGL."""
 
     def __init__(
-        self, face: Face, size: tuple[int, int], camera: Camera, light: Light, *, smooth: bool = True
+        self,
+        face: Face,
+        size: tuple[int, int],
+        camera: Camera,
+        light: Light,
+        background: str | None = None,
+        *,
+        smooth: bool = True,
     ) -> None:
-        """Nothing is drawn yet; `smooth` is four samples a pixel, otherwise one."""
+        """Nothing is drawn yet.
+
+        Args:
+            background: as `backdrop` takes it.
+            smooth: four samples a pixel, otherwise one.
+        """
         self.size = size
         self._camera = camera
         self._figure = Figure(face, camera, light)
-        self._backdrop = backdrop(size, light)
+        self._backdrop = backdrop(size, light, background)
+        self._channels = channels(background)
         self._raster = Raster(size, smooth=smooth)
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """(h, w, 3) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out` if given.
+        """(h, w, 3 or 4) uint8, row 0 at the top, of (n, 3) vertices and unit normals; into `out` if given.
 
         Raises:
             RenderError: no numba.
@@ -41,7 +54,7 @@ class OnboardCanvas:
         nearness = np.where(distances > self._camera.near, 1 / distances, np.nan).astype(np.float32)
         pixels = self._raster(places, nearness, figure.triangles, figure.colours)
         if out is None:
-            out = np.empty((*pixels.shape[:2], 3), np.uint8)
+            out = np.empty((*pixels.shape[:2], self._channels), np.uint8)
         return over(pixels, self._backdrop, out)
 
     def close(self) -> None:

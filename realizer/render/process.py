@@ -47,6 +47,8 @@ class Renderer:
         camera: str = "front",
         *,
         light: str | None = None,
+        background: str | None = None,
+        alpha: bool = False,
         way: str | None = None,
     ) -> None:
         """Nothing starts yet.
@@ -56,27 +58,31 @@ class Renderer:
             size: width, height in pixels.
             camera: a preset, or a camera of the face.
             light: a preset; None is what REALIZER_LIGHT says, or "portrait".
+            background: "#rrggbb" or "transparent"; None is what REALIZER_BACKGROUND says, or the light's own.
+            alpha: the caller takes pictures of four channels, should REALIZER_BACKGROUND say "transparent".
             way: "gl", "onboard" or "auto"; None is what REALIZER_DRAW says, or "auto".
         """
         width, height = size
         if not (1 <= width <= 8192 and 1 <= height <= 8192):
             raise ValueError(f"size: wanted 1..8192 pixels each way, got {width}x{height}")
         self.face, self.size, self.camera = face, size, camera
-        self.light = light
+        self.light, self._background, self._alpha = light, background, alpha
         self.way = way or os.environ.get(DRAW) or "auto"
-        self._half = max(1, min(HALF, HALF_BYTES // (width * height * 3)))
+        self._half = max(1, min(HALF, HALF_BYTES // (width * height * 4)))
         self._lock = threading.Lock()
         self._process: _Process | None = None
 
     def draw(self, faps: Float32) -> UInt8:
-        """(n, h, w, 3) uint8, row 0 at the top, of (n, 68) FAPs.
+        """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, 68) FAPs.
 
         Raises:
             ValueError: not (n, 68).
             RenderError: no GL, no such face or camera, or the process died; says what to do.
         """
+        from realizer.render.backdrop import channels
+
         rows = _rows(faps)
-        pixels = np.empty((len(rows), self.size[1], self.size[0], 3), np.uint8)
+        pixels = np.empty((len(rows), self.size[1], self.size[0], channels(self.background)), np.uint8)
         for k, picture in enumerate(self.frames(rows)):
             pixels[k] = picture
         return pixels
@@ -130,6 +136,17 @@ class Renderer:
         return encoded
 
     @property
+    def background(self) -> str | None:
+        """What stands behind: None is the light's own gradient.
+
+        Raises:
+            RenderError: neither a colour nor "transparent".
+        """
+        from realizer.render.backdrop import colour_of
+
+        return colour_of(self._background, alpha=self._alpha)
+
+    @property
     def pid(self) -> int | None:
         """The drawing process, while there is one."""
         return None if self._process is None else self._process.pid
@@ -149,11 +166,13 @@ class Renderer:
 
     def _started(self) -> _Process:
         if self._process is None:
+            from realizer.render.backdrop import channels
             from realizer.render.wire import Open, Pixels
 
             slots = 2 * self._half
-            path = Pixels.create(slots, self.size)
-            order = Open(self.face, self.size, self.camera, path, slots, self.light, self.way)
+            behind = self.background
+            path = Pixels.create(slots, self.size, channels(behind))
+            order = Open(self.face, self.size, self.camera, path, slots, self.light, self.way, behind)
             self._process = _Process(order)
         return self._process
 
@@ -169,6 +188,7 @@ class _Process:
     pixels: Pixels
 
     def __init__(self, order: Open) -> None:
+        from realizer.render.backdrop import channels
         from realizer.render.wire import Pixels, connection
 
         try:
@@ -184,7 +204,7 @@ class _Process:
             self._end = weakref.finalize(self, _end, self._popen, self._orders, self._answers)
             self.pid = self._popen.pid
             try:
-                self.pixels = Pixels(order.memory, order.slots, order.size)
+                self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
                 self.send(order)
                 self.way = self.receive()
             except BaseException:

@@ -24,18 +24,24 @@ class Drawer(Protocol):
     """What every canvas can do."""
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
-        """(h, w, 3) uint8 of (n, 3) vertices and unit normals, into `out` if given."""
+        """(h, w, 3) uint8, (h, w, 4) where transparent, of (n, 3) vertices and unit normals."""
 
     def close(self) -> None:
         """Free what it holds."""
 
 
 def open_canvas(
-    face: Face, size: tuple[int, int], camera: Camera, light: Light, way: str = "auto"
+    face: Face,
+    size: tuple[int, int],
+    camera: Camera,
+    light: Light,
+    background: str | None = None,
+    way: str = "auto",
 ) -> tuple[str, Drawer]:
     """The way that was taken, and its canvas.
 
     Args:
+        background: as `realizer.render.backdrop.backdrop` takes it.
         way: one of WAYS; "auto" takes what is faster here, and the other one where that is missing.
 
     Raises:
@@ -46,7 +52,7 @@ def open_canvas(
     faults = []
     for name in _order(Path("/dev")) if way == "auto" else (way,):
         try:
-            return name, OPENERS[name](face, size, camera, light)
+            return name, OPENERS[name](face, size, camera, light, background)
         except RenderError as error:
             faults.append(str(error))
     raise RenderError("; or: ".join(faults))
@@ -57,22 +63,24 @@ def _order(devices: Path) -> tuple[str, ...]:
     return ("gl", "onboard") if card else ("onboard", "gl")
 
 
-def _gl(face: Face, size: tuple[int, int], camera: Camera, light: Light) -> Drawer:
+def _gl(face: Face, size: tuple[int, int], camera: Camera, light: Light, background: str | None) -> Drawer:
     from realizer.render.offscreen import Canvas
 
-    return Canvas(face, size, camera, light)
+    return Canvas(face, size, camera, light, background)
 
 
-def _onboard(face: Face, size: tuple[int, int], camera: Camera, light: Light) -> Drawer:
+def _onboard(
+    face: Face, size: tuple[int, int], camera: Camera, light: Light, background: str | None
+) -> Drawer:
     from realizer.render.onboard import OnboardCanvas
     from realizer.render.raster import ready
 
     if fault := ready():
         raise RenderError(fault)
-    return OnboardCanvas(face, size, camera, light)
+    return OnboardCanvas(face, size, camera, light, background)
 
 
-OPENERS: Mapping[str, Callable[[Face, tuple[int, int], Camera, Light], Drawer]] = {
+OPENERS: Mapping[str, Callable[[Face, tuple[int, int], Camera, Light, str | None], Drawer]] = {
     "gl": _gl,
     "onboard": _onboard,
 }

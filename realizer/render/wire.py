@@ -28,6 +28,7 @@ class Open:
     slots: int
     light: str | None
     way: str
+    background: str | None
 
 
 @dataclass(frozen=True)
@@ -57,25 +58,25 @@ Message = Open | Draw | Jpeg
 
 
 class Pixels:
-    """(slots, h, w, 3) uint8 in memory that two processes map.
+    """(slots, h, w, 3 or 4) uint8 in memory that two processes map.
 
     A file that is unlinked as soon as both have it open, so a killed process leaves nothing behind;
     `multiprocessing.shared_memory` would leave its segment, or a warning about it.
     """
 
-    def __init__(self, path: str, slots: int, size: tuple[int, int]) -> None:
+    def __init__(self, path: str, slots: int, size: tuple[int, int], channels: int = 3) -> None:
         width, height = size
         with Path(path).open("r+b") as file:
-            self._map = mmap.mmap(file.fileno(), slots * height * width * 3)
-        self.array: UInt8 = np.frombuffer(self._map, np.uint8).reshape(slots, height, width, 3)
+            self._map = mmap.mmap(file.fileno(), slots * height * width * channels)
+        self.array: UInt8 = np.frombuffer(self._map, np.uint8).reshape(slots, height, width, channels)
 
     @staticmethod
-    def create(slots: int, size: tuple[int, int]) -> str:
+    def create(slots: int, size: tuple[int, int], channels: int = 3) -> str:
         """Path of a new file of the right length, in memory where the system has such a folder."""
         folder = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
         handle, path = tempfile.mkstemp(prefix="realizer-", dir=folder)
         with os.fdopen(handle, "wb") as file:
-            file.truncate(slots * size[0] * size[1] * 3)
+            file.truncate(slots * size[0] * size[1] * channels)
         return path
 
 

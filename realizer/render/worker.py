@@ -12,6 +12,7 @@ import numpy as np
 from realizer.arrays import Float32, UInt8
 from realizer.errors import RealizerError
 from realizer.face.model import Face
+from realizer.render.backdrop import channels
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.ways import open_canvas
@@ -29,9 +30,14 @@ class Artist:
         from realizer.face import load_face
 
         self.face = load_face(order.face) if isinstance(order.face, str) else order.face
-        self.pixels = Pixels(order.memory, order.slots, order.size)
+        self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         self.way, self.canvas = open_canvas(
-            self.face, order.size, camera_for(self.face, order.camera), preset(order.light), order.way
+            self.face,
+            order.size,
+            camera_for(self.face, order.camera),
+            preset(order.light),
+            order.background,
+            order.way,
         )
 
     def draw(self, rows: Float32, first: int) -> int:
@@ -55,8 +61,8 @@ def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
 
 
 def encode_jpeg(pixels: UInt8, quality: int) -> bytes:
-    """JPEG of (h, w, 3) uint8; simplejpeg is twice as fast as Pillow and optional."""
-    pixels = np.ascontiguousarray(pixels)
+    """JPEG of (h, w, 3) uint8, or of the first three of four; simplejpeg is twice as fast as Pillow."""
+    pixels = np.ascontiguousarray(pixels[..., :3])
     try:
         import simplejpeg
     except ModuleNotFoundError:
@@ -114,7 +120,7 @@ def check(way: str) -> int:
 
     face = triangle()
     try:
-        taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), way)
+        taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), way=way)
         canvas.draw(face.vertices, np.zeros_like(face.vertices))
         canvas.close()
     except RenderError as error:

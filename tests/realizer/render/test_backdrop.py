@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from realizer.render.backdrop import backdrop, over
+from realizer.errors import RenderError
+from realizer.render.backdrop import backdrop, channels, colour_of, over
 from realizer.render.light import preset
 
 
@@ -23,3 +25,28 @@ def test_half_covered_pixels_are_half_of_each():
     out = np.zeros((1, 3, 3), np.uint8)
     assert over(pixels, behind, out) is out
     assert out[0].tolist() == [[200] * 3, [50 + 100] * 3, [9, 8, 7]]
+
+
+def test_over_nothing_colours_are_whole_and_alpha_says_how_much():
+    pixels = np.array([[[0, 0, 0, 0], [50, 25, 100, 128], [9, 8, 7, 255]]], np.uint8)
+    out = over(pixels, backdrop((3, 1), preset(), "transparent"), np.zeros((1, 3, 4), np.uint8))
+    assert out[0].tolist() == [[0, 0, 0, 0], [100, 50, 199, 128], [9, 8, 7, 255]]
+
+
+def test_one_colour_fills_the_picture():
+    assert (backdrop((4, 3), preset(), "#12ab00") == (0x12, 0xAB, 0x00, 255)).all()
+
+
+@pytest.mark.parametrize("says", ["white", "#12345", "#12345g", "#123456 "])
+def test_what_is_no_colour_is_refused(says):
+    with pytest.raises(RenderError, match="wanted transparent or a colour such as #d8dde2"):
+        colour_of(says)
+
+
+def test_the_variable_counts_where_nothing_is_asked_for(monkeypatch):
+    assert colour_of(None) is None
+    monkeypatch.setenv("REALIZER_BACKGROUND", "transparent")
+    assert colour_of(None) == "transparent"
+    assert colour_of(None, alpha=False) is None
+    assert colour_of("#ffffff") == "#ffffff"
+    assert [channels(b) for b in (None, "#ffffff", "transparent")] == [3, 3, 4]

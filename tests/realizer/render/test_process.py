@@ -17,7 +17,7 @@ from PIL import Image
 
 import realizer
 from realizer.errors import RenderError
-from realizer.render import Renderer
+from realizer.render import Renderer, available
 
 SIZE = (96, 80)
 
@@ -241,3 +241,26 @@ def test_jpeg_without_simplejpeg_is_written_by_pillow(tmp_path):
     env = {**os.environ, "PYTHONPATH": str(Path(realizer.__path__[0]).parent)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=env)
     assert np.asarray(Image.open(io.BytesIO(done.stdout))).shape == (20, 30, 3)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("way", ["gl", "onboard"])
+def test_a_transparent_picture_is_the_opaque_one_without_its_backdrop(way):
+    if missing := available(way):
+        pytest.skip(missing)
+    with Renderer("default", SIZE, background="#000000", way=way) as renderer:
+        black = renderer.draw(rows(2)).astype(int)
+    with Renderer("default", SIZE, background="transparent", way=way) as renderer:
+        clear = renderer.draw(rows(2)).astype(int)
+        assert Image.open(io.BytesIO(renderer.jpeg(rows(1)[0]))).mode == "RGB"
+    assert clear.shape == (2, 80, 96, 4)
+    assert clear[0, 0, 0, 3] == 0
+    assert np.abs(clear[..., :3] * clear[..., 3:] / 255 - black).max() <= 2
+
+
+@pytest.mark.gl
+def test_another_light_is_another_picture(renderer):
+    with Renderer("default", SIZE, light="evening") as evening:
+        assert evening.draw(rows(1)).mean() < renderer.draw(rows(1)).mean() - 15
+    with Renderer("default", SIZE, light="noon") as noon, pytest.raises(RenderError, match="light: wanted"):
+        noon.draw(rows(1))
