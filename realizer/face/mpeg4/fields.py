@@ -17,7 +17,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.errors import FaceError
-from realizer.face.mpeg4.truth import WAYS
+from realizer.face.mpeg4.measure import WAYS
 from realizer.face.mpeg4.zones import Setup, Zone
 from realizer.tables import faps, read_csv
 
