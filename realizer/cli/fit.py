@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from realizer.errors import FaceError
+
 __all__: list[str] = []
 
 SHAPES = "au_shapes.npz"
@@ -56,8 +58,13 @@ def fit(name: str, measurements: Path | None, data: Path | None, form: str, outp
         write_shapes(folder / SHAPES, measured)
     elif measurements:
         measured, source = read_measured(measurements), f"measured landmarks, {measurements.name}"
-    else:
+    elif (folder / SHAPES).is_file():
         measured = read_shapes(folder / SHAPES)
+    else:
+        raise FaceError(
+            f"{folder / SHAPES}: wanted this face's own shapes, found none; "
+            "give landmarks with --from, or the data it was built from with --data"
+        )
     done = 0
 
     def say(words: str) -> None:

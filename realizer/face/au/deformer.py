@@ -23,6 +23,7 @@ __all__ = ["Deformer", "load_deformer"]
 MODEL = "au_extended.toml"
 # Whatever else a face is built from moves with the head alone.
 FACE = ("skin", "brows", "lashes", "hair")
+GROWN = ("brows", "lashes")
 JAW = ("lower_teeth", "tongue")
 EYES = ("left_eye", "right_eye")
 LIDS = ("5", "6", "7", "9", "43")  # what moves the lids
@@ -54,6 +55,7 @@ class Deformer:
         moves = np.zeros((len(names), *at.shape))
         for row, (au, side) in zip(moves, names, strict=True):
             row[mine] = model.displacement(au, at[mine], side, upper[mine])
+        self._grow(moves)
         moves[np.abs(moves).max(axis=2) < LEAST] = 0
         found = np.flatnonzero(moves.any(axis=(0, 2)))
         self._moving = slice(int(found[0]), int(found[-1]) + 1)
@@ -104,6 +106,18 @@ class Deformer:
         for k, name in enumerate(self.columns):
             out[k] = values.get(int(name.rstrip("LR")), 0)
         return out
+
+    def _grow(self, moves: Float64) -> None:
+        """Brows and lashes go with the skin that they grow on: off it, functions of the place differ."""
+        from scipy.spatial import cKDTree
+
+        first, last = self.face.parts["skin"]
+        tree = cKDTree(self.face.vertices[first:last])
+        for part in GROWN:
+            if part in self.face.parts:
+                mine = slice(*self.face.parts[part])
+                root = np.asarray(tree.query(self.face.vertices[mine])[1])
+                moves[:, mine] = moves[:, first + root]
 
     def _turn(self, row: Float32, lids: bool, vertices: Float32) -> None:
         """Jaw bone, lids over eyeballs, eyeballs, head: what is an object's own first (5.1)."""

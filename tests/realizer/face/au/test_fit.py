@@ -1,5 +1,6 @@
 """Fitting: a model that is known is found again from landmarks, and bad measurements get a message."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -81,13 +82,28 @@ def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path:
         capture_output=True,
         text=True,
         check=False,
-        env=None,
     )
     assert done.returncode == 0, done.stderr
     assert "AU2" in done.stdout
     assert "e/d_max" in done.stdout
     assert "1/1 AU2" in done.stderr
     assert set(read_model(tmp_path / "mine.toml").units) == {2}
+
+
+def test_a_face_without_shapes_says_what_to_give(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from realizer.cli.fit import fit
+
+    folder = next(info.path for info in list_faces() if info.name == load_face().name)
+    copy = Path(shutil.copytree(folder, tmp_path / "bare"))
+    (copy / "au_shapes.npz").unlink()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("REALIZER_FACES", str(tmp_path))
+        done = CliRunner().invoke(fit, ["bare", "-o", str(tmp_path / "model.toml")])
+    assert isinstance(done.exception, FaceError)
+    assert "--from" in str(done.exception)
+    assert not (tmp_path / "model.toml").exists()
 
 
 @pytest.mark.parametrize(
