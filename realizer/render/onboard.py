@@ -58,4 +58,5 @@ class OnboardCanvas:
         return over(pixels, self._backdrop, out)
 
     def close(self) -> None:
-        """Nothing to free."""
+        """End its threads."""
+        self._raster.close()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,6 +21,7 @@ NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-real
 # one column, as graphics cards place four.
 PLAIN = (0.5,)
 SMOOTH = (0.375, 0.875, 0.125, 0.625)
+THREADS = 4  # at most
 
 
 class Raster:
@@ -36,6 +40,11 @@ class Raster:
         self._nearest = np.zeros((rows, width), np.float32)
         self._tones = np.zeros((rows, width), np.uint32)
         self._picture = np.zeros((height, width), np.uint32)
+        # A band of rows for each processor: the loops let go of Python's lock.
+        bands = max(1, min(THREADS, os.cpu_count() or 1, height))
+        edges = [height * k // bands for k in range(bands + 1)]
+        self._bands = list(pairwise(edges))
+        self._pool = ThreadPoolExecutor(bands)
 
     def __call__(self, points: Any, nearness: Float32, triangles: Int32, colours: Float32) -> UInt8:
         """(h, w, 4) uint8, premultiplied, row 0 at the top; valid until the next call.
@@ -50,19 +59,24 @@ class Raster:
             RenderError: no numba; the text says what to install.
         """
         fill, mean = _compiled()
-        self._nearest.fill(0)
-        self._tones.fill(0)
-        fill(
-            np.ascontiguousarray(points, np.float64),
-            np.ascontiguousarray(nearness, np.float32),
-            triangles,
-            np.ascontiguousarray(colours * np.float32(254.9) + np.float32(0.52), np.float32),
-            self._samples,
-            self._nearest,
-            self._tones,
-        )
-        mean(self._tones, len(self._samples), self._picture)
+        points = np.ascontiguousarray(points, np.float64)
+        nearness = np.ascontiguousarray(nearness, np.float32)
+        # Samples lie inside their triangle: no tone leaves its corners' by more than rounding.
+        tones = np.ascontiguousarray(colours * np.float32(254.9) + np.float32(0.52), np.float32)
+
+        def band(rows: tuple[int, int]) -> None:
+            first, last = (n * len(self._samples) for n in rows)
+            self._nearest[first:last] = 0
+            self._tones[first:last] = 0
+            fill(points, nearness, triangles, tones, self._samples, first, last, self._nearest, self._tones)
+            mean(self._tones[first:last], len(self._samples), self._picture[slice(*rows)])
+
+        list(self._pool.map(band, self._bands))
         return self._picture.view(np.uint8).reshape(*self._picture.shape, 4)
+
+    def close(self) -> None:
+        """End its threads."""
+        self._pool.shutdown()
 
 
 def ready() -> str | None:
@@ -89,13 +103,22 @@ def _compiled() -> tuple[Callable[..., None], Callable[..., None]]:
 
 
 def _fill(
-    points: Any, nearness: Any, triangles: Any, colours: Any, samples: Any, nearest: Any, tones: Any
+    points: Any,
+    nearness: Any,
+    triangles: Any,
+    colours: Any,
+    samples: Any,
+    begin: int,
+    stop: int,
+    nearest: Any,
+    tones: Any,
 ) -> None:
     """Write each triangle's samples where nothing nearer is: nearness, and RGBA in one number.
 
-    Args as `Raster.__call__`, but colours 0.5..255.5; `nearest` and `tones` are (rows of samples, w).
+    Args as `Raster.__call__`, but colours 0.5..255.5; `nearest` and `tones` are (rows of samples, w), and
+    those rows from `begin` to `stop` are written.
     """
-    rows, width = nearest.shape
+    width = nearest.shape[1]
     per = len(samples)
     lowest, highest = np.empty(3), np.empty(3)  # rows that an edge spans
     slope, at = np.empty(3), np.empty(3)
@@ -109,8 +132,8 @@ def _fill(
         if not turn < 0:  # seen from behind, without area, or not a number
             continue
         # Half-open, so that what two triangles share belongs to one of them.
-        top = int(np.ceil(max((ay + min(0.0, uy, vy)) * per - 0.5, 0.0)))
-        end = int(np.ceil(min((ay + max(0.0, uy, vy)) * per - 0.5, float(rows))))
+        top = int(np.ceil(max((ay + min(0.0, uy, vy)) * per - 0.5, float(begin))))
+        end = int(np.ceil(min((ay + max(0.0, uy, vy)) * per - 0.5, float(stop))))
         if top >= end:
             continue
         for k in range(3):

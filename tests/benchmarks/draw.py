@@ -1,6 +1,6 @@
 """What a picture costs: medians in ms a frame, and film in frames a second.
 
-python tests/benchmarks/draw.py [--face NAME] [--size 512x512] [--frames 60]
+python tests/benchmarks/draw.py [--face NAME] [--size 512x512] [--way auto] [--frames 60]
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ import numpy as np
 
 from realizer.face import deform, load_face, normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
-from realizer.render import Renderer
+from realizer.render import Renderer, available
 from realizer.render.cameras import camera_for
+from realizer.render.figure import Figure
 from realizer.render.light import Shader, preset
 from realizer.render.offscreen import Canvas
+from realizer.render.onboard import OnboardCanvas
+from realizer.render.ways import WAYS
 from realizer.render.worker import encode_jpeg
 
 
@@ -41,6 +44,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--face", default="default")
     options.add_argument("--size", default="512x512")
+    options.add_argument("--way", default="auto", choices=WAYS)
     options.add_argument("--frames", type=int, default=60)
     chosen = options.parse_args()
     width, height = (int(n) for n in chosen.size.split("x"))
@@ -63,13 +67,22 @@ def main() -> None:
     line("normals, likewise", median(lambda: normals(face, vertices), 20) / 16)
     line("deform and normals, one frame alone", median(lambda: normals(face, deform(face, rows[:1])), 40))
     line("shade", median(lambda: shader(ups[0]), 100))
-    canvas = Canvas(face, size, camera, preset())
-    picture = canvas.draw(vertices[0], ups[0])
-    line("shade, upload, draw (MSAA x4), read back", median(lambda: canvas.draw(vertices[0], ups[0]), 60))
-    canvas.close()
+    figure = Figure(face, camera, preset())
+    line("shade, with furrows and glints", median(lambda: figure.pose(vertices[4], ups[4]), 60))
+    for smooth in (True, False):
+        own = OnboardCanvas(face, size, camera, preset(), smooth=smooth)
+        name = "four samples" if smooth else "one sample"
+        line(f"by the processor, {name} a pixel", median(lambda own=own: own.draw(vertices[0], ups[0]), 60))
+    picture = own.draw(vertices[0], ups[0])
+    if (missing := available("gl")) is None:
+        canvas = Canvas(face, size, camera, preset())
+        line("by OpenGL, four samples a pixel", median(lambda: canvas.draw(vertices[0], ups[0]), 60))
+        canvas.close()
+    else:
+        print(f"by OpenGL: {missing}")
     line("JPEG, quality 85", median(lambda: encode_jpeg(picture, 85), 60))
 
-    with Renderer(chosen.face, size) as renderer:
+    with Renderer(chosen.face, size, way=chosen.way) as renderer:
         line("Renderer.jpeg, one row, all of it", median(lambda: renderer.jpeg(rows[0]), 40))
         each = median(lambda: renderer.draw(rows), 3) / len(rows)
         line("Renderer.draw, a frame of a long call", each)
