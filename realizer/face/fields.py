@@ -111,12 +111,23 @@ def _brows(ground: Ground) -> dict[int, Float64]:
         middle = half * (1 - smooth(x, b, a)) * (1 - outer)
         for number, name, share in zip(numbers, names, (inner, middle, outer), strict=True):
             out[number] = scaled(profile * share[:, None], points[name], UP)
+    _soften(ground, out, [points[f"4.{k}"] for k in range(1, 7)])
     for number, name, side in ((37, "4.1", 1), (38, "4.2", -1)):
         x = at[:, 0] * side
         reach = ground.ellipsoid(ground.point(name), (0.030, 0.022, 0.03)) * smooth(x, 0.0, across[0])
         field = reach[:, None] * (-side * LEFT + 0.15 * FORWARD) * calm[:, None]
         out[number] = scaled(ground.smoothed(field, 1), points[name], -side * LEFT)
     return out
+
+
+def _soften(ground: Ground, fields: dict[int, Float64], points: list[int]) -> None:
+    """Take the kinks off fields; the vertices of feature points keep their moves, so each goes as asked."""
+    for number, field in fields.items():
+        soft = field
+        for _ in range(2):
+            soft = (soft + ground.smoothed(soft)) / 2
+            soft[points] = field[points]
+        fields[number] = soft
 
 
 def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:

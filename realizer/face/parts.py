@@ -116,7 +116,8 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     )
     # Dilation: the pupil's edge moves out, the iris gives way up to its rim.
     out = np.hypot(ball[:, 0], ball[:, 1]) * radius * 1000
-    share = np.where(out < PUPIL + 0.2, out / PUPIL, np.clip((IRIS - out) / (IRIS - PUPIL - 0.2), 0, 1))
+    edge = flat[1]  # the outermost ring that is black
+    share = np.where(out < edge + 1e-6, out / edge, np.clip((IRIS - out) / (IRIS - PUPIL - 0.2), 0, 1))
     ways = np.zeros_like(ball)
     ways[:, :2] = ball[:, :2] / np.maximum(np.hypot(ball[:, 0], ball[:, 1]), 1e-9)[:, None]
     # A unit of IRISD widens the pupil, both edges together, by that much: half at each edge.
