@@ -1,0 +1,49 @@
+"""Measuring a face by the shapes of the data it was built from: what is wrong is told by its file."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.errors import FaceError
+from realizer.face import list_faces, load_face
+from realizer.face.au import read_shapes
+from realizer.face.au.shapes import measure_shapes
+from realizer.face.au.units import units
+
+FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)
+
+
+def test_a_folder_without_the_data_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FaceError, match="MakeHuman base mesh"):
+        measure_shapes(load_face(), FOLDER, tmp_path)
+
+
+@pytest.mark.skipif("REALIZER_HEAD_DATA" not in os.environ, reason="wants the unpacked CC0 head data")
+def test_the_stored_shapes_are_what_the_data_say() -> None:
+    made = measure_shapes(load_face(), FOLDER, Path(os.environ["REALIZER_HEAD_DATA"]))
+    for au, stored in read_shapes(FOLDER / "au_shapes.npz").items():
+        assert stored.moves == pytest.approx(made[au].moves, abs=1e-5)
+
+
+def test_the_stored_shapes_go_where_their_units_names_say() -> None:
+    """Brows up for 1 and 2, down for 4; corners up for 12, down for 15; lids down for 43; jaw down for 27."""
+    measured = read_shapes(FOLDER / "au_shapes.npz")
+    ways = {1: 1, 2: 1, 4: -1, 5: 1, 6: 1, 10: 1, 12: 1, 15: -1, 16: -1, 27: -1, 43: -1}
+    for au, sign in ways.items():
+        one = measured[au]
+        long = np.where(one.seen, np.linalg.norm(one.moves, axis=1), 0)
+        assert sign * one.moves[np.argmax(long), 1] > 0.001, f"AU{au}"
+
+
+def test_the_table_of_units_is_hers() -> None:
+    table = units()
+    assert len(table) == 32
+    assert [unit.au for unit in table.values() if unit.kind == "eyes"] == [61, 62, 63, 64]
+    assert [unit.au for unit in table.values() if unit.kind == "head"] == [51, 52, 53, 54, 55, 56]
+    # Her sub-object action units (4.3.2) are all split.
+    assert all(table[au].split for au in (10, 16, 18, 22, 25, 27, 28))
+    for unit in table.values():
+        assert bool(unit.mixture) == (unit.kind == "displacement")
+        assert (np.linalg.norm(unit.axis) == 1) == (unit.kind != "displacement")
