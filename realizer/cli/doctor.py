@@ -26,7 +26,7 @@ def doctor() -> int:
 
 
 def _pictures() -> Iterator[Finding]:
-    from realizer.render.process import asked
+    from realizer.render.child import asked
 
     says = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
     way, fix = asked()

@@ -1,5 +1,6 @@
 """FAP rows become pictures: light, cameras, a canvas in a process of its own, contact sheets."""
 
-from realizer.render.process import Renderer, available
+from realizer.render.child import available
+from realizer.render.process import Renderer
 
 __all__ = ["Renderer", "available"]

@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import threading
-import weakref
 from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-import realizer
 from realizer.arrays import Float32, UInt8
 from realizer.errors import RenderError
 from realizer.face.model import Face
+from realizer.render.child import DRAW, Child
 
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
-
-    from realizer.render.wire import Message, Open, Pixels
-
-__all__ = ["Renderer", "available"]
+__all__ = ["Renderer"]
 
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it
-DRAW = "REALIZER_DRAW"
-PATIENCE = 60.0  # s; the longest answer, a start on a cold disk, takes about 3
 
 
 class Renderer:
@@ -70,7 +58,7 @@ class Renderer:
         self.way = way or os.environ.get(DRAW) or "auto"
         self._half = max(1, min(HALF, HALF_BYTES // (width * height * 4)))
         self._lock = threading.Lock()
-        self._process: _Process | None = None
+        self._process: Child | None = None
 
     def draw(self, faps: Float32) -> UInt8:
         """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, 68) FAPs.
@@ -164,7 +152,7 @@ class Renderer:
     ) -> None:
         self.close()
 
-    def _started(self) -> _Process:
+    def _started(self) -> Child:
         if self._process is None:
             from realizer.render.backdrop import channels
             from realizer.render.wire import Open, Pixels
@@ -173,119 +161,13 @@ class Renderer:
             behind = self.background
             path = Pixels.create(slots, self.size, channels(behind))
             order = Open(self.face, self.size, self.camera, path, slots, self.light, self.way, behind)
-            self._process = _Process(order)
+            self._process = Child(order)
         return self._process
 
     def _drop(self) -> None:
         if self._process is not None:
             self._process.end()
             self._process = None
-
-
-class _Process:
-    """One drawing process that has opened its canvas."""
-
-    pixels: Pixels
-
-    def __init__(self, order: Open) -> None:
-        from realizer.render.backdrop import channels
-        from realizer.render.wire import Pixels, connection
-
-        try:
-            self._popen = subprocess.Popen(
-                _command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
-            )
-            assert self._popen.stdin is not None
-            assert self._popen.stdout is not None
-            self._orders = connection(self._popen.stdin.fileno(), writes=True)
-            self._answers = connection(self._popen.stdout.fileno(), writes=False)
-            self._popen.stdin.close()
-            self._popen.stdout.close()
-            self._end = weakref.finalize(self, _end, self._popen, self._orders, self._answers)
-            self.pid = self._popen.pid
-            try:
-                self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
-                self.send(order)
-                self.way = self.receive()
-            except BaseException:
-                self.end()
-                raise
-        finally:
-            Path(order.memory).unlink()
-
-    def send(self, message: Message) -> None:
-        try:
-            self._orders.send(message)
-        except OSError:
-            raise self._died() from None
-
-    def receive(self) -> Any:
-        from realizer.render.wire import Failed
-
-        try:
-            if not self._answers.poll(PATIENCE):
-                raise RenderError(f"the drawing process gave no picture within {PATIENCE:g} s")
-            answer = self._answers.recv()
-        except (EOFError, OSError):
-            raise self._died() from None
-        if isinstance(answer, Failed):
-            raise RenderError(answer.says)
-        return answer
-
-    def end(self) -> None:
-        self._end()
-
-    def _died(self) -> RenderError:
-        try:
-            code: int | None = self._popen.wait(5)
-        except subprocess.TimeoutExpired:
-            code = None
-        return RenderError(f"the drawing process ended (exit status {code}); the next call starts a new one")
-
-
-def _end(popen: subprocess.Popen[bytes], orders: Connection, answers: Connection) -> None:
-    """Hang up, and insist where that does not help."""
-    orders.close()
-    answers.close()
-    try:
-        popen.wait(0.5)
-    except subprocess.TimeoutExpired:
-        popen.kill()
-        popen.wait()
-
-
-def available(way: str | None = None) -> str | None:
-    """None where pictures can be drawn, that way; otherwise a sentence that says what to install."""
-    return asked(way)[1]
-
-
-@cache
-def asked(way: str | None = None) -> tuple[str, str | None]:
-    """The way pictures are drawn here, and None; or "" and what to install. Asks a new process, once."""
-    done = subprocess.run(
-        [*_command(), "--check", way or os.environ.get(DRAW) or "auto"],
-        env=_environment(),
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    said = (done.stdout.strip() or done.stderr.strip()).splitlines()
-    if done.returncode == 0:
-        return said[-1], None
-    return "", said[-1] if said else f"the drawing process ended (exit status {done.returncode})"
-
-
-def _command() -> list[str]:
-    return [sys.executable, "-P", "-m", "realizer.render.worker"]
-
-
-def _environment() -> dict[str, str]:
-    """Ours, with our package first, and one thread for linear algebra: 0.8 ms a frame instead of 7.5."""
-    ours = str(Path(realizer.__path__[0]).parent)
-    paths = [ours, *filter(None, [os.environ.get("PYTHONPATH")])]
-    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    return {**os.environ, **threads, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def _rows(faps: Any) -> Float32:
