@@ -28,7 +28,7 @@ JAW = ("lower_teeth", "tongue")
 EYES = ("left_eye", "right_eye")
 LIDS = ("5", "6", "7", "9", "43")  # what moves the lids
 CHUNK = 16  # frames at once: what a cache holds
-LEAST = 1e-6  # m; what a unit moves less is left out of it
+LEAST = 1e-5  # m; what a unit moves less is left out of it
 
 
 class Deformer:

@@ -15,13 +15,11 @@ __all__: list[str] = []
 
 STILL = 0.35  # weight of a point that does not move: leaks count, but less than what is seen to move
 SOFT = 0.004  # of the largest move; a miss below it counts by its square, so that the cost has a slope at 0
-CALM = (
-    1e-3  # pull towards the start: too weak to change a fit, it keeps what does not matter from running away
-)
-ROUNDS = (
-    4,
-    8,
-)  # how often the weights of a sum of lengths are renewed: in the two separate costs, and in the joint one
+# Pull towards the start: too weak to change a fit to many points, it keeps what they do not decide from
+# running away; of few landmarks more is undecided.
+CALM, FEW = 1e-3, 5.0
+# How often the weights of a sum of lengths are renewed: in the direction's cost, and in the joint one.
+ROUNDS = (4, 8)
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, ev
     """The parameters that make the squares of the residual least; `residual` gives it and its derivatives."""
     from scipy.optimize import least_squares
 
-    calm = CALM * np.eye(len(start))
+    calm = max(CALM, FEW / len(residual(start)[0])) * np.eye(len(start))
     cache: dict[bytes, tuple[Float64, Float64]] = {}
 
     def both(x: Float64) -> tuple[Float64, Float64]:
