@@ -19,7 +19,8 @@ SHAPES = "au_shapes.npz"
     "--from",
     "measurements",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Measured landmarks: a CSV file au,x,y,z,dx,dy,dz in metres. Default: the face's own shapes.",
+    help="Measured landmarks: a CSV file au,x,y,z,dx,dy,dz in metres, below lines # source:, # units: and "
+    "# licence:; one side is enough. Default: the face's own shapes.",
 )
 @click.option(
     "--data",
