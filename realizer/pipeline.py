@@ -26,7 +26,7 @@ from realizer.composition.playing import Speaking
 from realizer.errors import RealizerError, VoiceError
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech.fitting import fitted
+from realizer.speech.fitting import fitted, stretched
 from realizer.speech.utterance import Say, Utterance, Voice
 from realizer.tables import faps
 from realizer.units import frame_count
@@ -256,15 +256,24 @@ def submitted(player: Player, block: Block, voice: Voice) -> Schedule:
     utterances = speak(says, voice)
     planned = player.submit(block, 0.0, utterances)
     if planned.lengths:
-        again = {b: replace(says[b], seconds=seconds) for b, seconds in planned.lengths.items()}
-        utterances |= speak(again, voice)
-        planned = player.submit(block, 0.0, {b: as_it_is(u) for b, u in utterances.items()})
+        again = {b: replace(says[b], seconds=times["end"]) for b, times in planned.lengths.items()}
+        utterances = {b: as_it_is(u) for b, u in utterances.items()} | speak(again, voice)
+        planned = player.submit(block, 0.0, utterances)
+    if planned.lengths:
+        planned = player.submit(block, 0.0, warped(utterances, planned.lengths))
     return planned
 
 
 def as_it_is(utterance: Utterance) -> Utterance:
     """An utterance that is not to be spoken again."""
     return replace(utterance, stretch=(1.0, 1.0))
+
+
+def warped(
+    utterances: Mapping[str, Utterance], lengths: Mapping[str, Mapping[str, float]]
+) -> dict[str, Utterance]:
+    """Utterances that come near to what was asked for, brought to it; none is to be spoken again."""
+    return {b: stretched(u, lengths[b]) if b in lengths else as_it_is(u) for b, u in utterances.items()}
 
 
 @contextmanager

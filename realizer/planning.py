@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from bml_schema import Block, Place, Problem, SyncRef, without
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import Kind, World
 from realizer.composition.claims import Claim, claims, losses
 from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
+from realizer.speech.utterance import WARP
 
 __all__ = ["Plan", "plan"]
 
-# A speech whose length differs by no more than this part is not spoken again.
+# s; a speech whose points differ by no more is not spoken again.
 SAME = 1e-6
+# s; shorter gaps of a speech say nothing about its rate.
+SHORT = 0.02
 _MOST_LISTED = 10  # references named in a warning as gone with their behaviour
 
 
@@ -89,7 +94,7 @@ class _Failed(Exception):
 class _Bends(Exception):
     """More of the block fits if speech lasts longer or shorter."""
 
-    def __init__(self, lengths: Mapping[str, float]) -> None:
+    def __init__(self, lengths: Mapping[str, Mapping[str, float]]) -> None:
         super().__init__(str(lengths))
         self.lengths = lengths
 
@@ -182,15 +187,36 @@ class _Work:
         for node in self.block.behaviours:
             if node.id in bent and (timing := self.kinds[node.tag].bend(node, self.world)) is not None:
                 bent[node.id] = timing
-        could = [b for b, timing in bent.items() if timing is not own.timings[b]]
+        could = {b: timing for b, timing in bent.items() if timing is not own.timings[b]}
         if not could:
             return
         found = schedule_together([replace(own, timings=bent), *others], outside=outside)[0]
         if found.failed or len(found.times) <= len(rigid.times):
             return
-        lengths = {b: float(found.times[b][-1] - found.times[b][0]) for b in could if b in found.times}
-        natural = {b: float(own.timings[b].preferred.sum()) for b in lengths}
-        raise _Bends({b: s for b, s in lengths.items() if abs(s - natural[b]) > SAME * natural[b]})
+        at = {b: found.times[b] - found.times[b][0] for b in could if b in found.times}
+        natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in at}
+        # A voice has one rate for all of a speech: of those its gaps ask for, the one that lets most fit.
+        most = len(rigid.times)
+        for b in at if len(at) == 1 else ():
+            if could[b].most is None or self.world.utterances[b].stretch == WARP:
+                continue
+            gaps = own.timings[b].preferred
+            asked = np.diff(at[b])[gaps > SHORT] / gaps[gaps > SHORT]
+            for rate in sorted({round(float(r), 9) for r in asked}, key=lambda r: abs(r - 1.0)):
+                evened = replace(own.timings[b], preferred=gaps * rate)
+                fits = schedule_together(
+                    [replace(own, timings={**own.timings, b: evened}), *others], outside=outside
+                )[0]
+                if not fits.failed and len(fits.times) > most:
+                    most = len(fits.times)
+                    at[b] = natural[b] * rate
+        lengths = {
+            b: dict(zip(could[b].points[1:], map(float, at[b][1:]), strict=True))
+            for b in at
+            if np.abs(at[b] - natural[b]).max() > SAME
+        }
+        if lengths:
+            raise _Bends(lengths)
 
     def drop(self, gone: Iterable[tuple[str, Warning]]) -> None:
         """Take behaviours out, and what refers to them; each has one warning, which names what went too."""

@@ -118,7 +118,7 @@ def submit(player: Player, block: Block, now: float) -> Schedule:
     utterances = speak(says, SilentVoice())
     schedule = player.submit(block, now, utterances)
     if schedule.lengths:
-        again = {b: replace(says[b], seconds=seconds) for b, seconds in schedule.lengths.items()}
+        again = {b: replace(says[b], seconds=times["end"]) for b, times in schedule.lengths.items()}
         utterances |= speak(again, SilentVoice())
         schedule = player.submit(block, now, {b: as_it_is(u) for b, u in utterances.items()})
     return schedule

@@ -95,8 +95,9 @@ class Schedule:
         warnings: one per thing that was dropped.
         cost: the sum of a (gap - preferred)^2 that remains.
         failed: the whole block was refused (a required part cannot hold); times is empty then.
-        lengths: speech -> seconds it would have to last for more of the block to fit. Where there are any,
-            nothing was planned: speak again and plan with what comes.
+        lengths: speech -> its points, with "end" -> seconds from its start at which they would have to be
+            for more of the block to fit. Where there are any, nothing was planned: speak again and plan with
+            what comes.
     """
 
     block: str
@@ -106,7 +107,7 @@ class Schedule:
     warnings: tuple[Warning, ...] = ()
     cost: float = 0.0
     failed: bool = False
-    lengths: Mapping[str, float] = field(default_factory=dict)
+    lengths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     character: str | None = field(default=None, compare=False)
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from bml_schema import Block
 from realizer.composition.references import references
-from realizer.pipeline import as_it_is
+from realizer.speech.fitting import near
 from realizer.speech.utterance import Say, Utterance
 
 __all__: list[str] = []
@@ -75,7 +75,7 @@ class Preparation:
         for waiting in self.waiting:
             if speak in waiting.says:
                 behaviour, _ = waiting.says.pop(speak)
-                waiting.utterances[behaviour] = as_it_is(utterance) if waiting.final else utterance
+                waiting.utterances[behaviour] = near(utterance) if waiting.final else utterance
 
     def unspoken(self, speak: int) -> None:
         """No voice can say it: the block goes on without, its speech is dropped when it is planned."""

@@ -13,7 +13,7 @@ from bml_schema import Block, BMLError, read
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError, VoiceError
-from realizer.pipeline import as_it_is, warning_of
+from realizer.pipeline import as_it_is, warning_of, warped
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
@@ -287,6 +287,10 @@ class Session:
             return False
         try:
             schedule = self.player.submit(waiting.block, t, waiting.utterances)
+            if schedule.lengths and waiting.final:
+                # Time has passed while the voice spoke, and it never comes exactly: what is left is little.
+                waiting.utterances = warped(waiting.utterances, schedule.lengths)
+                schedule = self.player.submit(waiting.block, t, waiting.utterances)
         except Exception:
             self.preparation.remove([waiting])
             self._internal(waiting.block, t)
@@ -299,13 +303,15 @@ class Session:
             self.withdraw(self.preparation.replaced_by(waiting), t)
         return True
 
-    def _speak_again(self, waiting: Waiting, lengths: Mapping[str, float], t: float) -> None:
+    def _speak_again(self, waiting: Waiting, lengths: Mapping[str, Mapping[str, float]], t: float) -> None:
         """More of the block fits if its speech lasts so long; what comes back is taken as it is."""
         wants = self.player.wants(waiting.block)
         waiting.utterances = {b: as_it_is(u) for b, u in waiting.utterances.items()}
         waiting.since, waiting.final = t, True
         self._speak(
-            waiting.says, waiting.character, {b: replace(wants[b], seconds=s) for b, s in lengths.items()}
+            waiting.says,
+            waiting.character,
+            {b: replace(wants[b], seconds=times["end"]) for b, times in lengths.items()},
         )
 
     def _speak(self, says: dict[int, tuple[str, Say]], character: int, wants: Mapping[str, Say]) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.speech.utterance import WARP, Say, Utterance, Voice
 
-__all__ = ["fitted", "stretched"]
+__all__ = ["fitted", "near", "stretched"]
 
 # A voice is asked again at another rate so often; its rate has steps, and pauses do not stretch evenly.
 TRIES = 3
@@ -33,22 +34,39 @@ def fitted(voice: Voice, say: Say) -> Utterance:
             break
         rate *= ratio
         utterance = voice.say(replace(say, rate=rate, seconds=None))
-    return stretched(utterance, say.seconds)
+    return replace(stretched(utterance, {"end": say.seconds}), stretch=WARP)
 
 
-def stretched(utterance: Utterance, seconds: float) -> Utterance:
-    """The same utterance, exactly so long; it does not stretch any more."""
-    ratio = seconds / utterance.duration
-    pcm = utterance.pcm
+def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
+    """The same utterance with its end, and marks that are named, at these times; it stretches no more.
+
+    Args:
+        times: "end" or a mark -> seconds from its start.
+    """
+    was = {**utterance.marks, "end": utterance.duration}
+    knots = sorted((was[name], time) for name, time in times.items() if name in was)
+    source, target = (np.array([0.0, *side]) for side in zip(*knots, strict=True))
+    source, target = np.maximum.accumulate(source), np.maximum.accumulate(target)
+
+    def moved(time: float) -> float:
+        return float(np.interp(time, source, target))
+
+    end, pcm = float(target[-1]), utterance.pcm
     if pcm is not None:
-        at = np.linspace(0.0, len(pcm) - 1.0, round(seconds * utterance.sample_rate))
+        rate = utterance.sample_rate
+        at = np.interp(np.arange(round(end * rate)) / rate, target, source) * rate
         pcm = np.rint(np.interp(at, np.arange(len(pcm)), pcm)).astype(np.int16)
     return replace(
         utterance,
-        duration=seconds,
-        words=tuple(replace(w, start=w.start * ratio, end=w.end * ratio) for w in utterance.words),
-        phonemes=tuple(replace(p, start=p.start * ratio, end=p.end * ratio) for p in utterance.phonemes),
-        marks={name: time * ratio for name, time in utterance.marks.items()},
+        duration=end,
+        words=tuple(replace(w, start=moved(w.start), end=moved(w.end)) for w in utterance.words),
+        phonemes=tuple(replace(p, start=moved(p.start), end=moved(p.end)) for p in utterance.phonemes),
+        marks={name: times[name] if name in times else moved(at) for name, at in utterance.marks.items()},
         pcm=pcm,
         stretch=(1.0, 1.0),
     )
+
+
+def near(utterance: Utterance) -> Utterance:
+    """An utterance that the voice is not asked for again: it can be warped a little."""
+    return replace(utterance, stretch=WARP if utterance.duration else (1.0, 1.0))

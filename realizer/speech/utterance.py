@@ -8,10 +8,12 @@ from typing import Protocol
 
 from realizer.arrays import Int16
 
-__all__ = ["MOST_TEXT", "STRETCH", "Phoneme", "Say", "Utterance", "Voice", "Word"]
+__all__ = ["MOST_TEXT", "STRETCH", "WARP", "Phoneme", "Say", "Utterance", "Voice", "Word"]
 
 # A voice can speak so much faster or slower and still be understood, as parts of its usual length; ours.
 STRETCH = (0.6, 1.8)
+# And a sound can be played so much faster or slower, here more and there less, without asking the voice.
+WARP = (0.92, 1.08)
 MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
 
 

@@ -88,3 +88,14 @@ def test_two_speeches_tied_at_both_ends_meet() -> None:
     played = realize(f'<bml id="b">{both}</bml>', voice=SilentVoice())
     assert not played.warnings
     assert played.schedules[0].at("t", "end") == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("mark", [0.5, 0.7])
+@pytest.mark.parametrize("voice", ["silent", pytest.param("espeak", marks=pytest.mark.espeak)])
+def test_a_speech_tied_at_a_mark_is_spoken_at_the_rate_that_brings_it_there(mark: float, voice: str) -> None:
+    tie = f'<constraint><synchronize><sync ref="s:m"/><sync ref="{mark}"/></synchronize></constraint>'
+    text = '<speech id="s" start="0"><text>hello my <sync id="m"/> dear friend of mine</text></speech>'
+    played = realize(f'<bml id="b">{text}<required>{tie}</required></bml>', voice=voice)
+    assert not played.warnings
+    assert played.schedules[0].at("s", "m") == pytest.approx(mark)
+    assert played.speech[0][1].marks["m"] == pytest.approx(mark)

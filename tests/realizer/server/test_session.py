@@ -726,3 +726,18 @@ def test_a_voice_that_is_not_there_is_an_error_at_once(driver) -> None:
     (error,) = told.of("error")
     assert (error["code"], error["where"]) == ("voice", "character.voice")
     assert "nope" in error["message"]
+
+
+def test_time_that_passes_while_a_voice_speaks_again_is_made_up_for() -> None:
+    driver = Driver(mute=True)
+    driver.send('<bml id="a"><faceLexeme id="f" lexeme="SMILE" start="0" end="4"/></bml>')
+    driver.run(0.5)
+    driver.send('<bml id="b"><speech id="s" start="0" end="a:f:end"><text>Hello</text></speech></bml>')
+    driver.say(driver.spoken[0].id, replace(spoken(2.5), stretch=(0.6, 1.8)))
+    driver.run(0.6)
+    driver.say(driver.spoken[1].id, spoken(3.5))
+    told = driver.run(9)
+    assert not [f for f in told.feedback if isinstance(f, WarningFeedback)]
+    times = {f.id: f.global_time for f in told.feedback if hasattr(f, "global_time")}
+    assert times["b:s:end"] == pytest.approx(4.0)
+    assert times["b:start"] == times["b:s:start"] == pytest.approx(0.6)

@@ -7,7 +7,7 @@ import pytest
 
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted, stretched
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import WARP, Say
 
 SAY = Say('one two <mark name="m"/>three four five', ("m",))
 
@@ -20,7 +20,7 @@ def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
     assert made.duration == pytest.approx(natural.duration * ratio)
     assert made.phonemes[-1].end == pytest.approx(made.duration)
     assert made.marks["m"] / made.duration == pytest.approx(natural.marks["m"] / natural.duration, abs=0.05)
-    assert made.stretch == (1.0, 1.0)
+    assert made.stretch == WARP, "what is left can be warped"
 
 
 def test_without_a_length_it_is_the_voices_own() -> None:
@@ -51,7 +51,18 @@ def test_a_stretched_sound_keeps_its_loudness() -> None:
     from realizer.speech.utterance import Utterance
 
     wave = (8000 * np.sin(np.arange(22050) * 0.1)).astype(np.int16)
-    made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, wave), 1.005)
+    made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, wave), {"end": 1.005})
     assert made.pcm is not None
     assert np.abs(made.pcm).max() == pytest.approx(8000, rel=0.01)
     assert made.marks["m"] == pytest.approx(0.5025)
+
+
+def test_a_sound_is_warped_so_that_its_marks_come_where_they_are_wanted() -> None:
+    from realizer.speech.utterance import Utterance
+
+    loud = np.zeros(22050, np.int16)
+    loud[11025:11035] = 9000  # a click at the mark
+    made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, loud), {"m": 0.53, "end": 1.02})
+    assert (made.duration, made.marks["m"]) == (1.02, 0.53)
+    assert made.pcm is not None
+    assert int(np.argmax(made.pcm)) / 22050 == pytest.approx(0.53, abs=0.001)
