@@ -75,7 +75,7 @@ def paint_skin(
         out[lips.rings[k]] *= dark
     inside = lips.inside
     # Wet near the lips, dark and dull behind: a shine deep in the mouth looks like metal.
-    out[inside] = mouth * np.clip(lips.fade[inside], 0.30, 1)[:, None]
+    out[inside] = mouth * np.clip(lips.fade[inside], 0.55, 1)[:, None]
     gloss[inside] = 0.3 * np.clip(lips.fade[inside] * 2 - 1, 0, 1)
     for ring in rings:
         # The wet edge of the lids is pink, the upper one darkened by the lashes' roots.
