@@ -65,6 +65,7 @@ MAY: dict[str, set[str]] = {
         "realizer.behaviours",
         "realizer.composition.claims",
         "realizer.scheduling",
+        "realizer.speech.utterance",
     },
     "realizer.composition": VALUES
     | {
