@@ -29,6 +29,10 @@ class Place(NamedTuple):
     line: int
     path: str
 
+    def says(self, text: str) -> str:
+        """A sentence with the place in front."""
+        return at(self.line, self.path, text)
+
 
 def at(line: int | None, path: str, text: str) -> str:
     """One sentence with its place: `line 3, /bml/head[1]: amount: wanted 0..1, got 7`."""

@@ -14,16 +14,9 @@ _ACTIVATION = number(1, 7)  # on Whissel's scale
 _FAPU = number(-1e5, 1e5)
 
 
-def _one_place(name: str | None, angle: float | None, activation: float | None) -> str:
-    """What is wrong with the ways in which an emotion is named."""
-    if (name is None) == (angle is None):
-        return "wanted a name, or an angle on the wheel, got " + ("neither" if name is None else "both")
-    return "" if activation is None or angle is not None else "activation: wanted an angle with it, got none"
-
-
 @node
-class Emotion(Behaviour):
-    """Show an emotion for a while.
+class Feeling(Behaviour):
+    """What an emotion and a mood say alike.
 
     Attributes:
         name: its word.
@@ -32,8 +25,6 @@ class Emotion(Behaviour):
         profile: which of several ways to show it; None the usual one.
     """
 
-    tag = own("emotion")
-    sync_points = PEAK
     name: str | None = attribute(word, default=None)
     angle: float | None = attribute(_ANGLE, default=None)
     activation: float | None = attribute(_ACTIVATION, default=None)
@@ -41,22 +32,27 @@ class Emotion(Behaviour):
     profile: str | None = attribute(word, default=None)
 
     def fault(self) -> str:
-        return _one_place(self.name, self.angle, self.activation)
+        if (self.name is None) == (self.angle is None):
+            got = "neither" if self.name is None else "both"
+            return f"wanted a name, or an angle on the wheel, got {got}"
+        if self.activation is not None and self.angle is None:
+            return "activation: wanted an angle with it, got none"
+        return ""
 
 
 @node
-class Mood(Behaviour):
-    """An emotion that is the resting face from now on; attributes as of `Emotion`."""
+class Emotion(Feeling):
+    """Show an emotion for a while."""
+
+    tag = own("emotion")
+    sync_points = PEAK
+
+
+@node
+class Mood(Feeling):
+    """An emotion that is the resting face from now on."""
 
     tag = own("mood")
-    name: str | None = attribute(word, default=None)
-    angle: float | None = attribute(_ANGLE, default=None)
-    activation: float | None = attribute(_ACTIVATION, default=None)
-    intensity: float = attribute(AMOUNT, default=0.5)
-    profile: str | None = attribute(word, default=None)
-
-    def fault(self) -> str:
-        return _one_place(self.name, self.angle, self.activation)
 
 
 @node

@@ -250,17 +250,17 @@ def play(
     return schedules, refused
 
 
-def submitted(player: Player, block: Block, voice: Voice) -> Schedule:
-    """Submit a block at t = 0 with what the voice makes of it, at other rates where that lets more fit."""
+def submitted(player: Player, block: Block, voice: Voice, now: float = 0.0) -> Schedule:
+    """Submit a block with what the voice makes of it, at other rates where that lets more fit."""
     says = player.wants(block)
     utterances = speak(says, voice)
-    planned = player.submit(block, 0.0, utterances)
+    planned = player.submit(block, now, utterances)
     if planned.lengths:
         again = {b: replace(says[b], seconds=times["end"]) for b, times in planned.lengths.items()}
         utterances = {b: as_it_is(u) for b, u in utterances.items()} | speak(again, voice)
-        planned = player.submit(block, 0.0, utterances)
+        planned = player.submit(block, now, utterances)
     if planned.lengths:
-        planned = player.submit(block, 0.0, warped(utterances, planned.lengths))
+        planned = player.submit(block, now, warped(utterances, planned.lengths))
     return planned
 
 

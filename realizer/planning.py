@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bml_schema import Block, Place, Problem, SyncRef, without
+from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import Kind, World
 from realizer.composition.claims import Claim, claims, losses
@@ -112,7 +112,7 @@ class _Work:
     def take_problems(self) -> None:
         """What the parser dropped."""
         for problem in self.block.problems:
-            warning = _of_problem(problem)
+            warning = Warning(problem.id, problem.type, str(problem))
             if problem.fatal:
                 raise _Failed(warning)
             self.warnings.append(warning)
@@ -248,10 +248,4 @@ class _Work:
     def at(self, behaviour: str, text: str) -> str:
         """A sentence with the place of its behaviour."""
         place = self.whole.places.get(behaviour)
-        return text if place is None else f"line {place.line}, {place.path}: {text}"
-
-
-def _of_problem(problem: Problem) -> Warning:
-    place = Place(problem.line, problem.path) if problem.line else None
-    text = problem.text if place is None else f"line {place.line}, {place.path}: {problem.text}"
-    return Warning(problem.id, problem.type, text)
+        return text if place is None else place.says(text)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ from bml_schema import (
     write,
 )
 from realizer.animation.fap import to_fap
-from realizer.pipeline import as_it_is, speak
+from realizer.pipeline import submitted
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule
 from realizer.speech import SilentVoice
@@ -91,7 +90,7 @@ def plays(text: str) -> None:
         assert list(read(write(item), VOCABULARY)) == [item], "written back, it means the same"
         told += run(player, now)
         blocks.append(item)
-        schedules.append(submit(player, item, now))
+        schedules.append(submitted(player, item, SilentVoice(), now))
         now += APART
     assert blocks
     if not schedules[0].failed:
@@ -112,24 +111,12 @@ def plays(text: str) -> None:
     assert progress == sorted(progress)
 
 
-def submit(player: Player, block: Block, now: float) -> Schedule:
-    """Submit a block with what a silent voice makes of it, at another rate where that lets more fit."""
-    says = player.wants(block)
-    utterances = speak(says, SilentVoice())
-    schedule = player.submit(block, now, utterances)
-    if schedule.lengths:
-        again = {b: replace(says[b], seconds=times["end"]) for b, times in schedule.lengths.items()}
-        utterances |= speak(again, SilentVoice())
-        schedule = player.submit(block, now, {b: as_it_is(u) for b, u in utterances.items()})
-    return schedule
-
-
 def stays(block: Block, schedule: Schedule) -> None:
     """A block that is written back with its times is scheduled to the same times."""
     (again,) = read(write(timed(block, schedule.behaviours)), VOCABULARY)
     assert isinstance(again, Block)
     player = Player(idle=False)
-    second = submit(player, again, 0.0)
+    second = submitted(player, again, SilentVoice())
     assert second.times.keys() == schedule.times.keys()
     for behaviour, times in schedule.times.items():
         assert np.abs(second.times[behaviour] - times).max() < 1e-6

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bml_schema import Block
 from realizer.behaviours.kind import Kind, World
@@ -35,6 +35,10 @@ class Claim:
     block: str
     behaviour: str
     rank: tuple[float, bool, int] = (0.0, False, 0)
+
+    def shifted(self, seconds: float) -> Claim:
+        """The same claim, later by `seconds`."""
+        return replace(self, begin=self.begin + seconds, end=self.end + seconds)
 
     def disturbs(self, other: Claim) -> bool:
         """Whether one of the two has to go."""

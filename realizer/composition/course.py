@@ -171,7 +171,7 @@ class Course:
         if not playing.plan.claims:
             return False
         late = start - playing.start
-        wanted = [replace(c, begin=c.begin + late, end=c.end + late) for c in playing.plan.claims]
+        wanted = [claim.shifted(late) for claim in playing.plan.claims]
         return bool(losses(wanted, relations.held(playing.character, self.cast.alive(), [playing])))
 
     def retime(self, blocks: Sequence[Playing], schedules: Sequence[Schedule], now: float) -> None:

@@ -154,7 +154,7 @@ class Playing:
     def lay(self, plan: Plan, start: float) -> None:
         """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
         late = start - plan.schedule.start
-        held = tuple(replace(c, begin=c.begin + late, end=c.end + late) for c in plan.claims)
+        held = tuple(claim.shifted(late) for claim in plan.claims)
         self.plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
         self.abroad = abroad(self.block)
         self.channels, self.shifts, self.speech = {}, {}, {}

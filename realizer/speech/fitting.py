@@ -34,7 +34,7 @@ def fitted(voice: Voice, say: Say) -> Utterance:
             break
         rate *= ratio
         utterance = voice.say(replace(say, rate=rate, seconds=None))
-    return replace(stretched(utterance, {"end": say.seconds}), stretch=WARP)
+    return near(stretched(utterance, {"end": say.seconds}))
 
 
 def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
