@@ -1,0 +1,160 @@
+"""cooccurrence.toml, or a user's own -> the rules that say which action units a face can show together."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from realizer import tables
+from realizer.errors import TableError
+
+__all__ = ["Rule", "Rules", "Unit", "parse_rule", "read_rules", "rules"]
+
+FILE = "cooccurrence.toml"
+Kind = Literal["domination", "exclusion", "inclusion", "opposition"]
+SIGNS: Mapping[str, str] = {"domination": "<", "exclusion": "@", "inclusion": "@", "opposition": "@"}
+UNIT = re.compile(r"(\d+)([A-Za-z]?)")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """An action unit in a rule: all of it, or one of the fuzzy sets of its intensity ("X", "Y", "Z")."""
+
+    au: int
+    set: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What weakens an action unit.
+
+    Attributes:
+        kind: the class of the rule.
+        weaker: the AU that gives way; of an opposition the first.
+        stronger: the AUs before which it gives way, all together; of the classes but domination just one.
+        text: as written.
+    """
+
+    kind: Kind
+    weaker: int
+    stronger: tuple[Unit, ...]
+    text: str
+
+
+@dataclass(frozen=True)
+class Rules:
+    """A file of rules.
+
+    Attributes:
+        sets: name -> membership of an intensity of 0, 0.5 and 1.
+        rules: in file order.
+    """
+
+    sets: Mapping[str, tuple[float, float, float]]
+    rules: tuple[Rule, ...]
+
+
+@cache
+def rules(path: Path | None = None) -> Rules:
+    """The rules of a file, of the table that ships if None.
+
+    Raises:
+        TableError: an unreadable file, or as `read_rules`.
+    """
+    if path is None:
+        return read_rules(tables.text_of(FILE), FILE)
+    try:
+        return read_rules(path.read_text("utf-8"), str(path))
+    except (OSError, UnicodeError) as error:
+        raise TableError(f"{path}: wanted a file of co-occurrence rules, {error}") from None
+
+
+def read_rules(text: str, name: str) -> Rules:
+    """Read a file of rules; `name` is what messages call it.
+
+    Raises:
+        TableError: every fault at once, a line each: not TOML, an unknown section, a rule that cannot be
+            read, an AU that does not exist, a rule that says the opposite of another.
+    """
+    table = tables.read_toml(text, name)
+    faults = [f"{name}: wanted sections sets, {', '.join(SIGNS)}; got [{key}]" for key in _strange(table)]
+    sets = {
+        key: _set(values, f"{name}, [sets] {key}", faults) for key, values in table.get("sets", {}).items()
+    }
+    found: list[Rule] = []
+    for kind in get_args(Kind):
+        for line in table.get(kind, {}).get("rules", ()):
+            try:
+                found.append(parse_rule(line, kind, sets))
+            except TableError as error:
+                faults.append(f"{name}, [{kind}] {line!r}: {error}")
+    faults += [f"{name}, {fault}" for fault in _contradictions(found)]
+    if faults:
+        raise TableError("\n".join(faults))
+    return Rules(sets, tuple(found))
+
+
+def parse_rule(text: str, kind: Kind, sets: Mapping[str, Any]) -> Rule:
+    """One rule in the notation of the table: "5<63", "18<20+23", "12<15Z", "27@25".
+
+    Raises:
+        TableError: what was wanted, and what came.
+    """
+    sign = SIGNS[kind]
+    left, found, right = str(text).replace(" ", "").partition(sign)
+    if not found:
+        example = "16<12+18" if sign == "<" else "27@25"
+        raise TableError(f"wanted two sides with {sign!r} between them, as {example}")
+    names = right.split("+") if kind == "domination" else [right]
+    first = _unit(left, {})
+    others = tuple(_unit(other, sets if kind == "domination" else {}) for other in names)
+    if first.au in [other.au for other in others]:
+        raise TableError(f"AU{first.au} stands on both sides")
+    if kind in ("exclusion", "inclusion"):  # there the privileged one comes first
+        return Rule(kind, others[0].au, (first,), text)
+    return Rule(kind, first.au, others, text)
+
+
+def _unit(text: str, sets: Mapping[str, Any]) -> Unit:
+    match = UNIT.fullmatch(text)
+    if match is None:
+        raise TableError(f"wanted the number of an action unit, got {text!r}")
+    number, name = int(match[1]), match[2].upper()
+    if number not in tables.by_number(tables.action_units()):
+        raise TableError(f"wanted an action unit that a face shows, got AU{number}")
+    if name and name not in sets:
+        known = " or ".join(sets) if sets else "no letter here"
+        raise TableError(f"wanted {known} after the number, got {text!r}")
+    return Unit(number, name)
+
+
+def _strange(table: Mapping[str, Any]) -> list[str]:
+    return [key for key in table if key != "sets" and key not in SIGNS]
+
+
+def _set(values: object, where: str, faults: list[str]) -> tuple[float, float, float]:
+    match values:
+        case [int() | float() as none, int() | float() as half, int() | float() as whole]:
+            if all(0 <= value <= 1 for value in (none, half, whole)):
+                return float(none), float(half), float(whole)
+    faults.append(f"{where}: wanted three memberships 0..1, of intensity 0, 0.5 and 1; got {values!r}")
+    return 0.0, 0.0, 0.0
+
+
+def _contradictions(found: list[Rule]) -> list[str]:
+    """Pairs of rules of which one says that the other's stronger unit is the weaker, or says it twice."""
+    faults = []
+    seen: dict[tuple[int, tuple[Unit, ...]], Rule] = {}
+    for rule in found:
+        key = (rule.weaker, rule.stronger)
+        turned = (rule.stronger[0].au, (Unit(rule.weaker),)) if len(rule.stronger) == 1 else None
+        if key in seen:
+            faults.append(f"[{rule.kind}] {rule.text!r}: says what {seen[key].text!r} says already")
+        elif turned in seen:
+            faults.append(f"[{rule.kind}] {rule.text!r}: says the opposite of {seen[turned].text!r}")
+        seen[key] = rule
+    return faults

@@ -1,0 +1,111 @@
+"""What is left of action units that a face cannot show together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from realizer.animation.cooccurrence import cooccur
+from realizer.animation.targets import AU_NAMES
+from realizer.arrays import Float32
+from realizer.tables.cooccurrence import Rule, rules
+
+NAMES = AU_NAMES()
+INTENSITIES = arrays(
+    np.float32, (len(NAMES), 4), elements=st.sampled_from([0.0, 0.125, 0.25, 0.5, 0.625, 0.75, 1.0])
+)
+
+
+def shown(**asked: float) -> dict[str, float]:
+    """ "AU12L" -> what is left of it, for the units that were asked for."""
+    values = np.zeros((len(NAMES), 1), np.float32)
+    for name, value in asked.items():
+        values[NAMES.index(name[2:])] = value
+    left = cooccur(values, rules()).aus[:, 0]
+    return {name: round(float(left[NAMES.index(name[2:])]), 4) for name in asked}
+
+
+def names(number: int) -> list[str]:
+    return [name for name in NAMES if name.rstrip("LR") == str(number)]
+
+
+@pytest.mark.parametrize("rule", rules().rules, ids=lambda rule: rule.text)
+def test_every_rule_silences_its_weaker_unit_when_the_stronger_ones_are_full(rule: Rule) -> None:
+    asked = {
+        f"AU{name}": 1.0 for unit in (rule.weaker, *(s.au for s in rule.stronger)) for name in names(unit)
+    }
+    left = shown(**asked)
+    assert all(left[f"AU{name}"] == 0.0 for name in names(rule.weaker))
+
+
+@pytest.mark.parametrize("rule", rules().rules, ids=lambda rule: rule.text)
+def test_every_unit_is_left_alone_when_nothing_is_stronger(rule: Rule) -> None:
+    assert set(shown(**{f"AU{name}": 0.75 for name in names(rule.weaker)}).values()) == {0.75}
+
+
+def test_a_unit_is_weakened_by_what_its_dominator_takes() -> None:
+    assert shown(AU5L=0.9, AU63=0.3) == {"AU5L": 0.7, "AU63": 0.3}
+
+
+def test_a_combination_dominates_as_far_as_both_of_it_are_there() -> None:
+    assert shown(AU16L=1.0, AU12L=0.8, AU22=0.3)["AU16L"] == 0.7
+
+
+def test_a_strong_unit_dominates_from_the_middle_of_its_range_on() -> None:
+    assert shown(AU12L=1.0, AU15L=0.5)["AU12L"] == 1.0
+    assert shown(AU12L=1.0, AU15L=0.75)["AU12L"] == 0.5
+
+
+def test_exclusion_leaves_a_unit_only_while_the_privileged_one_is_small() -> None:
+    assert shown(AU12L=0.25, AU20L=1.0)["AU20L"] == 0.5
+    assert shown(AU12L=0.5, AU20L=1.0)["AU20L"] == 0.0
+
+
+def test_opposed_movements_leave_their_difference() -> None:
+    assert shown(AU51=0.75, AU52=0.25) == {"AU51": 0.5, "AU52": 0.0}
+
+
+def test_each_side_of_the_face_is_ruled_by_itself() -> None:
+    assert shown(AU12L=1.0, AU12R=1.0, AU15R=1.0) == {"AU12L": 1.0, "AU12R": 0.0, "AU15R": 1.0}
+
+
+def test_a_unit_without_sides_gives_way_to_the_stronger_side() -> None:
+    assert shown(AU18=1.0, AU20L=0.25, AU20R=0.5, AU23=1.0)["AU18"] == 0.5
+
+
+def test_the_jaw_keeps_the_parting_of_the_lips_that_is_no_longer_scored() -> None:
+    values = np.zeros((len(NAMES), 1), np.float32)
+    values[[NAMES.index("25"), NAMES.index("26")]] = 1.0
+    result = cooccur(values, rules())
+    assert [result.aus[NAMES.index(name), 0] for name in ("25", "26")] == [0.0, 1.0]
+    assert result.held[NAMES.index("25"), 0] == 1.0
+
+
+@given(INTENSITIES)
+def test_a_second_pass_changes_nothing(aus: Float32) -> None:
+    once = cooccur(aus, rules()).aus
+    assert np.array_equal(cooccur(once, rules()).aus, once)
+
+
+@given(INTENSITIES)
+def test_nothing_is_added_to_what_was_asked_for(aus: Float32) -> None:
+    result = cooccur(aus, rules())
+    assert (result.held >= 0).all()
+    assert (result.aus >= 0).all()
+    assert (result.aus + result.held <= aus + 1e-6).all()
+
+
+@given(INTENSITIES, arrays(np.float32, (len(NAMES), 4), elements=st.sampled_from([-1.0, 0.0, 1.0])))
+def test_a_hair_more_or_less_never_makes_a_jump(aus: Float32, step: Float32) -> None:
+    moved = np.clip(aus + step / 1024, 0, 1, dtype=np.float32)
+    before, after = cooccur(aus, rules()), cooccur(moved, rules())
+    assert np.abs(after.aus - before.aus).max() <= 2 / 1024 + 1e-6
+
+
+@given(INTENSITIES)
+def test_what_is_asked_of_the_mirrored_face_is_shown_mirrored(aus: Float32) -> None:
+    twin = [NAMES.index(name.translate(str.maketrans("LR", "RL"))) for name in NAMES]
+    assert np.array_equal(cooccur(aus[twin], rules()).aus, cooccur(aus, rules()).aus[twin])

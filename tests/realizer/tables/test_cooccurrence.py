@@ -1,0 +1,63 @@
+"""The rules of co-occurrence are read as Wojdel writes them; a bad file says all that is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from realizer.errors import TableError
+from realizer.tables.cooccurrence import Unit, read_rules, rules
+
+HEAD = "# source: test\n# units: none\n# licence: MIT\n[sets]\nX = [1, 0, 0]\nZ = [0, 0, 1]\n"
+
+
+def test_the_table_holds_all_rules_of_appendix_c() -> None:
+    found = rules().rules
+    by_kind = [sum(rule.kind == kind for rule in found) for kind in ("domination", "opposition")]
+    assert by_kind == [15 + 15 + 2, 7]
+    assert sum(rule.kind in ("exclusion", "inclusion") for rule in found) == 14
+    assert len({rule.text for rule in found}) == len(found)
+
+
+def test_a_dominated_unit_stands_left_and_an_excluded_one_right() -> None:
+    found = {rule.text: rule for rule in rules().rules}
+    assert (found["16<12+18"].weaker, found["16<12+18"].stronger) == (16, (Unit(12), Unit(18)))
+    assert (found["12<15Z"].weaker, found["12<15Z"].stronger) == (12, (Unit(15, "Z"),))
+    assert (found["27@25"].weaker, found["27@25"].stronger) == (25, (Unit(27),))
+
+
+@pytest.mark.parametrize(
+    ("section", "rule", "says"),
+    [
+        ("domination", "5>63", "wanted two sides with '<' between them, as 16<12+18"),
+        ("domination", "5<", "wanted the number of an action unit, got ''"),
+        ("domination", "5<99", "wanted an action unit that a face shows, got AU99"),
+        ("domination", "12<15Q", "wanted X or Z after the number, got '15Q'"),
+        ("domination", "12<12Z", "AU12 stands on both sides"),
+        ("exclusion", "12@15Z", "wanted no letter here after the number, got '15Z'"),
+        ("opposition", "51<52", "wanted two sides with '@' between them, as 27@25"),
+    ],
+)
+def test_a_rule_that_cannot_be_read_says_what_was_wanted(section: str, rule: str, says: str) -> None:
+    with pytest.raises(TableError) as caught:
+        read_rules(f'{HEAD}[{section}]\nrules = ["{rule}"]\n', "mine.toml")
+    assert str(caught.value) == f"mine.toml, [{section}] {rule!r}: {says}"
+
+
+def test_all_faults_of_a_file_are_said_at_once() -> None:
+    with pytest.raises(TableError) as caught:
+        read_rules(
+            f'{HEAD}Y = [0, 2]\n[dominance]\n[domination]\nrules = ["5<63", "63<5", "5<63"]\n', "mine.toml"
+        )
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 4
+    assert "[dominance]" in lines[0]
+    assert "[sets] Y: wanted three memberships" in lines[1]
+    assert "'63<5': says the opposite of '5<63'" in lines[2]
+    assert "'5<63': says what '5<63' says already" in lines[3]
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(TableError, match=r"none\.toml: wanted a file of co-occurrence rules"):
+        rules(tmp_path / "none.toml")
