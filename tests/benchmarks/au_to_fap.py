@@ -1,0 +1,161 @@
+"""How near the table's FAPs come to a face's own action unit shapes.
+
+python tests/benchmarks/au_to_fap.py [--face NAME] [--worst 5]
+
+Every action unit at full intensity on both sides. `cosine`: between the shape and what its FAPs and the MPEG-4
+deformer make of it, over the visible skin of the left half. `ratio`: of their lengths. `cap`: the best cosine
+that any values of the 66 FAPs could reach. `far`: the shape's longest move. Last: where the difference lies.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from dataclasses import dataclass
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames
+from realizer.animation.targets import au, axis
+from realizer.arrays import Float32, Float64, Int32
+from realizer.face import deform, load_face
+from realizer.face.au import Measured, read_shapes
+from realizer.face.load import folder_of
+from realizer.face.model import Face
+from realizer.tables import faps
+
+# Feature points by the part of the face they stand for.
+PARTS = {
+    "brows": ("4.1", "4.3", "4.5", "11.1", "11.3"),
+    "upper lids": ("3.1", "3.13"),
+    "lower lids": ("3.3", "3.9", "3.7", "3.11"),
+    "cheeks": ("5.1", "5.3"),
+    "nose": ("9.1", "9.3", "9.5", "9.7", "9.12", "9.13"),
+    "upper lip": ("2.2", "2.6", "8.1", "8.5", "8.9"),
+    "lower lip": ("2.3", "2.8", "8.2", "8.7"),
+    "corners": ("2.4", "8.3"),
+    "chin": ("2.1", "2.10", "2.11"),
+    "jaw": ("2.13",),
+}
+WAYS = ("across", "up", "forward")
+AIM = 0.75
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """A face's visible skin on the left half: where it lies, and how FAPs move it.
+
+    Attributes:
+        vertices: (n,) indices into the face's; part: (n,) name of the part of the face each belongs to.
+    """
+
+    face: Face
+    vertices: Int32
+    part: npt.NDArray[np.str_]
+
+    @classmethod
+    def of(cls, face: Face, shape: Measured) -> Skin:
+        from scipy.spatial import cKDTree
+
+        first, last = face.parts["skin"]
+        skin = face.vertices[first:last]
+        off, nearest = (np.asarray(found) for found in cKDTree(skin).query(shape.at[shape.seen]))
+        if np.max(off) > 1e-5:
+            raise SystemExit(
+                f"{face.name}: its shapes lie {np.max(off):.5f} m off its skin; build them again"
+            )
+        names = [(part, name) for part, points in PARTS.items() for name in points]
+        near = np.asarray(cKDTree([face.points[name] for _, name in names]).query(skin[nearest])[1])
+        return cls(face, (first + nearest).astype(np.int32), np.array([names[k][0] for k in near]))
+
+    def moves(self, rows: Float32) -> Float64:
+        """(n, len(vertices), 3) metres that FAP rows (n, 68) move it."""
+        moved = deform(self.face, rows)[:, self.vertices]
+        return np.asarray(moved - self.face.vertices[self.vertices], np.float64)
+
+    def fields(self) -> Float64:
+        """(68, len(vertices), 3) metres that a tenth of each FAP's range moves it."""
+        rows = np.zeros((68, 68), np.float32)
+        for row in faps():
+            rows[row.fap - 1, row.fap - 1] = row.most / 10
+        return self.moves(rows)
+
+
+def asked(numbers: list[int]) -> Float32:
+    """(n, 68) FAPs that the table asks for each action unit at full intensity, on both sides."""
+    values = np.zeros((len(numbers), len(axis())), np.float32)
+    for row, number in zip(values, numbers, strict=True):
+        row[[target.column for target in au(number)]] = 1
+    return to_fap(AUFrames(np.arange(len(values), dtype=np.float64), values)).values
+
+
+def cosine(a: Float64, b: Float64) -> float:
+    """Of two displacement fields; 0 where one of them is nought."""
+    lengths = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float((a * b).sum()) / lengths if lengths else 0.0
+
+
+def even(fields: Float64) -> Float64:
+    """(k, n) one column a pair of mirrored FAPs: what both do with the same value (signs as the mirror's)."""
+    kept = []
+    for row in faps()[2:]:
+        if row.mirror >= row.fap:
+            both = fields[row.fap - 1].ravel().copy()
+            if row.mirror != row.fap:
+                both += row.sign * fields[row.mirror - 1].ravel()
+            if (row.mirror != row.fap or row.sign > 0) and both.any():
+                kept.append(both)
+    return np.array(kept)
+
+
+def where(skin: Skin, wanted: Float64, got: Float64) -> str:
+    """Where the difference lies that no length mends: parts with a fifth of it or so, and its direction."""
+    length = float((got * got).sum())
+    left = wanted - got * (float((wanted * got).sum()) / length if length else 0.0)
+    squares = left**2
+    whole = squares.sum()
+    shares = {part: float(squares[skin.part == part].sum() / whole) for part in PARTS}
+    most = [part for part in sorted(shares, key=lambda k: -shares[k]) if shares[part] >= 0.18][:3]
+    ways = squares.sum(axis=0) / whole
+    said = ", ".join(f"{part} {shares[part]:.0%}" for part in most) or "everywhere"
+    return f"{said}; {WAYS[int(ways.argmax())]} {ways.max():.0%}"
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument("--face", default="default")
+    options.add_argument("--worst", type=int, default=5)
+    chosen = options.parse_args()
+    face = load_face(chosen.face)
+    shapes = read_shapes(folder_of(chosen.face) / "au_shapes.npz")
+    skin = Skin.of(face, next(iter(shapes.values())))
+    base = np.linalg.qr(even(skin.fields()).T)[0]
+    made = skin.moves(asked(list(shapes)))
+    print(
+        f"{face.name}: {len(shapes)} action units with a shape, {len(skin.vertices)} vertices of visible skin"
+    )
+    print(f"{'AU':>4}{'cosine':>8}{'ratio':>7}{'cap':>6}{'far mm':>8}  difference")
+    found = {}
+    for number, got in zip(shapes, made, strict=True):
+        wanted = shapes[number].moves[shapes[number].seen]
+        flat = wanted.ravel()
+        cap = float(np.linalg.norm(base.T @ flat) / np.linalg.norm(flat))
+        found[number] = cosine(wanted, got)
+        ratio = np.linalg.norm(got) / np.linalg.norm(wanted)
+        far = 1000 * np.linalg.norm(wanted, axis=1).max()
+        print(f"{number:>4}{found[number]:8.3f}{ratio:7.2f}{cap:6.2f}{far:8.1f}  {where(skin, wanted, got)}")
+    worst = sorted(found, key=lambda k: found[k])[: chosen.worst]
+    print(
+        f"mean {np.mean(list(found.values())):.3f} (aim {AIM}); worst "
+        + ", ".join(f"AU{number} {found[number]:.3f}" for number in worst)
+    )
+
+
+if __name__ == "__main__":
+    main()
