@@ -39,7 +39,7 @@ def to_fap(frames: AUFrames, rows: tuple[AuToFap, ...] | None = None) -> FAPFram
         n frames; the mask is the same for all frames of one table.
     """
     demand = _compile(rows)
-    aus = np.ascontiguousarray(frames.aus.T)
+    aus = frames.moving
     positive, negative = demand.extremes(aus)
     _close_lids(positive, negative, demand.closed)
     values = positive + negative
