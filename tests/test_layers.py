@@ -37,6 +37,7 @@ MAY: dict[str, set[str]] = {
         "realizer.speech.utterance",
         "realizer.tables",
     },
+    "realizer.emotion": VALUES | {"realizer.emotion", "realizer.face.model", "realizer.tables"},
     "realizer.face": VALUES | {"realizer.face", "realizer.tables"},
     "realizer.render": VALUES | {"realizer.face", "realizer.render", "realizer.tables"},
     "realizer.outputs": VALUES

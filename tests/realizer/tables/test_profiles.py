@@ -1,0 +1,46 @@
+"""Profiles, vocabularies and statistics against each other: what was copied wrongly would not agree."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.tables.profiles import published_ranges, statistics, vocabularies
+
+
+def test_the_first_profiles_are_mean_and_deviation_of_the_statistics_in_print_and_corrected() -> None:
+    measured = {(row.emotion, row.fap): row for row in statistics() if row.mean is not None}
+    seen = 0
+    for row in published_ranges():
+        if row.profile or row.fault == "misprint":
+            continue
+        stat = measured[row.emotion, row.fap]
+        for mean, low, high in ((stat.raw_mean, row.raw_low, row.raw_high), (stat.mean, row.low, row.high)):
+            # Their surprise is rounded more freely than the rest.
+            assert (mean - stat.deviation, mean + stat.deviation) == pytest.approx((low, high), abs=2), row
+        seen += 1
+    assert seen == 57
+
+
+def test_a_misprint_is_one_against_the_statistics() -> None:
+    measured = {(row.emotion, row.fap): row for row in statistics() if row.mean is not None}
+    wrong = [row for row in published_ranges() if row.fault == "misprint"]
+    assert [(row.emotion, row.fap) for row in wrong] == [("anger", 31), ("disgust", 33), ("disgust", 34)]
+    for row in wrong:
+        stat = measured[row.emotion, row.fap]
+        assert (row.low, row.high) == (stat.mean - stat.deviation, stat.mean + stat.deviation)
+        assert (row.raw_low, row.raw_high) != (row.low, row.high)
+
+
+def test_every_verified_fap_is_in_the_vocabulary_of_its_emotion() -> None:
+    known = vocabularies()
+    outside = {(row.emotion, row.fap) for row in statistics() if row.mean is not None} - {
+        (emotion, fap) for emotion, faps in known.items() for fap in faps
+    }
+    assert not outside
+
+
+def test_only_fear_is_misprinted_among_the_vocabularies() -> None:
+    raw, known = vocabularies(raw=True), vocabularies()
+    assert {emotion for emotion in known if known[emotion] != raw[emotion]} == {"fear"}
+    assert known["fear"] - raw["fear"] == {19}
+    assert raw["fear"] - known["fear"] == {12}
