@@ -151,6 +151,7 @@ def realize(
     idle: bool = True,
     language: str = "en-US",
     media: Path | None = None,
+    cooccurrence: str = "on",
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
 
@@ -163,8 +164,10 @@ def realize(
         seed: for idle motion; the same seed gives the same frames.
         idle: blinks and small head motion.
         media: the folder of the files that documents may name.
+        cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
 
     Raises:
+        TableError: a file of rules that cannot be used.
         VoiceError: the named voice is not installed.
     """
     from realizer.face import face_name
@@ -172,7 +175,15 @@ def realize(
     texts = [documents] if isinstance(documents, str | bytes) else list(documents)
     if not (math.isfinite(fps) and fps > 0):
         raise ValueError(f"fps: wanted a number above 0, got {fps}")
-    player = Player(scene=scene, seed=seed, idle=idle, language=language, media=media, history=float("inf"))
+    player = Player(
+        scene=scene,
+        seed=seed,
+        idle=idle,
+        language=language,
+        media=media,
+        history=float("inf"),
+        cooccurrence=cooccurrence,
+    )
     accepted, refused = play(texts, player, voice)
     # Blocks act on each other while they play: what is seen and heard is known when all of them have ended.
     told = player.due(float("inf"))
@@ -189,7 +200,7 @@ def realize(
     for index, name in enumerate(player.characters):
         step = max(1, int(WINDOW * fps))
         windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
-        aus = AUFrames(times, np.concatenate([w.values for w in windows]))
+        aus = AUFrames(times, np.concatenate([w.values for w in windows]), player.rules)
         characters[name] = Performance(aus, to_fap(aus))
     speaking = player.speech()
     # Those of planning say more than what is told of them; others arise while blocks play.

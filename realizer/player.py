@@ -27,6 +27,7 @@ from realizer.composition.playing import Speaking
 from realizer.composition.reporting import State
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Say, Utterance
+from realizer.tables.cooccurrence import chosen
 
 __all__ = ["Player", "Speaking"]
 
@@ -45,6 +46,7 @@ class Player:
         language: BCP-47 of speech that does not name its own.
         media: the folder of the files that documents may name; None: they may name none.
         history: seconds before the last `due` for which frames can still be asked for.
+        cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
 
     Attributes:
         revision: rises whenever frames change that were already computed.
@@ -60,11 +62,13 @@ class Player:
         language: str = "en-US",
         media: Path | None = None,
         history: float = HISTORY,
+        cooccurrence: str = "on",
     ) -> None:
         self.kinds = kinds
         self.world = World(scene=scene, seed=seed, language=language, media=media)
         self.idle = idle
         self.history = history
+        self.rules = chosen(cooccurrence)
         self._characters: list[Character] = [Character(None)]
         self._blocks = Ensemble(kinds, self._characters)
 
@@ -199,14 +203,14 @@ class Player:
         """
         times = np.asarray(times, np.float64)
         if not len(times):
-            return blend((), times)
+            return blend((), times, self.rules)
         first, last = float(times[0]), float(times[-1])
         channels = [c for p in self._blocks.cast.of(character) for c in p.moving()]
         channels += self._characters[character].channels()
         channels = [c for c in channels if c.span[0] <= last and c.span[1] >= first]
         if self.idle:
             channels += idle_channels(first, last, self.world.seed + 7919 * character)
-        return blend(tuple(channels), times)
+        return blend(tuple(channels), times, self.rules)
 
     @property
     def end(self) -> float:

@@ -76,6 +76,16 @@ def _folder(value: Any) -> Path:
     return path
 
 
+def _switch_or_file(value: Any) -> str:
+    """ "on", "off", or the name of a file."""
+    try:
+        return "on" if _flag(value) else "off"
+    except ValueError:
+        if not Path(value).is_file():
+            raise ValueError("on, off, or a file that is there") from None
+        return str(value)
+
+
 def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
     return lambda value: None if value is None or value == "" else read(value)
 
@@ -117,6 +127,7 @@ class Settings:
     media: Path | None = _setting(None, _optional(_folder), "the folder of the files that documents may name")
     seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
+    cooccurrence: str = _setting("on", _switch_or_file, "rules of AUs together: on, off, or a file of them")
     keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")
     drain: float = _setting(5.0, _number(float, 0, 3600), "seconds given to what plays when the service ends")
     max_message: int = _setting(16 * 2**20, _number(int, 1, 2**31), "bytes of one WebSocket message")

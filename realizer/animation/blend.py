@@ -14,11 +14,12 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.idle import Blink
 from realizer.animation.targets import AU_NAMES, axis, presence, region
 from realizer.arrays import Bool, Float64
+from realizer.tables.cooccurrence import Rules
 
 __all__ = ["blend"]
 
 
-def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
+def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = None) -> AUFrames:
     """What all channels show together.
 
     Column by column of the axis:
@@ -37,6 +38,7 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     Args:
         channels: any number, any order; times on the same clock as `times`.
         times: (n,) seconds, any order.
+        rules: which AUs a face can show together; None: all of them.
     """
     times = np.asarray(times, np.float64)
     alive = _alive(channels, times)
@@ -75,7 +77,7 @@ def blend(channels: Iterable[Channel], times: Float64) -> AUFrames:
     np.clip(values, 0.0, 1.0, out=values, where=limited[:, None])
     frames = np.zeros((len(times), len(axis())), np.float32)
     frames[:, columns] = values.T
-    return AUFrames(times, frames)
+    return AUFrames(times, frames, rules)
 
 
 def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:

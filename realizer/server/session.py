@@ -94,6 +94,7 @@ class Session:
             idle=settings.idle,
             language=settings.language,
             media=settings.media,
+            cooccurrence=settings.cooccurrence,
         )
         self.load_face = load_face or _load_face
         self.capabilities = dict(capabilities or {})

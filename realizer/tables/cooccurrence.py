@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from realizer import tables
 from realizer.errors import TableError
 
-__all__ = ["Rule", "Rules", "Unit", "parse_rule", "read_rules", "rules"]
+__all__ = ["Rule", "Rules", "Unit", "chosen", "parse_rule", "read_rules", "rules"]
 
 FILE = "cooccurrence.toml"
 Kind = Literal["domination", "exclusion", "inclusion", "opposition"]
@@ -56,6 +56,17 @@ class Rules:
 
     sets: Mapping[str, tuple[float, float, float]]
     rules: tuple[Rule, ...]
+
+
+def chosen(setting: str) -> Rules | None:
+    """The rules of "on" (those that ship), "off" (none), or a file.
+
+    Raises:
+        TableError: as `rules`.
+    """
+    if setting == "off":
+        return None
+    return rules(None if setting == "on" else Path(setting))
 
 
 @cache
