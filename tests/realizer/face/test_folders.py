@@ -21,7 +21,6 @@ from realizer.face import (
     quantise,
     to_glb,
 )
-from realizer.face.build import build_face
 from realizer.face.features import NAMES
 
 FACES = [info.name for info in list_faces()]
@@ -227,12 +226,3 @@ def test_the_glb_holds_mesh_colours_and_parts(face: Face) -> None:
         a, b = extras["parts"][name]["triangles"]
         assert face.triangles[a:b].min() >= first
         assert face.triangles[a:b].max() < last
-
-
-def test_the_builder_says_what_it_misses(tmp_path: Path) -> None:
-    with pytest.raises(FaceError, match=r"recipe\.toml: wanted a recipe"):
-        build_face("x", tmp_path, tmp_path / "x")
-    (tmp_path / "x").mkdir()
-    (tmp_path / "x/recipe.toml").write_text("says = 'x'\n")
-    with pytest.raises(FaceError, match="wanted the unpacked wheel"):
-        build_face("x", tmp_path, tmp_path / "x")

@@ -1,0 +1,112 @@
+"""A person and their recipe in, the parts of their bust out, with baked light."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.arrays import Float64
+from realizer.face import head, paint, parts
+from realizer.face.hair import hair, scalp_of, shadow, style_of
+from realizer.face.lids import Lid
+from realizer.face.lips import Lips
+from realizer.face.parts import Part, smooth
+from realizer.face.patch import Patch, vertex_normals
+from realizer.face.person import Person
+from realizer.face.recipe import Recipe
+
+__all__: list[str] = []
+
+ORDER = (
+    "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
+    "shirt",
+)  # fmt: skip
+# Behind closed lips, or too thin: they cast no shadow.
+SHADOWLESS = ("upper_teeth", "lower_teeth", "tongue", "brows", "lashes")
+MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
+# Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
+BITE = {"upper_teeth": (0.0068, -0.0012), "lower_teeth": (0.0098, 0.0014)}
+LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
+TONGUE = np.array([0, -0.0085, -0.0055])  # m that the tongue rests lower and further back than in the data
+
+
+def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
+    """The parts in the order that a face's vertices have, with baked occlusion."""
+    ground, look = person.ground, recipe.colours
+    at, n = ground.at, len(ground.at)
+    points = {name: ground.point(name) for name in ground.points}
+    body = Patch.of_quads(ground.mesh.quads["body"], n)
+    body = body.kept((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
+    body = body.clipped(body.positions(at)[:, 1] - person.floor)[0]
+    visible = head.under_collar(body.positions(at))
+    skin = body.clipped(0.012 - visible)[0]
+    colours, gloss = paint.paint_skin(ground, lips, [lid.rings for lid in lids], look)
+    style = style_of(recipe.hair)
+    scalp = scalp_of(skin, at, points, style)
+    roots = shadow(scalp, style, at)[:, None]
+    colours = colours * (1 - roots) + np.array(look["hair"], float) * roots
+    made = [
+        Part(
+            "skin",
+            skin,
+            skin.positions(at),
+            skin.triangles,
+            np.asarray(skin.mix @ colours),
+            np.asarray(skin.mix @ gloss),
+        )
+    ]
+    made += [parts.brow(skin, at, points, side, look["brows"]) for side in (1, -1)]
+    for lid, (centre, _) in zip(lids, person.balls, strict=True):
+        made.append(parts.lashes(at, lid.upper, centre, look["lashes"]))
+    for name, side, (centre, radius) in zip(("left_eye", "right_eye"), (1, -1), person.balls, strict=True):
+        made.append(parts.eyeball(name, centre, radius, look, -side))
+    made += _teeth(person, recipe)
+    made.append(_tongue(person, recipe))
+    made += hair(scalp, style, look)
+    made.append(head.shirt(body, at, look["shirt"]))
+    made = sorted(made, key=lambda part: ORDER.index(part.name))
+    _bake(made)
+    return made
+
+
+def _teeth(person: Person, recipe: Recipe) -> list[Part]:
+    bite = person.ground.point("2.2")
+    width, depth = person.arch
+    made = []
+    for name, (back, rise) in BITE.items():
+        front = np.array([0, bite[1] + rise, bite[2] - back])
+        narrow = LOWER_ARCH if name == "lower_teeth" else 0
+        made.append(parts.teeth(name, front, width - narrow, depth, recipe.colours))
+    return made
+
+
+def _tongue(person: Person, recipe: Recipe) -> Part:
+    ground = person.ground
+    tongue = Patch.of_quads(ground.mesh.quads["helper-tongue"], len(ground.at))
+    tongue = tongue.moved(np.repeat(TONGUE[None], len(tongue), 0))
+    place = tongue.positions(ground.at)
+    # Darker in the groove along the middle and at the sides.
+    across = np.abs(place[:, 0]) / np.abs(place[:, 0]).max()
+    shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
+    colours: Float64 = np.array(recipe.colours["tongue"], float) * shade[:, None]
+    deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
+    light = 0.60 * smooth(deep, 0.65, 0.0) + 0.06
+    return Part("tongue", tongue, place, tongue.triangles, colours, np.full(len(place), 0.35), light)
+
+
+def _bake(made: list[Part]) -> None:
+    """Occlusion of every part that has none."""
+    count = np.cumsum([0] + [len(part.vertices) for part in made])
+    vertices = np.concatenate([part.vertices for part in made])
+    ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in made])
+    casts = np.concatenate(
+        [
+            part.triangles + first
+            for part, first in zip(made, count, strict=False)
+            if part.name not in SHADOWLESS
+        ]
+    )
+    sees = paint.occlusion(vertices, ups, casts)
+    for part, first in zip(made, count, strict=False):
+        if part.occlusion is None:
+            mine = sees[first : first + len(part.vertices)]
+            part.occlusion = 0.25 + 0.75 * mine
