@@ -62,7 +62,7 @@ def test_a_recipe_is_read_as_it_is_written(data: Path) -> None:
         ("= 0.5", "= true", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got True"),
         ("'macrodetails/asian-female-old' = 1.0", "", "wanted at least one of macrodetails/..., got none"),
         ("skin = [1, 2.5, 255]", "", "colours: skin: wanted three numbers 0..255, got none"),
-        ("skin = [1, 2.5, 255]", "skin = [1, 2, 256]", "colours: skin: wanted three numbers 0..255, got [1, 2"),
+        ("skin = [1, 2.5, 255]", "skin = [1, 2, 256]", "colours: skin: wanted three numbers 0..255, got [1"),
         ("skin = [1, 2.5, 255]", "skin = 'pink'", "colours: skin: wanted three numbers 0..255, got 'pink'"),
         ("[colours]", "[colours]\nnose = [1, 2, 3]", "colours: nose: wanted one of skin, "),
         ("says = 'Eve'", "says = 'Eve'\nhair = 3", "hair: wanted a table, got 3"),
