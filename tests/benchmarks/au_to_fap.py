@@ -2,7 +2,7 @@
 
 python tests/benchmarks/au_to_fap.py [--face NAME] [--worst 5]
 
-Every action unit at full intensity on both sides. `cosine`: between the shape and what its FAPs and the MPEG-4
+Each action unit at full intensity on both sides. `cosine`: between the shape and what its FAPs and the MPEG-4
 deformer make of it, over the visible skin of the left half. `ratio`: of their lengths. `cap`: the best cosine
 that any values of the 66 FAPs could reach. `far`: the shape's longest move. Last: where the difference lies.
 """

@@ -1,0 +1,175 @@
+"""Fit the table of action units and FAPs to a face's own shapes, and say it as rows of the table.
+
+python tests/benchmarks/fit_au_to_fap.py [--face NAME] [--au 12 ...] [--write]
+
+For each action unit with a shape: the FAP values, within the bounds of `au_to_fap_bounds.csv` (what the
+published maps and FACS say it may move, and which way), that bring the MPEG-4 deformer nearest to it in
+the least squares over the visible skin of the left half. Lips do not pass through each other, and AU26 parts
+them at least as far as AU25, AU27 as AU26. Rounded, and without what nobody sees.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from au_to_fap import Skin, asked, cosine
+from scipy.optimize import Bounds, LinearConstraint, minimize
+
+from realizer import tables
+from realizer.arrays import Float32, Float64
+from realizer.face import load_face
+from realizer.face.au import read_shapes
+from realizer.face.load import folder_of
+from realizer.tables import action_units, by_number, faps, read_csv
+
+# Upper and lower lip, one above the other: they part by -(upper + lower).
+INNER = ((4, 5), (8, 10))
+LIPS = (*INNER, (51, 52), (55, 57))
+PARTED = {26: 25, 27: 26}  # an action unit that parts the lips at least as far as the other
+STEP = 5.0  # what values are rounded to
+RIDGE = (
+    0.02  # of the mean square of what a FAP moves: of two ways to the same shape, the one that asks for less
+)
+SEEN = 0.04  # of the unit's length: what moves less is left out
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of bounds.csv; FAPs of the left side stand for both."""
+
+    au: int
+    length: float
+    fap: int
+    least: float
+    most: float
+
+
+def pair(values: Float64, numbers: list[int]) -> Float32:
+    """(68,) a FAP row of values of `numbers` and their mirrors."""
+    row = np.zeros(68, np.float32)
+    for number, value in zip(numbers, values, strict=True):
+        fap = faps()[number - 1]
+        row[[fap.fap - 1, fap.mirror - 1]] = value, fap.sign * value
+    return row
+
+
+def fit(
+    skin: Skin, wanted: Float64, bounds: list[Row], gaps: dict[tuple[int, int], float]
+) -> dict[int, float]:
+    """FAP -> value at full intensity, within the bounds; lips part by at least `gaps`."""
+    numbers = [bound.fap for bound in bounds]
+    low, high = np.array([b.least for b in bounds]), np.array([b.most for b in bounds])
+    values = np.clip(0.0, low, high).astype(np.float64)
+    size = np.array([faps()[number - 1].most / 20 for number in numbers])
+    apart = np.array([[-1.0 if n in lips else 0.0 for n in numbers] for lips in gaps]) * size
+    for _ in range(3):  # jaw and lids are not straight: start again from where the last fit came to
+        rows = [pair(values, numbers), *(pair(values + size * one, numbers) for one in np.eye(len(size)))]
+        moves = skin.moves(np.stack(rows)).reshape(len(rows), -1)
+        fields = moves[1:] - moves[0]  # of a step of `size`
+        target = wanted.ravel() - moves[0] + (values / size) @ fields
+        limits = LinearConstraint(apart, np.array(list(gaps.values())), np.inf)
+        values = np.clip(solve(fields, target, Bounds(low / size, high / size), limits) * size, low, high)
+    length = np.linalg.norm(wanted)
+    strong = np.abs(values / size) * np.sqrt(np.diag(fields @ fields.T)) > SEEN * length
+    kept = np.clip(np.where(strong, values, 0.0), low, high)
+    return {n: float(v) for n, v in zip(numbers, np.rint(kept / STEP) * STEP, strict=True) if v}
+
+
+def solve(fields: Float64, target: Float64, bounds: Bounds, limits: LinearConstraint) -> Float64:
+    """(k,) how much of each field (k, n) together is nearest to the target (n,)."""
+    whole = float(target @ target)
+    square, aimed = fields @ fields.T / whole, fields @ target / whole
+    square += RIDGE * np.diag(np.diag(square))
+
+    def slope(x: Float64) -> Float64:
+        return np.asarray(square @ x - aimed)
+
+    found = minimize(
+        lambda x: float(x @ square @ x / 2 - aimed @ x),
+        np.clip(np.zeros(len(fields)), bounds.lb, bounds.ub),
+        jac=slope,
+        bounds=bounds,
+        constraints=limits,
+        method="SLSQP",
+        options={"maxiter": 300, "ftol": 1e-12},
+    )
+    return np.asarray(found.x, np.float64)
+
+
+def gaps_of(number: int, found: dict[int, dict[int, float]]) -> dict[tuple[int, int], float]:
+    """The least that pairs of lips part."""
+    if number not in PARTED:
+        return dict.fromkeys(INNER, 0.0)
+    before = found.get(PARTED[number]) or dict(enumerate(asked([PARTED[number]])[0].tolist(), 1))
+    return {(a, b): -before.get(a, 0.0) - before.get(b, 0.0) for a, b in LIPS}
+
+
+def rows_of(number: int, values: dict[int, float]) -> list[str]:
+    """Rows of the table, both sides."""
+    sides = ("L", "R") if by_number(action_units())[number].sides else ("",)
+    lines = []
+    for side in sides:
+        asks = dict(values) if side == "L" else {}
+        if side != "L":
+            asks = {faps()[n - 1].mirror: faps()[n - 1].sign * v for n, v in values.items()}
+        if not side:
+            asks |= values
+        lines += [f"{number},{side},{fap},0,1,0,{value:.0f}" for fap, value in sorted(asks.items())]
+    return lines
+
+
+def write(new: dict[int, list[str]]) -> None:
+    """Put rows in the place of those that the table has of their action units."""
+    path = Path(tables.__file__).with_name("au_to_fap.csv")
+    lines = []
+    for line in path.read_text("utf-8").splitlines():
+        number = line.partition(",")[0]
+        if number.isdecimal() and int(number) in new:
+            lines += new[int(number)]
+            new[int(number)] = []
+        else:
+            lines.append(line)
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument("--face", default="default")
+    options.add_argument("--au", type=int, nargs="*")
+    options.add_argument("--write", action="store_true", help="put the rows into the table")
+    chosen = options.parse_args()
+    face = load_face(chosen.face)
+    shapes = read_shapes(folder_of(chosen.face) / "au_shapes.npz")
+    skin = Skin.of(face, next(iter(shapes.values())))
+    path = Path(__file__).with_name("au_to_fap_bounds.csv")
+    bounds: dict[int, list[Row]] = defaultdict(list)
+    for bound in read_csv(path.read_text("utf-8"), Row, path.name):
+        bounds[bound.au].append(bound)
+    found: dict[int, dict[int, float]] = {}
+    for number in bounds:
+        if chosen.au and number not in chosen.au:
+            continue
+        wanted = shapes[number].moves[shapes[number].seen]
+        part = bounds[number][0].length
+        found[number] = fit(skin, part * wanted, bounds[number], gaps_of(number, found))
+        row = pair(np.array(list(found[number].values())), list(found[number]))
+        before, after = skin.moves(np.stack([asked([number])[0], row]))
+        near = f"{cosine(wanted, before):.3f} -> {cosine(wanted, after):.3f}"
+        ratio = np.linalg.norm(after) / np.linalg.norm(wanted)
+        print(f"# AU{number}: cosine {near}, ratio {ratio:.2f}")
+        print("\n".join(rows_of(number, found[number])), flush=True)
+    if chosen.write:
+        write({number: rows_of(number, values) for number, values in found.items()})
+
+
+if __name__ == "__main__":
+    main()
