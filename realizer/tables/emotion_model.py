@@ -1,0 +1,50 @@
+"""emotion_model.toml -> the few numbers that the wheel and the recogniser need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from realizer import tables
+from realizer.errors import TableError
+
+__all__ = ["EmotionModel", "emotion_model"]
+
+FILE = "emotion_model.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class EmotionModel:
+    """What is not in the other tables of emotions.
+
+    Attributes:
+        most: the highest activation, for which our own profiles are drawn.
+        middle: of evaluation and activation.
+        chosen: emotion -> the number of the published profile that stands for it.
+        core, base: parts of a range's length within which a value belongs to it for sure, and perhaps.
+        least_length: FAPU, of a range.
+        absent: FAPU, as far as a FAP that is not moved may be off.
+    """
+
+    most: float
+    middle: float
+    chosen: Mapping[str, int]
+    core: float
+    base: float
+    least_length: float
+    absent: float
+
+
+@cache
+def emotion_model() -> EmotionModel:
+    """The table.
+
+    Raises:
+        TableError: a membership that does not fall.
+    """
+    table = tables.read_toml(tables.text_of(FILE), FILE)
+    model = EmotionModel(**table["wheel"], chosen=table["chosen"], **table["recognition"])
+    if not (0 <= model.core < model.base and model.least_length > 0 and model.absent > 0):
+        raise TableError(f"{FILE}, recognition: wanted 0 <= core < base, and lengths above 0, got {model}")
+    return model
