@@ -7,6 +7,7 @@ import sys
 import click
 
 import realizer
+from realizer.cli import options
 from realizer.cli.check import check
 from realizer.cli.demo import demo
 from realizer.cli.doctor import doctor
@@ -21,8 +22,8 @@ __all__ = ["main"]
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(realizer.__version__, prog_name="realizer")
-@click.option("-v", "--verbose", is_flag=True, help="Say more on standard error.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors on standard error.")
+@click.option("-v", "--verbose", is_flag=True, help=options.VERBOSE)
+@click.option("-q", "--quiet", is_flag=True, help=options.QUIET)
 @click.pass_context
 def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     """Send it BML, get a living face.
@@ -36,16 +37,11 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
 
     DOC may be - for standard input. Settings may also come from REALIZER_* variables.
     """
-    import logging
-
-    level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
-    logging.basicConfig(level=level, format="realizer: %(message)s", stream=sys.stderr)
-    if not quiet:  # long films say how far they are
-        logging.getLogger("realizer.outputs").setLevel(logging.INFO)
-    context.obj = {"quiet": quiet, "verbose": verbose}
+    options.speak_up(context, quiet=quiet, verbose=verbose)
 
 
 for command in (serve, realize, schedule, check, faces, voices, outputs, doctor, demo):
+    options.loudness(command)
     cli.add_command(command)
 
 

@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from realizer.cli.fit import fit
-
-if TYPE_CHECKING:
-    from realizer.arrays import Float32
+from realizer.cli.sheet import sheet
 
 __all__: list[str] = []
-
-# What a sheet shows of a FAP: half a face distance (Paul 2010, 4.4.2), or 20 degrees.
-HALF, TURN = 512, 34907
 
 
 @click.group()
@@ -24,6 +18,7 @@ def faces() -> None:
 
 
 faces.add_command(fit)
+faces.add_command(sheet)
 
 
 @faces.command("list")
@@ -47,62 +42,6 @@ def check(name: str) -> int:
     if not faults:
         click.echo(f"{name}: sound", err=True)
     return 1 if faults else 0
-
-
-@faces.command()
-@click.argument("name")
-@click.option("-o", "--output", required=True, metavar="SHEET.png", type=click.Path(path_type=Path))
-@click.option("--camera", default="front", show_default=True, help="front, three-quarter, profile or close.")
-@click.option("--aus", is_flag=True, help="Every action unit at full intensity instead of every FAP.")
-def sheet(name: str, output: Path, camera: str, aus: bool) -> None:
-    """Draw what every FAP, in each of its directions, or every action unit does to a face."""
-    import numpy as np
-    from PIL import Image
-
-    from realizer.render import Renderer
-    from realizer.render.sheets import sheet as arrange
-
-    if output.suffix != ".png":
-        raise click.BadParameter(f"wanted a name that ends in .png, got {output}", param_hint="-o")
-    titles, rows = _action_units() if aus else _displacements()
-    with Renderer(name, (240, 240), camera) as renderer:
-        pictures = renderer.draw(np.stack(rows))
-    Image.fromarray(arrange(list(pictures), titles)).save(output)
-    click.echo(f"{output}: {len(titles)} pictures")
-
-
-def _displacements() -> tuple[list[str], list[Float32]]:
-    """Title and (68,) FAP row of each displacement: 66 FAPs, those with two directions in both."""
-    import numpy as np
-
-    from realizer.tables import faps
-
-    titles, rows = ["neutral"], [np.zeros(68, np.float32)]
-    for fap in faps()[2:]:
-        size = TURN if fap.unit == "angle_unit" else HALF
-        for value in (size, -size):
-            if fap.least <= value <= fap.most:
-                titles.append(f"{fap.fap} {fap.name} {value:+d}")
-                rows.append(np.zeros(68, np.float32))
-                rows[-1][fap.fap - 1] = value
-    return titles, rows
-
-
-def _action_units() -> tuple[list[str], list[Float32]]:
-    """Title and (68,) FAP row of each action unit at intensity 1, on both sides."""
-    import numpy as np
-
-    from realizer.animation.fap import to_fap
-    from realizer.animation.frames import AUFrames
-    from realizer.animation.targets import au, axis
-    from realizer.tables import action_units
-
-    units = action_units()
-    values = np.zeros((len(units) + 1, len(axis())), np.float32)
-    for row, unit in enumerate(units, 1):
-        values[row, [target.column for target in au(unit.au)]] = 1
-    frames = to_fap(AUFrames(np.arange(len(values), dtype=np.float64), values))
-    return ["neutral", *(f"AU{u.au} {u.name}" for u in units)], list(frames.values)
 
 
 @faces.command()

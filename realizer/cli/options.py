@@ -33,6 +33,20 @@ media = click.option(
 )
 
 
+cooccurrence = click.option(
+    "--cooccurrence",
+    metavar="on|off|FILE",
+    help="Rules of action units that no face shows together: ours, none, a file of them.  [default: on]",
+)
+
+
+deformer = click.option(
+    "--deformer",
+    type=click.Choice(["mpeg4", "au"]),
+    help="What moves the face: FAPs, or its model of action units.  [default: as the face says]",
+)
+
+
 class Number(click.FloatRange):
     """A finite number in a range; click lets NaN through."""
 
@@ -110,6 +124,106 @@ def tell(warnings: Iterable[Warning]) -> None:
     """Warnings of documents, one line each, on standard error."""
     for warning in warnings:
         click.echo(f"{warning.id}: {warning.type}: {warning.text}", err=True)
+
+
+CAMERAS = "front, three-quarter, profile, close, or a camera of the face's own."
+LIGHTS = "portrait (soft and warm), daylight (even: shows every feature) or evening (one cheek in shade)"
+
+
+def light(command: Command) -> Command:
+    """--light; another name is refused with the known ones."""
+    words = f"{LIGHTS}.  [default: portrait]"
+    return click.option("--light", metavar="NAME", callback=_light, help=words)(command)
+
+
+def _light(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    from realizer.render.light import preset
+
+    return None if value is None else _asked(preset, value)
+
+
+def background(command: Command) -> Command:
+    """--background, of pictures that may have no background at all."""
+    words = "Behind the head: a colour such as '#d8dde2', or transparent.  [default: the light's own]"
+    return click.option("--background", metavar="COLOUR", callback=_background, help=words)(command)
+
+
+def colour(command: Command) -> Command:
+    """--background, of pictures that are opaque."""
+    words = "Behind the head: a colour such as '#d8dde2'.  [default: the light's own]"
+    return click.option("--background", metavar="COLOUR", callback=_colour, help=words)(command)
+
+
+def _background(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    from realizer.render.backdrop import colour_of
+
+    return None if value is None else _asked(colour_of, value)
+
+
+def _colour(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    if value == "transparent":
+        raise click.BadParameter("wanted a colour such as #d8dde2: these pictures are opaque")
+    return _background(context, parameter, value)
+
+
+def _asked(check: Callable[[str], object], value: str) -> str:
+    """The value, where `check` takes it; what it says otherwise is about how it was called."""
+    from realizer.errors import RenderError
+
+    try:
+        check(value)
+    except RenderError as error:
+        raise click.BadParameter(str(error)) from None
+    return value
+
+
+def check_camera(face: str, name: str) -> None:
+    """Nothing, where this face has a camera of that name.
+
+    Raises:
+        click.BadParameter: it has none; lists those it has.
+    """
+    from realizer.face import load_face
+    from realizer.render.cameras import PRESETS, camera_for
+
+    if name not in PRESETS:  # a face may bring its own
+        try:
+            _asked(lambda name: camera_for(load_face(face), name), name)
+        except click.BadParameter as error:
+            raise click.BadParameter(error.message, param_hint="--camera") from None
+
+
+def loudness(command: click.Command) -> None:
+    """Let a command, or each command of a group, take -q and -v as `realizer` itself does."""
+    if isinstance(command, click.Group):
+        for member in command.commands.values():
+            loudness(member)
+        return
+    taken = {flag for parameter in command.params for flag in parameter.opts}
+    for flags, words in ((("-q", "--quiet"), QUIET), (("-v", "--verbose"), VERBOSE)):
+        if not taken & set(flags):
+            option = click.Option(flags, is_flag=True, expose_value=False, callback=_loud, help=words)
+            command.params.append(option)
+
+
+VERBOSE, QUIET = "Say more on standard error.", "Say nothing but errors on standard error."
+
+
+def _loud(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+    if value:
+        speak_up(context, **{str(parameter.name): True})
+
+
+def speak_up(context: click.Context, *, quiet: bool = False, verbose: bool = False) -> None:
+    """Say as much on standard error as was asked for, before or after the command's name."""
+    import logging
+
+    context.obj = {"quiet": quiet, "verbose": verbose}
+    level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
+    logging.basicConfig(format="realizer: %(message)s", stream=sys.stderr)
+    logging.getLogger().setLevel(level)
+    # Long films say how far they are.
+    logging.getLogger("realizer.outputs").setLevel(logging.ERROR if quiet else logging.INFO)
 
 
 def size(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, int]:

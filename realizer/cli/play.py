@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 __all__: list[str] = []
 
+PICTURES = (".png", ".mp4", ".webm")
+TRANSPARENT = "transparent"
+
 
 @click.command()
 @options.documents
@@ -31,10 +34,14 @@ __all__: list[str] = []
     "--at", type=options.Number(0), metavar="SECONDS", help="With .png: the picture of that instant."
 )
 @click.option("--face", metavar="NAME", help="A face of `realizer faces list`.")
+@options.deformer
 @click.option("--size", default="512x512", show_default=True, callback=options.size, help="Of pictures.")
-@click.option("--camera", default="front", show_default=True, help="front, three-quarter, profile or close.")
+@click.option("--camera", default="front", show_default=True, help=options.CAMERAS)
+@options.light
+@options.background
 @click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]")
 @click.option("--no-idle", is_flag=True, help="No blinks, no small head motion.")
+@options.cooccurrence
 @options.playing
 @click.pass_context
 def realize(
@@ -44,10 +51,14 @@ def realize(
     fps: float | None,
     at: float | None,
     face: str | None,
+    deformer: str | None,
     size: tuple[int, int],
     camera: str,
+    light: str | None,
+    background: str | None,
     seed: int | None,
     no_idle: bool,
+    cooccurrence: str | None,
     voice: str | None,
     scene: str | None,
     media: Path | None,
@@ -69,16 +80,27 @@ def realize(
             raise click.BadParameter(str(error), param_hint="-o") from None
     chosen = options.settings(
         face=face,
+        deformer=deformer,
         fps=fps,
         voice=voice,
         scene=scene,
         media=media,
         seed=seed,
         idle=False if no_idle else None,
+        cooccurrence=cooccurrence,
     )
+    if writer is not None and writer.suffix in PICTURES:
+        options.check_camera(chosen.face, camera)
+    if background == TRANSPARENT and (writer is None or writer.suffix != ".png" or at is None):
+        raise click.BadParameter(
+            "wanted a colour such as #d8dde2: only the picture of one instant, a .png with --at, "
+            "can be transparent",
+            param_hint="--background",
+        )
     realization = run(
         options.read_documents(documents),
         face=chosen.face,
+        deformer=chosen.deformer,
         fps=chosen.fps,
         voice=chosen.voice,
         scene=options.read_scene(chosen.scene),
@@ -86,6 +108,7 @@ def realize(
         idle=chosen.idle,
         language=chosen.language,
         media=chosen.media,
+        cooccurrence=chosen.cooccurrence,
     )
     if any(speaking.utterance.pcm is None for speaking in realization.speaking):
         options.tell_silence(chosen.voice)
@@ -96,7 +119,8 @@ def realize(
         sys.stdout.flush()
     elif output is not None:
         try:
-            writer.write(realization, Path(output), Drawing(size=size, camera=camera, at=at))
+            drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)
+            writer.write(realization, Path(output), drawing)
         except OSError as error:
             raise click.UsageError(f"{output}: {error.strerror or error}") from None
         if not context.obj["quiet"]:

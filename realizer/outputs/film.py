@@ -174,13 +174,11 @@ def _sound(av: Any, pcm: Int16, rate: int, first: int) -> Any:
 
 def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
     """Draw and encode side by side: the drawing process is a batch ahead."""
-    from realizer.render import Renderer
-
     _av()  # before the drawing starts
     form = FORMATS[Path(path).suffix.lower()]
     size = (drawing.size[0] + drawing.size[0] % 2, drawing.size[1] + drawing.size[1] % 2)
-    rows = realization.faps.values
-    with replacing(path) as draft, Renderer(realization.face_name, size, drawing.camera) as renderer:
+    rows = realization.poses
+    with replacing(path) as draft, drawing.renderer(realization.face_name, size) as renderer:
         pictures = renderer.frames(rows)
         encode_film(draft, form, pictures, len(rows), realization.fps, realization.sound(RATE))
 

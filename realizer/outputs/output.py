@@ -9,17 +9,26 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from realizer.pipeline import Realization
+    from realizer.render import Renderer
 
 __all__ = ["Drawing", "Output"]
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """How pictures are drawn: what `realize --size --camera --at` say."""
+    """How pictures are drawn: what `realize --size --camera --at --light --background` say."""
 
     size: tuple[int, int] = (512, 512)  # width, height
     camera: str = "front"
     at: float | None = None  # seconds; None: the whole span
+    light: str | None = None  # a preset; None: as `realizer.render.Renderer` takes it, as is
+    background: str | None = None  # "#rrggbb", or of one picture "transparent"
+
+    def renderer(self, face: str, size: tuple[int, int], *, alpha: bool = False) -> Renderer:
+        """What draws like that, at this size; `alpha` where the picture may be transparent."""
+        from realizer.render import Renderer
+
+        return Renderer(face, size, self.camera, light=self.light, background=self.background, alpha=alpha)
 
 
 @dataclass(frozen=True)

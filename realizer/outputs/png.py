@@ -54,8 +54,8 @@ def moments(realization: Realization, most: int = MOST) -> tuple[Moment, ...]:
 
 
 def row_at(realization: Realization, seconds: float) -> Float32:
-    """(68,) FAPs at an instant, between the two frames around it; outside of all, the nearest."""
-    frames = realization.faps.values
+    """(k,) the pose at an instant, between the two frames around it; outside of all, the nearest."""
+    frames = realization.poses
     place = min(max(seconds * realization.fps, 0.0), len(frames) - 1)
     below = int(place)
     above = min(below + 1, len(frames) - 1)
@@ -75,18 +75,17 @@ def encode_png(pixels: UInt8) -> bytes:
 
 def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
     """With `drawing.at` the picture of that instant; otherwise the sheet, its pictures at half the size."""
-    from realizer.render import Renderer
     from realizer.render.sheets import sheet
 
     if drawing.at is not None:
-        with Renderer(realization.face_name, drawing.size, drawing.camera, alpha=True) as renderer:
+        with drawing.renderer(realization.face_name, drawing.size, alpha=True) as renderer:
             (picture,) = renderer.draw(row_at(realization, drawing.at)[None])
         write_bytes(path, encode_png(picture))
         return
     shown = moments(realization)
     half = (max(1, drawing.size[0] // 2), max(1, drawing.size[1] // 2))
-    with Renderer(realization.face_name, half, drawing.camera) as renderer:
-        pictures = renderer.draw(realization.faps.values[[moment.frame for moment in shown]])
+    with drawing.renderer(realization.face_name, half) as renderer:
+        pictures = renderer.draw(realization.poses[[moment.frame for moment in shown]])
     titles = [f"{moment.time:.2f} s" for moment in shown]
     write_bytes(path, encode_png(sheet(list(pictures), titles, [moment.points for moment in shown])))
 

@@ -1,0 +1,173 @@
+"""`faces sheet`: what every FAP, action unit and emotion does to a face, as one picture to look at."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from realizer.cli import options
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from realizer.cli.poses import Series
+    from realizer.render.sheets import Cell
+
+__all__: list[str] = []
+
+SCALE = (260, 16)  # pixels of the colour scale
+
+
+@click.command()
+@click.argument("name")
+@click.option("-o", "--output", required=True, metavar="SHEET.png", type=click.Path(path_type=Path))
+@click.option("--faps", "faps", is_flag=True, help="Every low-level FAP, in each of its directions.")
+@click.option("--aus", is_flag=True, help="Every action unit.  [default: FAPs and action units]")
+@click.option(
+    "--emotions", is_flag=True, help="The archetypes, and 17 angles of the wheel at 4 activations each."
+)
+@click.option(
+    "--value",
+    type=options.Number(1, 4320),
+    default=512,
+    show_default=True,
+    help="Of FAPs: 512 is half the distance they are measured in, and 20 degrees of those that turn. "
+    "Less where a FAP does not go so far.",
+)
+@click.option(
+    "--intensity",
+    type=options.Number(0, 1, min_open=True),
+    default=1,
+    show_default=True,
+    help="Of action units.",
+)
+@click.option(
+    "--camera",
+    "cameras",
+    multiple=True,
+    help=f"{options.CAMERAS} Repeat it to see each pose from several sides.  [default: front]",
+)
+@options.light
+@options.colour
+@click.option("--size", default="220x280", show_default=True, callback=options.size, help="Of each picture.")
+@click.pass_context
+def sheet(
+    context: click.Context,
+    name: str,
+    output: Path,
+    faps: bool,
+    aus: bool,
+    emotions: bool,
+    value: float,
+    intensity: float,
+    cameras: tuple[str, ...],
+    light: str | None,
+    background: str | None,
+    size: tuple[int, int],
+) -> None:
+    """Draw what every FAP and every action unit does to a face.
+
+    Beside each picture stands what changed: over the neutral face, blurred and faint, the difference in
+    colours, pale where it is strong (Paul 2010, 4.4.2). For judging a face by eye, also from the side:
+
+    \b
+    realizer faces sheet ada -o ada.png --camera front --camera profile
+    realizer faces sheet ada -o ada.png --emotions
+    """
+    from PIL import Image
+
+    from realizer.cli import poses
+    from realizer.render.sheets import Group, album
+
+    if output.suffix != ".png":
+        raise click.BadParameter(f"wanted a name that ends in .png, got {output}", param_hint="-o")
+    cameras = cameras or ("front",)
+    for camera in cameras:
+        options.check_camera(name, camera)
+    if not (faps or aus or emotions):
+        faps = aus = True
+    series = [poses.neutral()]
+    if faps:
+        series += poses.of_faps(value)
+    if aus:
+        series += poses.of_aus(intensity)
+    if emotions:
+        series += poses.of_emotions()
+    count = sum(len(part.poses) for part in series)
+    with _progress(count * len(cameras), context.obj["quiet"]) as step:
+        groups = [
+            Group(part.heading, cells, part.columns)
+            for part, cells in _cells(name, series, cameras, size, light, background, step)
+        ]
+    words = f"{name}: {', '.join(cameras)}. Left as drawn, right the difference to the neutral face"
+    pixels = album(groups, _scale(), words)
+    Image.fromarray(pixels).save(output, compress_level=4)
+    if not context.obj["quiet"]:
+        click.echo(f"{output}: {count} poses, {pixels.shape[1]}x{pixels.shape[0]}", err=True)
+
+
+def _cells(
+    name: str,
+    series: list[Series],
+    cameras: tuple[str, ...],
+    size: tuple[int, int],
+    light: str | None,
+    background: str | None,
+    step: Callable[[int], None],
+) -> Iterator[tuple[Series, list[Cell]]]:
+    """Each series with its cells; the first pose of all is the neutral one."""
+    import numpy as np
+
+    from realizer.render import Renderer
+    from realizer.render.difference import difference, faint, flatten
+    from realizer.render.light import preset
+    from realizer.render.sheets import Cell
+
+    # Plain, so that what differs is the face.
+    behind = np.rint(np.array(preset(light).backdrop_middle) * 255)
+    if background:
+        behind = np.frombuffer(bytes.fromhex(background[1:]), np.uint8)
+    every = [pose for part in series for pose in part.poses]
+    rows = np.stack([pose.row for pose in every])
+    shown: list[list[Any]] = [[] for _ in every]
+    for camera in cameras:
+        neutral = below = None
+        with Renderer(name, size, camera, light=light, background="transparent") as renderer:
+            for k, drawn in enumerate(renderer.frames(rows)):
+                picture = flatten(drawn, behind)
+                if neutral is None or below is None:
+                    neutral, below = picture, faint(drawn)
+                shown[k] += [picture, difference(picture, neutral, below)]
+                step(1)
+    pictures = iter(shown)
+    for part in series:
+        yield part, [Cell(next(pictures), pose.title, pose.notes) for pose in part.poses]
+
+
+@contextmanager
+def _progress(steps: int, quiet: bool) -> Iterator[Callable[[int], None]]:
+    """A bar on standard error, where somebody looks."""
+    with click.progressbar(length=steps, label="drawing", file=sys.stderr, hidden=quiet) as bar:
+        yield bar.update
+
+
+def _scale() -> Any:
+    """(h, w, 3): the colours of differences, and what they mean."""
+    import numpy as np
+    from PIL import Image, ImageDraw, ImageFont
+
+    from realizer.render.difference import FULL, ramp
+    from realizer.render.sheets import INK, PAPER
+
+    width, height = SCALE
+    image = Image.new("RGB", (width, height * 2 + 8), PAPER)
+    bar = np.broadcast_to(ramp(np.linspace(0, 1, width, dtype=np.float32)), (height, width, 3))
+    image.paste(Image.fromarray(np.rint(bar).astype(np.uint8)), (0, 0))
+    words = f"differs by 0 .. {FULL:.0%} of white or more"
+    ImageDraw.Draw(image).text((0, height + 4), words, INK, ImageFont.load_default(14))
+    return np.asarray(image)

@@ -1,0 +1,51 @@
+"""FAPs and AUs under headings for people: `regions.toml` as rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+from realizer import tables
+from realizer.errors import TableError
+
+__all__ = ["Region", "au_regions", "fap_regions"]
+
+FILE = "regions.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A heading, and the numbers of the FAPs or AUs under it."""
+
+    name: str
+    members: tuple[int, ...]
+
+
+@cache
+def fap_regions() -> tuple[Region, ...]:
+    """The groups of the low-level FAPs, 3..68, in order.
+
+    Raises:
+        TableError: a FAP that is missing, unknown, or there twice.
+    """
+    return _regions("fap", [row.fap for row in tables.faps() if row.fap > 2])
+
+
+@cache
+def au_regions() -> tuple[Region, ...]:
+    """The classes of the AUs, from the brows down.
+
+    Raises:
+        TableError: an AU that is missing, unknown, or there twice.
+    """
+    return _regions("au", [row.au for row in tables.action_units()])
+
+
+def _regions(kind: str, wanted: list[int]) -> tuple[Region, ...]:
+    rows = tables.read_toml(tables.text_of(FILE), FILE)[kind]
+    found = tuple(Region(row["name"], tuple(row["members"])) for row in rows)
+    members = [number for region in found for number in region.members]
+    if sorted(members) != wanted:
+        odd = sorted({n for n in [*members, *wanted] if members.count(n) != 1 or n not in wanted})
+        raise TableError(f"{FILE}, {kind}: wanted every number of its table once, but not so: {odd}")
+    return found

@@ -1,0 +1,71 @@
+"""Options that several commands share: the same words, the same refusals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+
+GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
+
+
+def run(*args: str) -> Result:
+    return CliRunner().invoke(cli, list(args), input=GOOD, catch_exceptions=False)
+
+
+def leaves(command: click.Command) -> list[click.Command]:
+    if isinstance(command, click.Group):
+        return [leaf for member in command.commands.values() for leaf in leaves(member)]
+    return [command]
+
+
+@pytest.mark.parametrize("command", leaves(cli), ids=lambda command: str(command.name))
+def test_every_command_can_be_told_to_be_quiet_or_to_say_more(command: click.Command) -> None:
+    flags = {flag for parameter in command.params for flag in parameter.opts}
+    assert {"-q", "--quiet", "-v", "--verbose"} <= flags
+
+
+@pytest.mark.parametrize(
+    "args", [["-q", "realize", "-"], ["realize", "-", "--quiet"], ["realize", "-q", "-"]]
+)
+def test_quiet_is_the_same_before_and_after_the_command(args: list[str], tmp_path: Path) -> None:
+    done = run(*args, "--voice", "silent", "-o", str(tmp_path / "x.fap"))
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (
+            ["-o", "x.png", "--camera", "top"],
+            "camera: wanted one of front, three-quarter, profile, close, got",
+        ),
+        (["-o", "x.png", "--light", "noon"], "light: wanted one of portrait, daylight, evening, got 'noon'"),
+        (["-o", "x.png", "--background", "#12"], "wanted transparent or a colour such as #d8dde2, got '#12'"),
+        (["-o", "x.mp4", "--background", "transparent"], "a .png with --at, can be transparent"),
+    ],
+)
+def test_a_wrong_look_is_wrong_usage(args: list[str], words: str) -> None:
+    done = run("realize", "-", *args)
+    assert done.exit_code == 2
+    assert words in " ".join(done.stderr.split())
+
+
+@pytest.mark.gl
+def test_light_and_background_are_seen_in_the_picture(tmp_path: Path) -> None:
+    from PIL import Image
+
+    def picture(*args: str) -> Image.Image:
+        path = tmp_path / "x.png"
+        done = run("realize", "-", "-o", str(path), "--at", "0", "--size", "64x64", "--no-idle", *args)
+        assert done.exit_code == 0
+        return Image.open(path).copy()
+
+    plain, evening = picture(), picture("--light", "evening")
+    assert sum(plain.getpixel((32, 30))) > sum(evening.getpixel((40, 30)))
+    assert picture("--background", "#204060").getpixel((1, 1)) == (0x20, 0x40, 0x60)
+    assert picture("--background", "transparent").getpixel((1, 1))[3] == 0

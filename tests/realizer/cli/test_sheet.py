@@ -1,0 +1,46 @@
+"""`realizer faces sheet`: a picture, and what it says of wrong wishes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from realizer.cli import cli
+
+
+def sheet(*args: str) -> Result:
+    return CliRunner().invoke(cli, ["faces", "sheet", "default", *args], catch_exceptions=False)
+
+
+@pytest.mark.gl
+def test_the_archetypes_from_two_sides_stand_beside_what_changed(tmp_path: Path) -> None:
+    path = tmp_path / "x.png"
+    done = sheet("-o", str(path), "--emotions", "--size", "60x80", "--camera", "front", "--camera", "profile")
+    assert done.exit_code == 0
+    assert "7 poses" in done.stderr
+    pixels = np.asarray(Image.open(path))
+    assert pixels.shape[1] > 2 * 4 * 60
+    # Differences are drawn in hues that no face has: violet, where they are small.
+    violet = (pixels[..., 2] > pixels[..., 1] + 40) & (pixels[..., 0] > pixels[..., 1] + 20)
+    assert violet.sum() > 100
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["-o", "x.jpg"], "wanted a name that ends in .png"),
+        (["-o", "x.png", "--camera", "top"], "wanted one of front, three-quarter, profile, close, got 'top'"),
+        (["-o", "x.png", "--light", "noon"], "wanted one of portrait, daylight, evening, got 'noon'"),
+        (["-o", "x.png", "--background", "blue"], "a colour such as #d8dde2, got 'blue'"),
+        (["-o", "x.png", "--background", "transparent"], "these pictures are opaque"),
+        (["-o", "x.png", "--value", "0"], "0"),
+    ],
+)
+def test_wrong_wishes_are_wrong_usage_and_the_words_list_what_there_is(args: list[str], words: str) -> None:
+    done = sheet(*args)
+    assert done.exit_code == 2
+    assert words in " ".join(done.stderr.split())
