@@ -34,7 +34,7 @@ class Part:
     fields: dict[int, Float64] = field(default_factory=dict)
 
 
-def smooth(x: Any, low: float, high: float) -> Any:
+def smooth(x: Any, low: Any, high: Any) -> Any:
     """0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
     t = np.clip((np.asarray(x, float) - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
