@@ -134,13 +134,14 @@ class Fap:
 
 @dataclass(frozen=True, slots=True)
 class ActionUnit:
-    """One FACS action unit."""
+    """One FACS action unit; `no_fap` says why no FAP shows it, "" where FAPs do."""
 
     au: int
     name: str
     sides: bool
     combine: Literal["max", "sum"]
     degrees: float
+    no_fap: str
 
 
 @dataclass(frozen=True, slots=True)

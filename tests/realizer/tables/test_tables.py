@@ -16,8 +16,8 @@ FAPS = {row.fap: row for row in tables.faps()}
 AUS = tables.by_number(tables.action_units())
 ROWS = tables.au_to_fap()
 
-# MPEG-4 moves the head by angles only: it cannot come forward or go back.
-NOT_SHOWN = {57, 58}
+# Wojdel 2005, appendix A: the action units of Ekman and Friesen.
+FACS = {1, 2, *range(4, 40), *range(41, 47), *range(51, 59), *range(61, 67)} - {3, 40}
 
 
 def polylines() -> dict[tuple[int, str, int], list[tuple[float, float]]]:
@@ -79,8 +79,23 @@ def test_a_polyline_starts_at_rest_and_stays_whole_and_within_the_fap(key: tuple
     assert any(f for _, f in points)
 
 
-def test_every_action_unit_that_a_face_can_show_moves_something() -> None:
-    assert set(AUS) - {row.au for row in ROWS} == NOT_SHOWN
+def test_every_action_unit_of_facs_is_listed() -> None:
+    assert set(AUS) == FACS
+
+
+@pytest.mark.parametrize("unit", tables.action_units(), ids=lambda unit: f"AU{unit.au}")
+def test_an_action_unit_moves_a_fap_on_each_of_its_sides_or_says_why_none(unit: tables.ActionUnit) -> None:
+    sides = {row.side for row in ROWS if row.au == unit.au}
+    if unit.no_fap:
+        assert not sides
+    else:
+        assert sides == ({"L", "R"} if unit.sides else {""})
+
+
+def test_a_side_of_an_action_unit_does_not_move_the_other_half_of_the_face() -> None:
+    for row in ROWS:
+        if row.side and FAPS[row.fap].mirror != row.fap:
+            assert f"_{row.side.lower()}" in FAPS[row.fap].name
 
 
 def test_left_and_right_mirror_each_other() -> None:
