@@ -1,4 +1,4 @@
-"""FAPs, action units and emotions in; the poses that a sheet shows of them out, each as a row of FAPs."""
+"""FAPs, action units and emotions in; the poses that a sheet shows of them out."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import au, axis
+from realizer.animation.targets import au, axis, fap
 from realizer.arrays import Float32
+from realizer.emotion import wheel
 from realizer.tables import action_units, by_number, faps
 from realizer.tables.emotions import archetypes
+from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.regions import au_regions, fap_regions
 
@@ -29,7 +30,7 @@ ANGLES, ACTIVATIONS = np.arange(0, 360.1, 22.5), (1, 3, 5, 7)
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """One picture: (68,) float32 FAPs, and what to write below it."""
+    """One picture: (n_targets,) float32 of the axis of all that is animated, and what to write below it."""
 
     row: Float32
     title: str
@@ -45,9 +46,15 @@ class Series:
     columns: int | None = None
 
 
+def frames(series: Sequence[Series]) -> AUFrames:
+    """All poses of these series, one a second."""
+    rows = np.stack([pose.row for part in series for pose in part.poses])
+    return AUFrames(np.arange(len(rows), dtype=np.float64), rows)
+
+
 def neutral() -> Series:
     """The face at rest, which all others are compared with."""
-    return Series("", [Pose(np.zeros(68, np.float32), "neutral")])
+    return Series("", [Pose(_nothing(), "neutral")])
 
 
 def of_faps(value: float) -> list[Series]:
@@ -62,21 +69,20 @@ def of_faps(value: float) -> list[Series]:
     ]
 
 
-def _both_ways(fap: Fap, value: float) -> list[Pose]:
-    size = value * TURN / HALF if fap.unit == "angle_unit" else value
+def _both_ways(row: Fap, value: float) -> list[Pose]:
+    size = value * TURN / HALF if row.unit == "angle_unit" else value
     found = []
     for sign in (1, -1):
-        amount = round(min(max(sign * size, fap.least), fap.most))
+        amount = round(min(max(sign * size, row.least), row.most))
         if amount:
-            row = np.zeros(68, np.float32)
-            row[fap.fap - 1] = amount
             far = (
                 f"{np.degrees(amount * 1e-5):+.0f} degrees"
-                if fap.unit == "angle_unit"
-                else f"{amount / 1024:+.2f} {fap.unit}0"
+                if row.unit == "angle_unit"
+                else f"{amount / 1024:+.2f} {row.unit}0"
             )
             # Some FAPs are named "lower" or "depress" and go up: say which way plus is.
-            found.append(Pose(row, f"{fap.fap} {fap.name} {amount:+d}", (f"{far}; + is {fap.direction}",)))
+            title, note = f"{row.fap} {row.name} {amount:+d}", f"{far}; + is {row.direction}"
+            found.append(Pose(_faps({row.fap: amount}), title, (note,)))
     return found
 
 
@@ -97,17 +103,26 @@ def of_aus(intensity: float) -> list[Series]:
 
 
 def of_emotions() -> list[Series]:
-    """The archetypes."""
+    """The archetypes, and Paul's table of the wheel: 17 angles at 4 activations (2010, 6.4)."""
     known = archetypes()
-    return [
-        Series(
-            "Emotions: archetypes",
-            _poses(
-                [face_lexemes()[emotion.name].aus for emotion in known],
-                [emotion.name.lower() for emotion in known],
-                [f"{emotion.angle:g} degrees, activation {emotion.activation:g}" for emotion in known],
-            ),
+    shown = _poses(
+        [face_lexemes()[emotion.name].aus for emotion in known],
+        [emotion.name.lower() for emotion in known],
+        [f"{emotion.angle:g} degrees, activation {emotion.activation:g}" for emotion in known],
+    )
+    names = {place.angle: name for name, place in ring("paul").items()}
+    grid = [
+        Pose(
+            _faps(dict(enumerate(wheel(angle, activation).frame(), 1))),
+            f"{angle:g} degrees, activation {activation}",
+            (names[angle % 360],),
         )
+        for angle in ANGLES
+        for activation in ACTIVATIONS
+    ]
+    return [
+        Series("Emotions: archetypes", shown),
+        Series("Emotions: the wheel, weak to strong", grid, len(ACTIVATIONS)),
     ]
 
 
@@ -115,12 +130,21 @@ def _poses(
     shown: Sequence[Mapping[tuple[int, str], float]], titles: Sequence[str], notes: Sequence[str]
 ) -> list[Pose]:
     """Poses of action units: (AU, side) -> intensity each."""
-    values = np.zeros((len(shown), len(axis())), np.float32)
-    for row, aus in zip(values, shown, strict=True):
+    found = []
+    for aus, title, note in zip(shown, titles, notes, strict=True):
+        row = _nothing()
         for (number, side), amount in aus.items():
             row[[target.column for target in au(number, side)]] = amount
-    rows = to_fap(AUFrames(np.arange(len(values), dtype=np.float64), values)).values
-    return [
-        Pose(row, title, (note,) if note else ())
-        for row, title, note in zip(rows, titles, notes, strict=True)
-    ]
+        found.append(Pose(row, title, (note,)))
+    return found
+
+
+def _faps(values: Mapping[int, float]) -> Float32:
+    row = _nothing()
+    for number, value in values.items():
+        row[fap(number).column] = value
+    return row
+
+
+def _nothing() -> Float32:
+    return np.zeros(len(axis()), np.float32)

@@ -123,6 +123,8 @@ def _cells(
     """Each series with its cells; the first pose of all is the neutral one."""
     import numpy as np
 
+    from realizer.animation.fap import to_fap
+    from realizer.cli import poses
     from realizer.render import Renderer
     from realizer.render.difference import difference, faint, flatten
     from realizer.render.light import preset
@@ -133,7 +135,7 @@ def _cells(
     if background:
         behind = np.frombuffer(bytes.fromhex(background[1:]), np.uint8)
     every = [pose for part in series for pose in part.poses]
-    rows = np.stack([pose.row for pose in every])
+    rows = to_fap(poses.frames(series)).values
     shown: list[list[Any]] = [[] for _ in every]
     for camera in cameras:
         neutral = below = None
