@@ -18,6 +18,7 @@ from bml_schema import Block, BMLError, WarningFeedback, read
 from realizer.animation.curves import gain_at
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.pose import poses
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float32, Int16
 from realizer.behaviours import VOCABULARY
@@ -60,6 +61,7 @@ class Realization:
         fps: frames a second; frame k is sampled at k / fps.
         duration: seconds, to the end of the last block.
         face_name: which face folder pictures are drawn with.
+        deformer: "mpeg4" or "au", what moves that face; None is what it says itself.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
         feedback: BML feedback as XML text, in order.
@@ -77,6 +79,7 @@ class Realization:
     warnings: tuple[Warning, ...]
     refused: tuple[str, ...] = ()
     speaking: tuple[Speaking, ...] = field(default=())
+    deformer: str | None = None
 
     @property
     def frames(self) -> int:
@@ -107,7 +110,18 @@ class Realization:
         """
         from realizer.face import load_face
 
-        return load_face(self.face_name)
+        return load_face(self.face_name, deformer=self.deformer)
+
+    @cached_property
+    def poses(self) -> Float32:
+        """(n, k) float32: what the first character is drawn by, a column for each thing its face takes.
+
+        Raises:
+            FaceError: no such face, or its folder is damaged.
+        """
+        from realizer.face import takes
+
+        return poses(self.aus, takes(self.face_name, deformer=self.deformer))
 
     def sound(self, rate: int = 22050) -> Int16:
         """(round(duration x rate),) int16 mono: all that is said, mixed; silence where nobody speaks."""
@@ -144,6 +158,7 @@ def realize(
     documents: str | bytes | Iterable[str | bytes],
     *,
     face: str = "default",
+    deformer: str | None = None,
     fps: float = 25.0,
     voice: Voice | str | None = None,
     scene: Mapping[str, Position] | None = None,
@@ -158,6 +173,7 @@ def realize(
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
         face: name of a face folder; only pictures need it.
+        deformer: what moves it: "mpeg4" (FAPs) or "au" (its model of action units); None is what it says.
         fps: frames a second.
         voice: a voice or its name; None takes espeak-ng where it is installed, otherwise the silent voice.
         scene: target name -> (x, y, z) metres, origin between the eyes.
@@ -217,6 +233,7 @@ def realize(
         warnings=warnings,
         refused=tuple(w.text for w in refused),
         speaking=speaking,
+        deformer=deformer,
     )
 
 

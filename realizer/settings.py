@@ -53,6 +53,12 @@ def _text(value: Any) -> str:
     return value
 
 
+def _deformer(value: Any) -> str:
+    if value not in ("mpeg4", "au"):
+        raise ValueError("mpeg4 or au")
+    return str(value)
+
+
 def _ports(value: Any) -> tuple[int, int]:
     """Two port numbers: BML in, feedback out."""
     port = _number(int, 0, 65535)
@@ -120,6 +126,9 @@ class Settings:
     stomp_xml_out: str = _setting("/topic/asap.bml.feedback", _text, "feedback")
     stomp_vhmsg: str | None = _setting("/topic/DEFAULT_SCOPE", _optional(_text), "VHMSG; none: not read")
     face: str = _setting("default", _text, "of characters that name none")
+    deformer: str | None = _setting(
+        None, _optional(_deformer), "what moves faces: mpeg4 or au; none: as each face says"
+    )
     voice: str | None = _setting(None, _optional(_text), "none: espeak-ng where installed, else silent")
     language: str = _setting("en-US", _text, "BCP-47, of speech that names none")
     fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")

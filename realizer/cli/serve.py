@@ -24,6 +24,7 @@ __all__: list[str] = []
 )
 @click.option("--stomp", metavar="HOST:PORT", help="Serve clients of this STOMP broker: ASAP JSON, VHMSG.")
 @click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
+@options.deformer
 @click.option("--voice", metavar="NAME", help="Voice of characters that name none.")
 @click.option("--fps", type=float, help="Frames a second of streams that name no rate.  [default: 25]")
 @click.option(

@@ -1,4 +1,4 @@
-"""FAP rows in, vertices out: one sparse product, then the parts that turn and the lids that slide."""
+"""Poses in, vertices out: one sparse product, then the parts that turn and the lids that slide."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from realizer.arrays import Bool, Float32, Float64
+from realizer.face.au.deformer import moves_of
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
 from realizer.face.model import Face
 from realizer.units import ANGLE_UNIT
@@ -14,17 +15,23 @@ from realizer.units import ANGLE_UNIT
 __all__ = ["deform"]
 
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
+LIDS = slice(18, 22)  # columns: upper left and right, lower left and right
 CHUNK = 16  # frames at once: what a cache holds
 MOST_TURN = 0.42  # rad, 24 degrees
 # Rotated by these, the parts are driven apart from the product.
 DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49, 22, 23, 24, 25]
 
 
-def deform(face: Face, faps: Any) -> Float32:
-    """The face's vertices under the FAPs.
+def deform(face: Face, poses: Any) -> Float32:
+    """The face's vertices in poses.
+
+    FAPs move every face. Where a face has a model of action units, its displacements are added to those of
+    the FAPs; rigid parts turn, and lids slide over the eyeballs, in the same way for both.
 
     Args:
-        faps: (n, 68) FAP values in FAPU, column = FAP - 1; FAPs 1 and 2 are not looked at.
+        poses: (n, len(face.takes)): FAP values in FAPU, column = FAP - 1 (FAPs 1 and 2 are not looked at),
+            then intensities 0..1 of what the face's model takes. `animation.pose` makes them. Or (n, 68)
+            FAPs alone.
 
     Returns:
         (n, n_vertices, 3) float32 metres.
@@ -32,12 +39,18 @@ def deform(face: Face, faps: Any) -> Float32:
     Raises:
         ValueError: another shape, or values that are not finite.
     """
-    rows = np.asarray(faps, np.float32)
-    if rows.ndim != 2 or rows.shape[1] != FAPS:
-        raise ValueError(f"faps: wanted (n, {FAPS}), got {rows.shape}")
+    rows = whole(poses, face.takes)
     if not np.isfinite(rows).all():
-        raise ValueError("faps: wanted finite values, got NaN or infinity")
-    basis = face.basis
+        raise ValueError("poses: wanted finite values, got NaN or infinity")
+    basis, units = face.basis, moves_of(face)
+    rows, taken = rows[:, :FAPS], rows[:, FAPS:]
+    moved: Bool = np.logical_or(rows[:, LIDS].any(axis=1), rows[:, THRUST].any(axis=1))
+    if units is not None:
+        shown, lips = units.intensities(taken), taken[:, -1]
+        moved |= units.lids(shown)
+        # Lids that a unit closes are closed: what gaze and others ask of them would bring them through.
+        rows = rows.copy()
+        rows[:, LIDS] *= 1 - np.tile(units.closed(shown), 2)
     out = np.empty((len(rows), *face.vertices.shape), np.float32)
     weights = _weights(basis, rows)
     first, last = basis["moving"]
@@ -47,10 +60,25 @@ def deform(face: Face, faps: Any) -> Float32:
         here[:] = face.vertices
         moves = basis["fields"] @ np.ascontiguousarray(weights[part].T)
         here.reshape(len(here), -1)[:, 3 * first : 3 * last] += moves.T
+        if units is not None:
+            units(shown[part], lips[part], here)
         _turn_eyes(basis, rows[part], here)
-        _keep_lids_over_balls(basis, rows[part], here)
+        _keep_lids_over_balls(basis, rows[part], moved[part], here)
         _turn_head(basis, rows[part], here)
     return out
+
+
+def whole(poses: Any, takes: tuple[str, ...]) -> Float32:
+    """(n, len(takes)) float32, with nothing added to FAPs that come alone.
+
+    Raises:
+        ValueError: another shape.
+    """
+    rows = np.ascontiguousarray(poses, np.float32)
+    if rows.ndim != 2 or rows.shape[1] not in (FAPS, len(takes)):
+        also = f" or (n, {len(takes)})" if len(takes) != FAPS else ""
+        raise ValueError(f"poses: wanted (n, {FAPS}){also}, got {rows.shape}")
+    return np.pad(rows, ((0, 0), (0, len(takes) - rows.shape[1])))
 
 
 def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
@@ -109,9 +137,8 @@ def _turn_eyes(basis: Any, rows: Float32, out: Float32) -> None:
             out[:, first:last, 2] += (thrust * basis["thrust"])[:, None]
 
 
-def _keep_lids_over_balls(basis: Any, rows: Float32, out: Float32) -> None:
+def _keep_lids_over_balls(basis: Any, rows: Float32, moved: Bool, out: Float32) -> None:
     """Push lid vertices forward until they are as far from the ball's centre as at rest: lids slide over."""
-    moved: Bool = np.logical_or(rows[:, 18:22].any(axis=1), rows[:, THRUST].any(axis=1))
     if not moved.any():
         return
     lid, side = basis["lid"], basis["lid_eye"]

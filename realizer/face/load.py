@@ -1,14 +1,14 @@
-"""A face's name in, a checked `Face` out: finds the folder, reads its four files."""
+"""A face's name in, a checked `Face` out: finds the folder, reads its files, takes the deformer it names."""
 
 from __future__ import annotations
 
 import os
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,11 +18,18 @@ from realizer.face.archive import read_arrays
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.model import Face
+from realizer.tables import faps
 
-__all__ = ["FaceInfo", "face_name", "list_faces", "load_face"]
+if TYPE_CHECKING:
+    from realizer.face.au.model import Model
+
+__all__ = ["FaceInfo", "face_name", "list_faces", "load_face", "takes"]
 
 DEFAULT = "ada"  # what the name "default" means
 VARIABLE = "REALIZER_FACES"
+DEFORMER = "REALIZER_DEFORMER"
+DEFORMERS = ("mpeg4", "au")
+MODEL = "au_extended.toml"
 MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}  # array -> dimensions
 
 
@@ -42,18 +49,30 @@ class FaceInfo:
     says: str
 
 
-def load_face(name: str = "default", directory: Path | str | None = None) -> Face:
+def load_face(
+    name: str = "default", directory: Path | str | None = None, deformer: str | None = None
+) -> Face:
     """The face of that name.
 
     Args:
         name: a folder with faces in it, or "default".
         directory: where to look first; else what REALIZER_FACES names, `faces` beside the package, and the
             faces that came with the package.
+        deformer: "mpeg4" (FAPs alone move it) or "au" (its model of action units, FAPs the rest); None is
+            what REALIZER_DEFORMER says, or its face.toml, or "mpeg4".
 
     Raises:
         FaceError: no such face, or a folder that cannot be used; the text says which file and what to change.
     """
-    return _load(folder_of(name, directory))
+    folder = folder_of(name, directory)
+    return _load(folder, _asked(deformer))
+
+
+def takes(
+    name: str = "default", directory: Path | str | None = None, deformer: str | None = None
+) -> tuple[str, ...]:
+    """`Face.takes` of the face of that name, without loading it. Arguments and errors as `load_face`."""
+    return _taken(_model(folder_of(name, directory), _asked(deformer)))
 
 
 def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
@@ -117,9 +136,56 @@ def _places(directory: Path | str | None) -> Iterator[Path]:
     yield package / "_faces"  # the wheel's copy
 
 
+def _asked(deformer: str | None) -> str | None:
+    """What is asked for in spite of a face.toml."""
+    chosen = deformer or os.environ.get(DEFORMER) or None
+    if chosen not in (None, *DEFORMERS):
+        where = "deformer" if deformer else DEFORMER
+        raise FaceError(f"{where}: wanted {' or '.join(DEFORMERS)}, got {chosen!r}")
+    return chosen
+
+
 @lru_cache(maxsize=16)
-def _load(folder: Path) -> Face:
+def _model(folder: Path, deformer: str | None) -> Model | None:
+    """The model a face is moved by, with those of its units that are drawn; None: by FAPs alone."""
+    path = folder / "face.toml"
+    said = read_head(folder).get("deformer", DEFORMERS[0])
+    chosen = said if isinstance(said, dict) else {"name": said}
+    if chosen.get("name") not in DEFORMERS:
+        raise FaceError(f"{path}: deformer: wanted {' or '.join(DEFORMERS)}, got {chosen.get('name')!r}")
+    if (deformer or chosen["name"]) == "mpeg4":
+        return None
+    file = chosen.get("model", MODEL)
+    if not isinstance(file, str) or Path(file).name != file:
+        raise FaceError(f"{path}: deformer.model: wanted the name of a file beside it, got {file!r}")
+    if not (folder / file).is_file():
+        raise FaceError(
+            f"{folder / file}: the deformer au draws by this model, which is not there; "
+            f"make it by `realizer faces fit {folder.name}`"
+        )
+    from realizer.face.au.file import read_model
+
+    model = read_model(folder / file)
+    drawn = chosen.get("aus", list(model.units))
+    if not isinstance(drawn, list) or not set(drawn) <= set(model.units):
+        known = ", ".join(map(str, sorted(model.units)))
+        raise FaceError(f"{path}: deformer.aus: wanted a list of units of {file} ({known}), got {drawn!r}")
+    return replace(model, units={au: unit for au, unit in model.units.items() if au in drawn})
+
+
+def _taken(model: Model | None) -> tuple[str, ...]:
+    names = tuple(row.name for row in faps())
+    if model is None:
+        return names
+    from realizer.face.au.deformer import columns
+
+    return names + columns(model)
+
+
+@lru_cache(maxsize=16)
+def _load(folder: Path, deformer: str | None) -> Face:
     head = read_head(folder)
+    model = _model(folder, deformer)
     mesh = read_arrays(folder / "mesh.npz", MESH)
     points = read_features(folder / "features.csv")
     vertices = np.ascontiguousarray(mesh["vertices"], np.float32)
@@ -142,6 +208,8 @@ def _load(folder: Path) -> Face:
         fapu=fapu,
         basis=basis_from(folder / "fields.npz", vertices, places, parts, fapu),
         cameras=head.get("cameras", {}),
+        takes=_taken(model),
+        model=model,
     )
 
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from realizer.arrays import Float32, Int32, UInt8
+from realizer.tables import faps
+
+if TYPE_CHECKING:
+    from realizer.face.au.model import Model
 
 __all__ = ["Face", "Fapu"]
 
@@ -32,7 +36,7 @@ class Fapu:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A head that FAPs move.
+    """A head, and what moves it.
 
     Attributes:
         name, source, licence: from face.toml.
@@ -49,6 +53,9 @@ class Face:
         fapu: measured from the feature points.
         basis: what `face.deform` needs (displacement fields, rigid parts), made when the face is built.
         cameras: extra camera presets by name.
+        takes: what the columns of a pose stand for, a row that `face.deform` makes vertices of: the 68 FAPs,
+            then what the model takes (`au.columns`).
+        model: the action units that are moved by functions of the place; None: FAPs move all there is.
     """
 
     name: str
@@ -65,6 +72,8 @@ class Face:
     fapu: Fapu
     basis: Mapping[str, Any]
     cameras: Mapping[str, Any] = field(default_factory=dict)
+    takes: tuple[str, ...] = field(default_factory=lambda: tuple(row.name for row in faps()))
+    model: Model | None = None
 
     @property
     def bounds(self) -> tuple[Float32, Float32]:

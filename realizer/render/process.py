@@ -1,10 +1,11 @@
-"""FAP rows in, pixels or JPEG out, by a drawing process that is started, watched and replaced here."""
+"""Poses in, pixels or JPEG out, by a drawing process that is started, watched and replaced here."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections.abc import Iterator
+from functools import cached_property
 from types import TracebackType
 from typing import Any
 
@@ -38,6 +39,7 @@ class Renderer:
         background: str | None = None,
         alpha: bool = False,
         way: str | None = None,
+        deformer: str | None = None,
     ) -> None:
         """Nothing starts yet.
 
@@ -49,41 +51,46 @@ class Renderer:
             background: "#rrggbb" or "transparent"; None is what REALIZER_BACKGROUND says, or the light's own.
             alpha: the caller takes pictures of four channels, should REALIZER_BACKGROUND say "transparent".
             way: "gl", "onboard" or "auto"; None is what REALIZER_DRAW says, or "auto".
+            deformer: what moves a face that is named, "mpeg4" or "au"; None is what it says itself.
         """
         width, height = size
         if not (1 <= width <= 8192 and 1 <= height <= 8192):
             raise ValueError(f"size: wanted 1..8192 pixels each way, got {width}x{height}")
-        self.face, self.size, self.camera = face, size, camera
+        self.face, self.size, self.camera, self.deformer = face, size, camera, deformer
         self.light, self._background, self._alpha = light, background, alpha
         self.way = way or os.environ.get(DRAW) or "auto"
         self._half = max(1, min(HALF, HALF_BYTES // (width * height * 4)))
         self._lock = threading.Lock()
         self._process: Child | None = None
 
-    def draw(self, faps: Float32) -> UInt8:
-        """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, 68) FAPs.
+    def draw(self, poses: Float32) -> UInt8:
+        """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, k) poses.
+
+        Args:
+            poses: as `face.deform` takes them: a column for each of `Face.takes`, or (n, 68) FAPs alone.
 
         Raises:
-            ValueError: not (n, 68).
-            RenderError: no GL, no such face or camera, or the process died; says what to do.
+            ValueError: another shape.
+            FaceError: no such face.
+            RenderError: no GL, no such camera, or the process died; says what to do.
         """
         from realizer.render.backdrop import channels
 
-        rows = _rows(faps)
+        rows = self._rows(poses)
         pixels = np.empty((len(rows), self.size[1], self.size[0], channels(self.background)), np.uint8)
         for k, picture in enumerate(self.frames(rows)):
             pixels[k] = picture
         return pixels
 
-    def frames(self, faps: Float32) -> Iterator[UInt8]:
-        """Each picture of (n, 68) FAPs, (h, w, 3) uint8; the next ones are drawn while you use this one.
+    def frames(self, poses: Float32) -> Iterator[UInt8]:
+        """Each picture of (n, k) poses, (h, w, 3) uint8; the next ones are drawn while you use this one.
 
         A picture is valid until the next one is asked for. Run the iterator to its end, or close it, before
         you ask this renderer for anything else. Errors as `draw`.
         """
         from realizer.render.wire import Draw
 
-        rows = _rows(faps)
+        rows = self._rows(poses)
         pieces = [rows[i : i + self._half] for i in range(0, len(rows), self._half)]
         with self._lock:
             process = self._started()
@@ -108,11 +115,11 @@ class Renderer:
                 for _ in range(waiting):  # the caller left early: at most two answers are still to come
                     process.receive()
 
-    def jpeg(self, faps: Float32, quality: int = 85) -> bytes:
-        """JPEG bytes of one row, (68,). Errors as `draw`."""
+    def jpeg(self, pose: Float32, quality: int = 85) -> bytes:
+        """JPEG bytes of one pose, (k,). Errors as `draw`."""
         from realizer.render.wire import Jpeg
 
-        (row,) = _rows(np.asarray(faps)[None])
+        (row,) = self._rows(np.asarray(pose)[None])
         with self._lock:
             process = self._started()
             try:
@@ -160,7 +167,9 @@ class Renderer:
             slots = 2 * self._half
             behind = self.background
             path = Pixels.create(slots, self.size, channels(behind))
-            order = Open(self.face, self.size, self.camera, path, slots, self.light, self.way, behind)
+            order = Open(
+                self.face, self.size, self.camera, path, slots, self.light, self.way, behind, self.deformer
+            )
             self._process = Child(order)
         return self._process
 
@@ -169,9 +178,13 @@ class Renderer:
             self._process.end()
             self._process = None
 
+    def _rows(self, poses: Any) -> Float32:
+        from realizer.face.deform import whole
 
-def _rows(faps: Any) -> Float32:
-    rows = np.ascontiguousarray(faps, np.float32)
-    if rows.ndim != 2 or rows.shape[1] != 68:
-        raise ValueError(f"faps: wanted (n, 68), got {rows.shape}")
-    return rows
+        return whole(poses, self._takes)
+
+    @cached_property
+    def _takes(self) -> tuple[str, ...]:
+        from realizer.face import takes
+
+        return takes(self.face, deformer=self.deformer) if isinstance(self.face, str) else self.face.takes

@@ -29,11 +29,12 @@ class Open:
     light: str | None
     way: str
     background: str | None
+    deformer: str | None = None
 
 
 @dataclass(frozen=True)
 class Draw:
-    """Draw rows (n, 68) into the slots from `first` on; answered with n."""
+    """Draw poses (n, k) into the slots from `first` on; answered with n."""
 
     rows: Float32
     first: int
@@ -41,7 +42,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Jpeg:
-    """Draw one row (68,); answered with JPEG bytes."""
+    """Draw one pose (k,); answered with JPEG bytes."""
 
     row: Float32
     quality: int

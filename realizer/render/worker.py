@@ -1,4 +1,4 @@
-"""The drawing process: FAP rows in over stdin, pixels out into shared memory, JPEG out over stdout."""
+"""The drawing process: poses in over stdin, pixels out into shared memory, JPEG out over stdout."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ class Artist:
     def __init__(self, order: Open) -> None:
         from realizer.face import load_face
 
-        self.face = load_face(order.face) if isinstance(order.face, str) else order.face
+        if isinstance(order.face, str):
+            self.face = load_face(order.face, deformer=order.deformer)
+        else:
+            self.face = order.face
         self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         self.way, self.canvas = open_canvas(
             self.face,
@@ -52,7 +55,7 @@ class Artist:
 
 
 def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
-    """Vertices and normals, (n_vertices, 3) each, of each row of (n, 68) FAPs."""
+    """Vertices and normals, (n_vertices, 3) each, of each of (n, k) poses."""
     from realizer.face import deform, normals
 
     for first in range(0, len(rows), BATCH):

@@ -272,5 +272,5 @@ class Broadcast:
             window = view.timeline.window(newest, newest)
             self._draws += 1
             view.busy, view.drawing, view.begun, view.next = self._draws, newest, now, newest + 1
-            faps = window.faps.values[newest - window.first]
-            effects.append(Draw(self._draws, view.face, faps, view.size, view.camera, view.quality))
+            pose = window.poses[newest - window.first]
+            effects.append(Draw(self._draws, view.face, pose, view.size, view.camera, view.quality))

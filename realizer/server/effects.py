@@ -30,12 +30,12 @@ class Speak:
 class Draw:
     """Draw one picture and answer `session.drawn(id, jpeg or error, now)`.
 
-    `faps` is (68,) float32 in FAPU; `size` is width, height.
+    `pose` is (k,) float32, a column for each thing the face takes; `size` is width, height.
     """
 
     id: int
     face: str
-    faps: Float32
+    pose: Float32
     size: tuple[int, int]
     camera: str
     quality: int

@@ -96,7 +96,7 @@ class Session:
             media=settings.media,
             cooccurrence=settings.cooccurrence,
         )
-        self.load_face = load_face or _load_face
+        self.load_face = load_face or (lambda name: _load_face(name, settings.deformer))
         self.capabilities = dict(capabilities or {})
         self.faces: dict[int, str] = {}
         self.voices: dict[int, str] = {}
@@ -435,7 +435,7 @@ def _name_of(text: str) -> str:
     return found.group(1) if found else "<no id>"
 
 
-def _load_face(name: str) -> Face:
+def _load_face(name: str, deformer: str | None) -> Face:
     from realizer.face import load_face
 
-    return load_face(name)
+    return load_face(name, deformer=deformer)

@@ -43,7 +43,7 @@ class Shell:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self._hub = Hub(self._make, settings.max_sessions)
-        self._studio = Studio()
+        self._studio = Studio(settings.deformer)
         self._clients: dict[int, Client] = {}
         self._timers: dict[Session, _Timer] = {}
         self._numbers = itertools.count(1)
@@ -68,7 +68,9 @@ class Shell:
         # A face that is not there is said before a door opens.
         from realizer.face import load_face
 
-        await self._loop.run_in_executor(None, load_face, self.settings.face)
+        await self._loop.run_in_executor(
+            None, lambda: load_face(self.settings.face, deformer=self.settings.deformer)
+        )
         self._capabilities = await self._loop.run_in_executor(None, _capabilities)
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
 

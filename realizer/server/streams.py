@@ -11,6 +11,7 @@ import numpy as np
 
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.pose import poses
 from realizer.arrays import Float32, Int16, Int32
 from realizer.pipeline import CUT, heard
 from realizer.player import Player, Speaking
@@ -42,7 +43,7 @@ def last_at(now: float, fps: float) -> int:
 
 
 class Window:
-    """Frames `first` .. `first + n - 1` of one character; FAPs and mesh are made when first asked for."""
+    """Frames `first` .. `first + n - 1` of one character; all but AUs is made when first asked for."""
 
     def __init__(self, first: int, fps: float, aus: AUFrames, face: Callable[[], Face]) -> None:
         self.first = first
@@ -70,19 +71,24 @@ class Window:
         return np.ascontiguousarray(self.aus.aus.astype("<f4"))
 
     @cached_property
+    def poses(self) -> Float32:
+        """(n, k) float32: what the face is drawn by."""
+        return poses(self.aus, self._face().takes)
+
+    @cached_property
     def mesh(self) -> Int16:
         """(n, n_vertices, 3) int16."""
         from realizer.face import deform, quantise
 
         face = self._face()
-        return np.ascontiguousarray(quantise(face, deform(face, self.faps.values)).astype("<i2"))
+        return np.ascontiguousarray(quantise(face, deform(face, self.poses)).astype("<i2"))
 
 
 class Timeline:
     """One character at one rate: frames in windows, dropped when the player's plan changes.
 
     Args:
-        face: what meshes are made of; called when the first mesh is asked for.
+        face: what is drawn; called when the first mesh or pose is asked for.
     """
 
     def __init__(self, player: Player, character: int, fps: float, face: Callable[[], Face]) -> None:

@@ -22,9 +22,14 @@ RENDERERS = 4
 
 
 class Studio:
-    """The engines. `speakers` and `drawers` are the threads that may call `speak` and `draw`."""
+    """The engines. `speakers` and `drawers` are the threads that may call `speak` and `draw`.
 
-    def __init__(self) -> None:
+    Args:
+        deformer: what moves faces, in spite of what they say themselves.
+    """
+
+    def __init__(self, deformer: str | None = None) -> None:
+        self._deformer = deformer
         # Two texts can be spoken at a time: one long text must not hold up the short ones of all others.
         self.speakers = ThreadPoolExecutor(2, "voice")
         self.drawers = ThreadPoolExecutor(1, "renderer")
@@ -48,10 +53,10 @@ class Studio:
         """A JPEG; or why there is none."""
         try:
             try:
-                return self._renderer(order).jpeg(order.faps, order.quality)
+                return self._renderer(order).jpeg(order.pose, order.quality)
             except RenderError:
                 # A drawing process that died is started anew by the next call; one that cannot fails again.
-                return self._renderer(order).jpeg(order.faps, order.quality)
+                return self._renderer(order).jpeg(order.pose, order.quality)
         except RealizerError as error:
             return error
         except Exception as error:
@@ -81,7 +86,7 @@ class Studio:
         if key not in self._renderers:
             if len(self._renderers) >= RENDERERS:
                 self._renderers.pop(next(iter(self._renderers))).close()
-            self._renderers[key] = Renderer(order.face, order.size, order.camera)
+            self._renderers[key] = Renderer(order.face, order.size, order.camera, deformer=self._deformer)
         return self._renderers[key]
 
     def _tell(self, fault: str) -> None:

@@ -1,188 +1,178 @@
-"""A face driven by action units alone: intensities in, vertices out; one product, then what turns."""
+"""A face and its model in, made ready out: intensities add displacements to vertices, and turn the jaw."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from realizer.arrays import Bool, Float32, Float64
-from realizer.errors import FaceError
-from realizer.face.au.file import read_model
+from realizer.face.au.mixers import OPENING, opened
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
 from realizer.face.au.units import units
-from realizer.face.load import folder_of, load_face, read_head
+from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
-from realizer.tables import action_units
+from realizer.tables import action_units, faps
 
-__all__ = ["Deformer", "load_deformer"]
+__all__ = ["Moves", "columns", "moves_of"]
 
-MODEL = "au_extended.toml"
 # Whatever else a face is built from moves with the head alone.
 FACE = ("skin", "brows", "lashes", "hair")
 GROWN = ("brows", "lashes")
 JAW = ("lower_teeth", "tongue")
-EYES = ("left_eye", "right_eye")
-LIDS = ("5", "6", "7", "9", "43")  # what moves the lids
-CHUNK = 16  # frames at once: what a cache holds
+CLOSE = 43  # the unit that closes the eyes
+LIDS = (5, 6, 7, 9, CLOSE)  # what moves the lids
 LEAST = 1e-5  # m; what a unit moves less is left out of it
+# FAPs of each side's lids; and the presence that says how far speech has the lips.
+LID_FAPS, LIPS = {"L": (19, 21), "R": (20, 22)}, "lips"
 
 
-class Deformer:
-    """A face and its model made ready: displacements are one matrix, made once.
+def columns(model: Model) -> tuple[str, ...]:
+    """What a pose holds beside the FAPs: a column for each unit that moves the face, by side, and "lips".
 
-    Attributes:
-        columns: "1L", "1R", ... "17", ...: what the columns of the intensities stand for.
+    "1L", "1R", ... "17", ...; units that differ in time alone (blink and wink are closed eyes) have columns
+    of their own, the strongest shows. "lips" is how far speech has the lips: FAPs move them then.
+    """
+    return (*(name for _, names in _units(model) for name in names), LIPS)
+
+
+def _units(model: Model) -> list[tuple[tuple[int, str], tuple[str, ...]]]:
+    """(unit, side) -> the names of the columns that show it; ascending."""
+    sided = {row.au: row.sides for row in action_units()}
+    return [
+        ((au, side), tuple(f"{name}{side}" for name in units()[au].names))
+        for au in sorted(model.units)
+        for side in (("L", "R") if sided[au] else ("",))
+    ]
+
+
+class Moves:
+    """The displacements of a face's model as matrices, made once.
+
+    Displacement units are mixed additively, each of the neutral place (Wojdel 2005, 5.1), but for two things
+    that a sum would get wrong: jaw and lips open as far as the widest of 25, 26 and 27 (`mixers.opened`), and
+    what closes the eyes takes the lids from all others, as far as it does.
     """
 
     def __init__(self, face: Face, model: Model) -> None:
         from scipy.sparse import csr_matrix
 
-        self.face, self.model = face, model
-        sides = {row.au: row.sides for row in action_units()}
-        names = [(au, side) for au in sorted(model.units) for side in (("L", "R") if sides[au] else ("",))]
-        self.columns = tuple(f"{au}{side}" for au, side in names) + tuple(map(str, sorted(model.degrees)))
-        self._displacing = len(names)
-        at = face.vertices.astype(np.float64)
-        mine = np.zeros(len(at), bool)
-        for part in FACE:
-            if part in face.parts:
-                mine[slice(*face.parts[part])] = True
-        upper = shares(face, model.mouth)
-        moves = np.zeros((len(names), *at.shape))
-        for row, (au, side) in zip(moves, names, strict=True):
-            row[mine] = model.displacement(au, at[mine], side, upper[mine])
-        self._grow(moves)
-        moves[np.abs(moves).max(axis=2) < LEAST] = 0
+        self._face, self._model = face, model
+        known = _units(model)
+        places = {name: k for k, name in enumerate(columns(model))}
+        self._read = [[places[name] for name in names] for _, names in known]
+        names = [name for name, _ in known]
+        moves = _displacements(face, model, names)
         found = np.flatnonzero(moves.any(axis=(0, 2)))
-        self._moving = slice(int(found[0]), int(found[-1]) + 1)
-        columns = moves[:, self._moving].reshape(len(names), -1).T
-        self._basis = csr_matrix(columns.astype(np.float32))
-        self._turns = [
-            (units()[au].kind, "zxy".index(units()[au].turn[1]), column, units()[au].axis, model.degrees[au])
-            for column, au in enumerate(sorted(model.degrees), len(names))
-        ]
-        self._jaw = np.zeros(len(self.columns), np.float32)
-        for column, (au, _) in enumerate(names):
-            self._jaw[column] = model.units[au].jaw_degrees
-        self._lids = np.array([name.rstrip("LR") in LIDS for name in self.columns])
-        self._neck = model.head.density(at).astype(np.float32)[:, None]
+        first, last = (int(found[0]), int(found[-1]) + 1) if len(found) else (0, 0)
+        self.moving = slice(first, last)
 
-    def __call__(self, intensities: Any) -> Float32:
-        """The face's vertices.
+        def matrix(rows: Float64) -> Any:
+            return csr_matrix(rows[:, self.moving].reshape(len(rows), -1).T.astype(np.float32))
 
-        Args:
-            intensities: (n, columns) 0..1.
+        closes = np.array([au == CLOSE for au, _ in names])
+        self._closing, self._rest = np.flatnonzero(closes), np.flatnonzero(~closes)
+        self._close, self._move = matrix(moves[closes]), matrix(moves[~closes])
+        self._sides = np.array(["LR".index(side) for au, side in names if au == CLOSE], np.intp)
+        self._lid_columns = np.array([au in LIDS for au, _ in names], bool)
+        self._opening = [names.index((au, "")) for au in OPENING if (au, "") in names]
+        self._gaps = np.array([model.gap(au) for au in OPENING if (au, "") in names])
+        self._jaw = np.array([np.radians(model.units[au].jaw_degrees) for au, _ in names], np.float32)
+        self._lids, self._owned = _shares(face, self.moving)
 
-        Returns:
-            (n, n_vertices, 3) float32 metres.
+    def intensities(self, pose: Float32) -> Float32:
+        """(n, units) of the (n, columns) part of poses that follows the FAPs, opened as far as the widest."""
+        shown = np.stack([pose[:, read].max(axis=1) for read in self._read], axis=1)
+        shown[:, self._opening] = opened(self._gaps, shown[:, self._opening].T).T
+        return shown
 
-        Raises:
-            ValueError: another shape, or values that are not finite.
-        """
-        rows = np.asarray(intensities, np.float32)
-        if rows.ndim != 2 or rows.shape[1] != len(self.columns):
-            raise ValueError(f"intensities: wanted (n, {len(self.columns)}), got {rows.shape}")
-        if not np.isfinite(rows).all():
-            raise ValueError("intensities: wanted finite values, got NaN or infinity")
-        out = np.empty((len(rows), *self.face.vertices.shape), np.float32)
-        lids: Bool = np.asarray(rows[:, self._lids].any(axis=1))
-        for start in range(0, len(rows), CHUNK):
-            part = slice(start, start + CHUNK)
-            here = out[part]
-            here[:] = self.face.vertices
-            moves = self._basis @ np.ascontiguousarray(rows[part, : self._displacing].T)
-            here[:, self._moving] += moves.T.reshape(len(here), -1, 3)
-            for row, lid, vertices in zip(rows[part], lids[part], here, strict=True):
-                self._turn(row, bool(lid), vertices)
+    def closed(self, shown: Float32) -> Float32:
+        """(n, 2) how far the left and the right eye are closed."""
+        out = np.zeros((len(shown), 2), np.float32)
+        out[:, self._sides] = np.minimum(shown[:, self._closing], 1)
         return out
 
-    def row(self, values: Mapping[int, float]) -> Float32:
-        """(columns,) intensities of action units, on both sides where they have sides."""
-        out = np.zeros(len(self.columns), np.float32)
-        for k, name in enumerate(self.columns):
-            out[k] = values.get(int(name.rstrip("LR")), 0)
-        return out
+    def lids(self, shown: Float32) -> Bool:
+        """(n,) whether a unit moves the lids."""
+        return np.asarray(shown[:, self._lid_columns].any(axis=1))
 
-    def _grow(self, moves: Float64) -> None:
-        """Brows and lashes go with the skin that they grow on: off it, functions of the place differ."""
-        from scipy.spatial import cKDTree
-
-        first, last = self.face.parts["skin"]
-        tree = cKDTree(self.face.vertices[first:last])
-        for part in GROWN:
-            if part in self.face.parts:
-                mine = slice(*self.face.parts[part])
-                root = np.asarray(tree.query(self.face.vertices[mine])[1])
-                moves[:, mine] = moves[:, first + root]
-
-    def _turn(self, row: Float32, lids: bool, vertices: Float32) -> None:
-        """Jaw bone, lids over eyeballs, eyeballs, head: what is an object's own first (5.1)."""
-        model, parts = self.model, self.face.parts
-        jaw = float(self._jaw @ row)
-        if jaw:
-            turn = rotation((1, 0, 0), np.radians(jaw))
-            for part in JAW:
-                if part in parts:
-                    _about(vertices[slice(*parts[part])], turn, model.jaw)
-        if lids:
-            self._slide_lids(vertices)
-        eyes, head = self._rotation("eyes", row), self._rotation("head", row)
-        if eyes is not None:
-            for part, centre in zip(EYES, model.eyes, strict=True):
-                if part in parts:
-                    _about(vertices[slice(*parts[part])], eyes, centre)
-        if head is not None:
-            by, pivot = head.astype(np.float32) - np.eye(3, dtype=np.float32), np.array(model.head.pivot)
-            moves = vertices @ by.T
-            moves -= (by @ pivot).astype(np.float32)
-            moves *= self._neck
-            vertices += moves
-
-    def _rotation(self, kind: str, row: Float32) -> Float64 | None:
-        """The turns of one kind, one after the other: tilts first, turns to a side last, as FAPs 48 to 50."""
-        mine = sorted(turn for turn in self._turns if turn[0] == kind and row[turn[2]])
-        whole = None
-        for _, _, column, axis, degrees in mine:
-            turn = rotation(axis, float(row[column]) * np.radians(degrees))
-            whole = turn if whole is None else turn @ whole
-        return whole
-
-    def _slide_lids(self, vertices: Float32) -> None:
-        """Lids do not sink into the balls they slide over: pushed forward, as the FAPs' lids are."""
-        basis = self.face.basis
-        if "lid" not in basis:
+    def __call__(self, shown: Float32, lips: Float32, vertices: Float32) -> None:
+        """Move vertices (n, n_vertices, 3) by intensities (n, units), in place; speech has `lips` (n,)."""
+        if not shown.any():
             return
-        lid, centres = basis["lid"], np.array(self.model.eyes, np.float32)[basis["lid_eye"]]
-        away = vertices[lid] - centres
-        room = np.square(basis["lid_radius"]) - np.square(away[:, 0]) - np.square(away[:, 1])
-        push = np.sqrt(np.maximum(room, 0)) - away[:, 2]
-        vertices[lid, 2] += np.where(room > 0, np.maximum(push, 0), 0)
+        moves = (self._move @ np.ascontiguousarray(shown[:, self._rest].T)).T.reshape(len(shown), -1, 3)
+        closed = self.closed(shown)
+        if closed.any():
+            index, share = self._lids
+            moves[:, index] *= (1 - np.minimum(closed @ share, 1))[..., None]
+            moves += (self._close @ np.ascontiguousarray(shown[:, self._closing].T)).T.reshape(moves.shape)
+        if lips.any():
+            index, owned = self._owned
+            moves[:, index] *= (1 - np.outer(lips, owned))[..., None]
+        vertices[:, self.moving] += moves
+        for angle, frame in zip((shown @ self._jaw) * (1 - lips), vertices, strict=True):
+            if angle:
+                self._turn_jaw(float(angle), frame)
+
+    def _turn_jaw(self, angle: float, vertices: Float32) -> None:
+        """The jaw bone: teeth and tongue turn with what is on them (what is an object's own comes first)."""
+        centre = np.array(self._model.jaw, np.float32)
+        turn = rotation((1, 0, 0), angle).T.astype(np.float32)
+        for part in JAW:
+            if part in self._face.parts:
+                mine = slice(*self._face.parts[part])
+                vertices[mine] = (vertices[mine] - centre) @ turn + centre
 
 
-def _about(vertices: Float32, turn: Float64, pivot: tuple[float, float, float]) -> None:
-    centre = np.array(pivot, np.float32)
-    vertices[:] = (vertices - centre) @ turn.T.astype(np.float32) + centre
+@lru_cache(maxsize=16)
+def moves_of(face: Face) -> Moves | None:
+    """What moves a face beside the FAPs; None where they move all there is."""
+    return None if face.model is None else Moves(face, face.model)
 
 
-def load_deformer(
-    name: str = "default", directory: Path | str | None = None, model: Path | None = None
-) -> Deformer | None:
-    """The action unit deformer of a face whose face.toml says `deformer = "au"`; None where it does not.
+def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Float64:
+    """(units, n_vertices, 3) metres with full intensity."""
+    from scipy.spatial import cKDTree
 
-    Args:
-        model: a fitted model to take, whatever face.toml says.
+    at = face.vertices.astype(np.float64)
+    mine = np.zeros(len(at), bool)
+    for part in FACE:
+        if part in face.parts:
+            mine[slice(*face.parts[part])] = True
+    upper = shares(face, model.mouth)
+    moves = np.zeros((len(names), *at.shape))
+    for row, (au, side) in zip(moves, names, strict=True):
+        row[mine] = model.displacement(au, at[mine], side, upper[mine])
+    # Brows and lashes go with the skin that they grow on: off it, functions of the place differ.
+    first, last = face.parts["skin"]
+    tree = cKDTree(at[first:last])
+    for part in GROWN:
+        if part in face.parts:
+            grown = slice(*face.parts[part])
+            moves[:, grown] = moves[:, first + np.asarray(tree.query(at[grown])[1])]
+    moves[np.abs(moves).max(axis=2) < LEAST] = 0
+    return moves
 
-    Raises:
-        FaceError: no such face or model, or another word in face.toml.
+
+def _shares(face: Face, moving: slice) -> tuple[tuple[Any, Float32], tuple[Any, Float32]]:
+    """Vertices of the lids and their share in each side's, (k,) and (2, k); those of speech, (k,) and (k,).
+
+    Which vertices FAPs of the lids and of the mouth move says where lids and mouth are: each with the part of
+    the way that its feature point goes.
     """
-    folder = folder_of(name, directory)
-    chosen = read_head(folder).get("deformer", "mpeg4")
-    if chosen not in ("mpeg4", "au"):
-        raise FaceError(f"{folder / 'face.toml'}: deformer: wanted mpeg4 or au, got {chosen!r}")
-    if model is None and chosen == "mpeg4":
-        return None
-    return Deformer(load_face(name, directory), read_model(model or folder / MODEL))
+    fields, (first, last) = face.basis["fields"], face.basis["moving"]
+    reach = np.zeros((FAPS, len(face.vertices)))
+    for row in faps():
+        # The jaw is driven by its angle.
+        column = np.asarray(fields[:, [JAW_SIN if row.fap == 3 else row.fap - 1]].todense())
+        size = np.linalg.norm(column.reshape(-1, 3), axis=1)
+        reach[row.fap - 1, first:last] = size / max(float(size.max()), 1e-12)
+    reach = reach[:, moving]
+    lids = np.stack([np.minimum(reach[[fap - 1 for fap in LID_FAPS[side]]].sum(axis=0), 1) for side in "LR"])
+    own = np.array([row.speech_owns for row in faps()])
+    whole = reach[own > 0].sum(axis=0)
+    owned = np.minimum(whole, 1) * (own @ reach) / np.maximum(whole, 1e-12)
+    near, lips = np.flatnonzero(lids.any(axis=0)), np.flatnonzero(owned)
+    return (near, lids[:, near].astype(np.float32)), (lips, owned[lips].astype(np.float32))

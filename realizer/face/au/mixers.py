@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from realizer.arrays import Float64
 from realizer.face.au.model import Model, turned
 from realizer.face.au.units import units
 
-__all__ = ["Thing", "additive", "mix", "successive"]
+__all__ = ["OPENING", "Thing", "additive", "mix", "opened", "successive"]
+
+# The units that open the mouth, the widest first. Each holds the narrower ones.
+OPENING = (27, 26, 25)
 
 # What a face is built from. "fixed" moves with the head alone: upper teeth, clothes.
 Thing = Literal["face", "left eye", "right eye", "jaw", "fixed"]
@@ -37,10 +40,32 @@ def successive(model: Model, at: Float64, values: Mapping[int, float]) -> Float6
     return np.asarray(at)
 
 
+def opened(gaps: Any, values: Any) -> Any:
+    """How much of each unit is left so that the mouth opens as far as the widest alone would open it.
+
+    A stretched mouth is a dropped jaw and parted lips already (27@26, 27@25, 26@25 in her appendix C): added
+    up they would open it twice.
+
+    Args:
+        gaps: (k,) metres between the lips with full intensity (`Model.gap`), of `OPENING`.
+        values: (k, n) intensities 0..1.
+
+    Returns:
+        (k, n) intensities, of the same type.
+    """
+    out, open_ = np.array(values), np.zeros(values.shape[1:], np.float64)
+    for row, gap, value in zip(out, gaps, values, strict=True):
+        if gap > 0:
+            row[...] = np.maximum(value - open_ / gap, 0)
+            open_ = np.maximum(open_, gap * value)
+    return out
+
+
 def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "face") -> Float64:
     """The places of an object's points under several action units, by her rules.
 
-    Single object and sub-object units are added up, of the neutral places. Turns cannot be: they follow one
+    Single object and sub-object units are added up, of the neutral places; those that open the mouth as far
+    as the widest of them does. Turns cannot be: they follow one
     after the other. A unit that moves several objects comes after those that are an object's own: the eyes
     look, the jaw opens, then the head turns with all of it.
 
@@ -50,6 +75,9 @@ def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "
     """
     known = units()
     moved = at
+    wide = [au for au in OPENING if au in model.units and au in values]
+    amounts = opened(np.array([model.gap(au) for au in wide]), np.array([[values[au]] for au in wide]))
+    values = {**values, **{au: float(amount[0]) for au, amount in zip(wide, amounts, strict=True)}}
     if thing == "face":
         moved = additive(model, at, {au: value for au, value in values.items() if au in model.units})
     elif thing == "jaw":

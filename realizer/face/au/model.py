@@ -155,6 +155,12 @@ class Model:
         share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
         return np.asarray(moves * (share * share * (3 - 2 * share))[:, None])
 
+    def gap(self, au: int) -> float:
+        """Metres by which a displacement unit parts the lips in the middle, with full intensity."""
+        between = np.array([[0.0, self.mouth.y[0], self.mouth.z[0]]])
+        upper, lower = (self.displacement(au, between, upper=np.array([half]))[0, 1] for half in (1.0, 0.0))
+        return float(upper - lower)
+
 
 def rotation(axis: tuple[float, float, float], radians: float) -> Float64:
     """(3, 3) right-handed turn about a unit vector."""

@@ -20,6 +20,7 @@ class Unit:
     kind: Literal["displacement", "head", "eyes"]
     split: bool
     turn: str
+    also: str
     shapes: str
 
     @property
@@ -27,6 +28,11 @@ class Unit:
         """Face unit -> weight."""
         pairs = (pair.split(":") for pair in self.shapes.split())
         return {name: float(weight) for name, weight in pairs}
+
+    @property
+    def names(self) -> tuple[int, ...]:
+        """Its number, then those of the units that move the face as it does."""
+        return self.au, *map(int, self.also.split())
 
     @property
     def axis(self) -> tuple[float, float, float]:

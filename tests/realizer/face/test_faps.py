@@ -253,5 +253,5 @@ def test_batches_equal_single_frames(face: Face) -> None:
 
 @pytest.mark.parametrize("bad", [np.zeros(68), np.zeros((2, 67)), np.full((1, 68), np.nan)])
 def test_wrong_rows_are_refused(bad: np.ndarray) -> None:
-    with pytest.raises(ValueError, match="faps: wanted"):
+    with pytest.raises(ValueError, match="poses: wanted"):
         deform(load_face(), bad)

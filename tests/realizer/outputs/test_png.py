@@ -36,11 +36,11 @@ def test_a_crowded_sheet_keeps_24_pictures_from_first_to_last(realization):
 
 @pytest.mark.parametrize(("seconds", "frame"), [(0, 0), (0.4, 10), (-1, 0), (99, 37)])
 def test_an_instant_on_a_frame_is_that_frame(realization, seconds, frame):
-    assert row_at(realization, seconds) == pytest.approx(realization.faps.values[frame], rel=1e-5, abs=1e-3)
+    assert row_at(realization, seconds) == pytest.approx(realization.poses[frame], rel=1e-5, abs=1e-3)
 
 
 def test_an_instant_between_frames_lies_between_them(realization):
-    wanted = realization.faps.values[10:12].mean(0)
+    wanted = realization.poses[10:12].mean(0)
     assert row_at(realization, 0.42) == pytest.approx(wanted, rel=1e-4, abs=0.01)
 
 

@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 import realizer
-from realizer.errors import RenderError
+from realizer.errors import RealizerError, RenderError
 from realizer.render import Renderer, available
 
 SIZE = (96, 80)
@@ -155,14 +155,14 @@ def test_the_process_dies_with_its_owner():
     [("default", "top", "camera: wanted one of front"), ("nobody", "front", "nobody")],
 )
 def test_what_cannot_be_drawn_says_why(face, camera, says):
-    with Renderer(face, SIZE, camera) as renderer, pytest.raises(RenderError, match=says):
+    with Renderer(face, SIZE, camera) as renderer, pytest.raises(RealizerError, match=says):
         renderer.draw(rows(1))
 
 
 @pytest.mark.parametrize("shape", [(68,), (2, 67), (1, 2, 68)])
 def test_rows_of_another_shape_are_refused_before_anything_starts(shape):
     renderer = Renderer("default", SIZE)
-    with pytest.raises(ValueError, match=r"faps: wanted \(n, 68\), got"):
+    with pytest.raises(ValueError, match=r"poses: wanted \(n, 68\), got"):
         renderer.draw(np.zeros(shape, np.float32))
     assert renderer.pid is None
 

@@ -378,7 +378,7 @@ def test_the_newest_frame_is_drawn_and_late_ones_are_skipped(driver) -> None:
     driver.run(1.0)
     (first,) = driver.draws
     assert first.size == (64, 64)
-    assert first.faps.shape == (68,)
+    assert first.pose.shape == (68,)
     driver.session.drawn(first.id, b"jpeg", driver.opened + 1.0)
     driver.collect()
     assert [(f.frame, f.payload) for f in client.frames] == [(0, b"jpeg")]

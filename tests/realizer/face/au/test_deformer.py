@@ -1,94 +1,140 @@
-"""A face driven by its action unit model: the same as the mixers, in one product."""
+"""A face drawn by its action unit model: the same as the mixers, with FAPs, gaze and speech on top."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face import list_faces, load_face
-from realizer.face.au import Deformer, load_deformer, mix
+from realizer.face import deform, list_faces, load_face, takes
+from realizer.face.au import mix, opened
+from realizer.face.model import Face
 
 FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)
 
 
 @pytest.fixture(scope="module")
-def deformer() -> Deformer:
-    found = load_deformer(model=FOLDER / "au_published.toml")
-    assert found is not None
-    return found
+def face() -> Face:
+    return load_face(deformer="au")
 
 
-def part(vertices: np.ndarray, name: str) -> np.ndarray:
-    return vertices[slice(*load_face().parts[name])]
+def pose(face: Face, **values: float) -> np.ndarray:
+    """A row: au12=1 (both sides), au12L=1, or a FAP by its name."""
+    row = np.zeros(len(face.takes), np.float32)
+    for key, value in values.items():
+        name = key.removeprefix("au")
+        for column in (name, f"{name}L", f"{name}R"):
+            if column in face.takes:
+                row[face.takes.index(column)] = value
+    return row
 
 
-def test_at_rest_the_face_is_neutral_to_the_last_bit(deformer: Deformer) -> None:
-    assert (deformer(np.zeros((2, len(deformer.columns)))) == deformer.face.vertices).all()
+def shown(face: Face, **values: float) -> np.ndarray:
+    made: np.ndarray = deform(face, pose(face, **values)[None])[0].astype(np.float64)
+    return made
 
 
-def test_each_unit_has_a_column_for_each_side_it_has(deformer: Deformer) -> None:
-    assert {"12L", "12R", "17", "51", "64"} <= set(deformer.columns)
-    assert len(deformer.columns) == len(set(deformer.columns))
-    assert {int(name.rstrip("LR")) for name in deformer.columns} == {
-        *deformer.model.units,
-        *deformer.model.degrees,
-    }
+def part(face: Face, vertices: np.ndarray, name: str) -> np.ndarray:
+    return vertices[slice(*face.parts[name])]
 
 
-def test_it_gives_what_the_mixers_give(deformer: Deformer) -> None:
-    values = {1: 0.6, 12: 0.9, 27: 0.5, 51: 0.4, 54: 0.3, 61: 0.7}
-    made = deformer(deformer.row(values)[None])[0]
-    neutral = deformer.face.vertices.astype(np.float64)
+def test_at_rest_the_face_is_neutral_to_the_last_bit(face: Face) -> None:
+    assert (deform(face, np.zeros((2, len(face.takes)))) == face.vertices).all()
+
+
+def test_a_pose_is_the_faps_then_each_unit_by_side_then_the_lips(face: Face) -> None:
+    assert face.takes[:68] == load_face(deformer="mpeg4").takes
+    assert {"12L", "12R", "17", "45L", "46R"} <= set(face.takes[68:])
+    assert face.takes[-1] == "lips"
+    assert len(set(face.takes)) == len(face.takes)
+    assert takes(deformer="au") == face.takes
+
+
+def test_units_give_what_the_mixers_give(face: Face) -> None:
+    values = {1: 0.6, 12: 0.9, 27: 0.5}
+    made = shown(face, **{f"au{au}": value for au, value in values.items()})
+    neutral = face.vertices.astype(np.float64)
+    assert face.model is not None
     for name, thing in (
         ("hair", "face"),
         ("left_eye", "left eye"),
-        ("right_eye", "right eye"),
         ("lower_teeth", "jaw"),
         ("upper_teeth", "fixed"),
     ):
-        wanted = mix(deformer.model, part(neutral, name), values, thing)  # type: ignore[arg-type]
-        assert part(made, name) == pytest.approx(wanted, abs=5e-5), name
+        wanted = mix(face.model, part(face, neutral, name), values, thing)  # type: ignore[arg-type]
+        assert part(face, made, name) == pytest.approx(wanted, abs=5e-5), name
 
 
-def test_lashes_and_brows_stay_on_the_skin_they_grow_on(deformer: Deformer) -> None:
+def test_faps_alone_move_it_as_they_move_any_face(face: Face) -> None:
+    rows = np.zeros((1, 68), np.float32)
+    rows[0, [2, 11, 22, 30, 48]] = 400, 200, 20000, 150, 30000
+    other = load_face(deformer="mpeg4")
+    assert np.array_equal(deform(face, rows), deform(other, rows))
+
+
+def test_a_turned_head_carries_what_units_do(face: Face) -> None:
+    """Mixed successively: the smile first, then the turn of all of it."""
+    turned = shown(face, head_yaw=30000)
+    both = shown(face, au12=1, head_yaw=30000)
+    straight = shown(face, au12=1)
+    corner = face.feature_points["8.3"]
+    before, after = straight[corner] - face.vertices[corner], both[corner] - turned[corner]
+    assert np.linalg.norm(after) == pytest.approx(np.linalg.norm(before), rel=0.02)
+    assert np.linalg.norm(after - before) > 0.1 * np.linalg.norm(before)
+
+
+def test_lashes_and_brows_stay_on_the_skin_they_grow_on(face: Face) -> None:
     """Half closed and closed, raised and lowered, nothing comes loose by more than a millimetre."""
     from scipy.spatial import cKDTree
 
-    neutral = deformer.face.vertices
-    skin = part(neutral, "skin")
-    for values in ({43: 1.0}, {43: 0.5}, {1: 1.0, 2: 1.0}, {4: 1.0}):
-        made = deformer(deformer.row(values)[None])[0]
+    skin = part(face, face.vertices, "skin")
+    for values in ({"au43": 1.0}, {"au43": 0.5}, {"au1": 1.0, "au2": 1.0}, {"au4": 1.0}):
+        made = shown(face, **values)
         for name in ("brows", "lashes"):
-            before = np.asarray(cKDTree(skin).query(part(neutral, name))[0])
-            after = np.asarray(cKDTree(part(made, "skin")).query(part(made, name))[0])
+            before = np.asarray(cKDTree(skin).query(part(face, face.vertices, name))[0])
+            after = np.asarray(cKDTree(part(face, made, "skin")).query(part(face, made, name))[0])
             assert (after - before).max() < 0.001, (values, name)
 
 
-def test_a_smile_on_the_left_leaves_the_right_alone(deformer: Deformer) -> None:
-    row = np.zeros((1, len(deformer.columns)))
-    row[0, deformer.columns.index("12L")] = 1
-    moved = deformer(row)[0] - deformer.face.vertices
-    face = deformer.face
+def test_a_smile_on_the_left_leaves_the_right_alone(face: Face) -> None:
+    moved = shown(face, au12L=1) - face.vertices
     left, right = (face.feature_points[key] for key in ("8.3", "8.4"))
     assert np.linalg.norm(moved[left]) > 0.008
     assert np.linalg.norm(moved[right]) < 1e-6
 
 
-def test_closed_eyes_cover_their_balls(deformer: Deformer) -> None:
-    made = deformer(deformer.row({43: 1.0})[None])[0]
-    lid = deformer.face.basis["lid"]
-    centres = np.array(deformer.model.eyes)[deformer.face.basis["lid_eye"]]
+def test_closed_eyes_cover_their_balls(face: Face) -> None:
+    made = shown(face, au43=1)
+    lid, basis = face.basis["lid"], face.basis
+    centres = np.stack([centre for _, centre in basis["eyes"]])[basis["lid_eye"]]
     away = np.linalg.norm(made[lid] - centres, axis=1)
-    assert (away > deformer.face.basis["lid_radius"] - 2e-5).all()
+    assert (away > basis["lid_radius"] - 2e-5).all()
 
 
-def test_an_open_jaw_parts_the_lips_everywhere_between_the_corners(deformer: Deformer) -> None:
+@pytest.mark.parametrize(
+    "also",
+    [{"au5": 1.0}, {"au7": 1.0}, {"au6": 1.0, "au7": 1.0}, {"close_t_l_eyelid": 470.0}],
+    ids=["wide", "tightened", "squinting", "looking down"],
+)
+def test_closed_lids_stay_where_they_meet_whatever_else_asks(face: Face, also: dict[str, float]) -> None:
+    closed, other = shown(face, au43=1), shown(face, au43=1, **also)
+    for point in ("3.1", "3.3"):
+        vertex = face.feature_points[point]
+        assert np.linalg.norm(other[vertex] - closed[vertex]) < 0.0008, point
+
+
+def test_blink_and_wink_close_the_eye_as_its_unit_does(face: Face) -> None:
+    closed = shown(face, au43L=1)
+    assert np.array_equal(shown(face, au45L=1), closed)
+    assert np.array_equal(shown(face, au46L=1, au45L=0.5, au43L=1), closed)
+
+
+def test_an_open_jaw_parts_the_lips_everywhere_between_the_corners(face: Face) -> None:
     """The lips' two sides are told apart by the mesh, so that no vertex stays behind on the wrong one."""
     from realizer.face.au.mouth import halves
 
-    face = deformer.face
-    made = deformer(deformer.row({27: 1.0})[None])[0]
+    made = shown(face, au27=1)
     index, upper = halves(face)
     inner = np.abs(face.vertices[index, 0]) < 0.015
     fall = (made - face.vertices)[index, 1]
@@ -97,21 +143,90 @@ def test_an_open_jaw_parts_the_lips_everywhere_between_the_corners(deformer: Def
     assert fall[lips].max() < -0.012
 
 
-def test_values_of_another_shape_or_not_finite_are_refused(deformer: Deformer) -> None:
-    with pytest.raises(ValueError, match=r"wanted \(n, "):
-        deformer(np.zeros((1, 3)))
+def test_the_mouth_opens_as_far_as_the_widest_unit_opens_it(face: Face) -> None:
+    wide = shown(face, au27=1)
+    for also in ({"au26": 1.0}, {"au25": 1.0}, {"au25": 0.7, "au26": 0.9}):
+        assert shown(face, au27=1, **also) == pytest.approx(wide, abs=1e-6)
+    assert face.model is not None
+    gaps = np.array([face.model.gap(au) for au in (27, 26, 25)])
+    values = np.random.default_rng(0).uniform(0, 1, (3, 50))
+    assert gaps @ opened(gaps, values) == pytest.approx((gaps[:, None] * values).max(axis=0))
+
+
+def test_speech_has_the_lips_and_leaves_brows_cheeks_and_part_of_the_corners(face: Face) -> None:
+    values = {"au1": 1.0, "au6": 1.0, "au12": 1.0, "au27": 1.0}
+    silent = shown(face, **values) - face.vertices
+    speaking = shown(face, **values, lips=1) - face.vertices
+    for point, least, most in (("2.3", 0, 0.12), ("8.3", 0.1, 0.7), ("4.1", 1, 1), ("5.3", 0.5, 1)):
+        here = face.feature_points[point]
+        part_of = np.linalg.norm(speaking[here]) / np.linalg.norm(silent[here])
+        assert least - 1e-3 <= part_of <= most + 1e-3, point
+    teeth = slice(*face.parts["lower_teeth"])
+    assert np.abs(speaking[teeth]).max() < 1e-6
+    assert np.abs(silent[teeth]).max() > 0.01
+
+
+def test_values_of_another_shape_or_not_finite_are_refused(face: Face) -> None:
+    with pytest.raises(ValueError, match=r"wanted \(n, 68\) or \(n, "):
+        deform(face, np.zeros((1, 3)))
     with pytest.raises(ValueError, match="finite"):
-        deformer(np.full((1, len(deformer.columns)), np.nan))
+        deform(face, np.full((1, len(face.takes)), np.nan))
 
 
-def test_a_face_chooses_its_deformer_by_a_key(tmp_path: Path) -> None:
-    import shutil
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(FOLDER, tmp_path / "mine"))
 
-    assert load_deformer() is None  # off by default
-    folder = Path(shutil.copytree(FOLDER, tmp_path / "mine"))
-    head = (folder / "face.toml").read_text()
-    (folder / "face.toml").write_text('deformer = "au"\n' + head)
-    assert load_deformer("mine", tmp_path) is not None
-    (folder / "face.toml").write_text('deformer = "bones"\n' + head)
+
+def say(folder: Path, words: str) -> None:
+    head = (FOLDER / "face.toml").read_text()
+    (folder / "face.toml").write_text(f"{words}\n" + head)
+
+
+def test_a_face_names_its_deformer_and_a_caller_may_choose_the_other(
+    mine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def units(deformer: str | None = None) -> bool:
+        return load_face("mine", mine.parent, deformer).model is not None
+
+    assert (units(), units("au"), units("mpeg4")) == (False, True, False)
+    monkeypatch.setenv("REALIZER_DEFORMER", "au")
+    assert (units(), units("mpeg4")) == (True, False)
+
+
+def test_a_face_may_be_drawn_by_its_model_without_being_asked(mine: Path) -> None:
+    say(mine, 'deformer = "au"')
+    assert load_face("mine", mine.parent).model is not None
+    assert load_face("mine", mine.parent, "mpeg4").model is None
+
+
+def test_a_face_may_leave_some_of_its_units_to_the_faps(mine: Path) -> None:
+    say(mine, 'deformer = { name = "au", model = "au_published.toml", aus = [1, 2, 12] }')
+    face = load_face("mine", mine.parent)
+    assert face.takes[68:] == ("1L", "1R", "2L", "2R", "12L", "12R", "lips")
+    assert face.model is not None
+    assert face.model.form == "published"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ('deformer = "bones"', "wanted mpeg4 or au, got 'bones'"),
+        ('deformer = { name = "au", model = "../x.toml" }', "wanted the name of a file beside it"),
+        ('deformer = { name = "au", model = "none.toml" }', "realizer faces fit mine"),
+        ('deformer = { name = "au", aus = [1, 51] }', r"got \[1, 51\]"),
+    ],
+)
+def test_a_deformer_that_cannot_be_used_is_said(mine: Path, words: str, says: str) -> None:
+    say(mine, words)
+    with pytest.raises(FaceError, match=says):
+        load_face("mine", mine.parent)
+
+
+def test_a_face_without_a_model_says_how_to_make_one(mine: Path) -> None:
+    (mine / "au_extended.toml").unlink()
+    assert load_face("mine", mine.parent).model is None
+    with pytest.raises(FaceError, match="realizer faces fit mine"):
+        load_face("mine", mine.parent, "au")
     with pytest.raises(FaceError, match="wanted mpeg4 or au, got 'bones'"):
-        load_deformer("mine", tmp_path)
+        load_face("mine", mine.parent, "bones")

@@ -1,0 +1,39 @@
+"""AUFrames and what a face takes in, the rows that it is drawn by out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames
+from realizer.animation.targets import AU_NAMES, axis
+from realizer.arrays import Float32
+
+__all__ = ["poses"]
+
+
+def poses(frames: AUFrames, takes: tuple[str, ...]) -> Float32:
+    """What a face is drawn by: stills, films, sheets and streams of pictures and meshes alike.
+
+    A column for each name, in its order: action units as they move a face (0..1), presences (0..1), and FAPs
+    in FAPU: those that did not come from action units, and those that the other action units ask for. A face
+    that takes no action units gets `to_fap` whole.
+
+    Args:
+        frames: n frames.
+        takes: names of `targets.axis()` (`Face.takes`).
+
+    Returns:
+        (n, len(takes)) float32.
+
+    Raises:
+        KeyError: a name that is not of the axis.
+    """
+    columns = [axis()[name].column for name in takes]
+    count = len(AU_NAMES())
+    values = frames.values.copy()
+    values[:, :count] = frames.moving.T
+    rest = values.copy()
+    rest[:, [column for column in columns if column < count]] = 0
+    values[:, count : count + 68] = to_fap(AUFrames(frames.times, rest)).values
+    return np.ascontiguousarray(values[:, columns])

@@ -1,0 +1,61 @@
+"""What a face is drawn by: FAPs alone, or the action units it takes and the FAPs of all others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer import tables
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames
+from realizer.animation.pose import poses
+from realizer.animation.targets import AU_NAMES, axis
+
+FAPS = tuple(row.name for row in tables.faps())
+
+
+def frames(*rows: dict[str, float]) -> AUFrames:
+    values = np.zeros((len(rows), len(axis())), np.float32)
+    for row, named in zip(values, rows, strict=True):
+        for name, value in named.items():
+            row[axis()[name].column] = value
+    return AUFrames(np.arange(len(rows), dtype=np.float64), values)
+
+
+faces = st.dictionaries(st.sampled_from(AU_NAMES()), st.floats(0, 1, width=32), max_size=6)
+
+
+@given(st.lists(faces, min_size=1, max_size=4))
+def test_a_face_that_takes_faps_gets_what_the_fap_stream_gets(rows: list[dict[str, float]]) -> None:
+    clip = frames(*rows)
+    assert np.array_equal(poses(clip, FAPS), to_fap(clip).values)
+
+
+@given(faces, st.sets(st.sampled_from(AU_NAMES())))
+def test_what_a_face_takes_as_a_unit_asks_no_fap_for_anything(
+    face: dict[str, float], taken: set[str]
+) -> None:
+    names = (*FAPS, *sorted(taken), "lips")
+    (row,) = poses(frames({**face, "lips": 0.25}), names)
+    others = {name: value for name, value in face.items() if name not in taken}
+    assert np.array_equal(row[:68], to_fap(frames({**others, "lips": 0.25})).values[0])
+    assert row[68:-1] == pytest.approx([face.get(name, 0) for name in sorted(taken)])
+    assert row[-1] == 0.25
+
+
+def test_gaze_visemes_and_faps_set_directly_reach_a_face_that_takes_units() -> None:
+    names = (*FAPS, "12L", "12R", "lips")
+    (row,) = poses(frames({"12L": 1, "61": 0.5, "51": 0.5, "open_jaw": 300, "lips": 1}), names)
+    found = dict(zip(names, row, strict=True))
+    assert found["12L"] == 1
+    assert found["raise_l_cornerlip"] == 0
+    assert found["open_jaw"] == 300
+    assert found["head_yaw"] > 10_000
+    assert found["yaw_l_eyeball"] > 10_000
+
+
+def test_a_name_that_is_not_of_the_axis_is_an_error() -> None:
+    with pytest.raises(KeyError, match="wings"):
+        poses(frames({}), (*FAPS, "wings"))
