@@ -95,8 +95,9 @@ DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth
 
 
 def occlusion(
-    vertices: Float64, normals: Float64, triangles: Int32, blockers: Int32 | None = None
-) -> Float64:
+    vertices: Float64, normals: Float64, triangles: Int32, blockers: Int32 | None = None,
+    directions: int = DIRECTIONS, cell: float = CELL,
+) -> Float64:  # fmt: skip
     """How much of the sky above it each vertex sees, 0..1, weighted by the cosine.
 
     Depth pictures of the mesh from many directions take the place of rays: a vertex that lies deeper than
@@ -105,11 +106,13 @@ def occlusion(
     Args:
         vertices, normals: (n, 3).
         blockers: triangles that cast shadows; all if None.
+        directions, cell: how many pictures, and metres of their cells: fewer and larger ones are quicker.
     """
-    cloud = _cover(vertices, triangles if blockers is None else blockers)
+    cloud = _cover(vertices, triangles if blockers is None else blockers, cell)
+    bias = cell * BIAS / CELL
     # A spiral of evenly spread directions (Fibonacci).
-    k = np.arange(DIRECTIONS) + 0.5
-    height, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
+    k = np.arange(directions) + 0.5
+    height, turn = 1 - 2 * k / directions, np.pi * (1 + 5**0.5) * k
     ways = np.stack([np.sqrt(1 - height**2) * np.cos(turn), height, np.sqrt(1 - height**2) * np.sin(turn)], 1)
     seen, total = np.zeros(len(vertices)), np.zeros(len(vertices))
     for way in ways:
@@ -119,25 +122,25 @@ def occlusion(
         facing = np.maximum(normals @ way, 0)
         lit = facing > 0.02
         far, here = cloud @ frame, (vertices + normals * 0.0008)[lit] @ frame
-        low = far[:, :2].min(axis=0) - CELL
-        shape = np.ceil((far[:, :2].max(axis=0) - low) / CELL).astype(int) + 2
-        cells = ((far[:, :2] - low) / CELL).astype(int)
+        low = far[:, :2].min(axis=0) - cell
+        shape = np.ceil((far[:, :2].max(axis=0) - low) / cell).astype(int) + 2
+        cells = ((far[:, :2] - low) / cell).astype(int)
         depth = np.full(shape[0] * shape[1], -np.inf)
         np.maximum.at(depth, cells[:, 0] * shape[1] + cells[:, 1], far[:, 2])
-        mine = np.clip(((here[:, :2] - low) / CELL).astype(int), 0, shape - 1)
-        free = here[:, 2] + BIAS > depth[mine[:, 0] * shape[1] + mine[:, 1]]
+        mine = np.clip(((here[:, :2] - low) / cell).astype(int), 0, shape - 1)
+        free = here[:, 2] + bias > depth[mine[:, 0] * shape[1] + mine[:, 1]]
         seen[lit] += facing[lit] * free
         total += facing
     return np.asarray(np.where(total > 0, seen / np.maximum(total, 1e-9), 1))
 
 
-def _cover(vertices: Float64, triangles: Int32) -> Float64:
+def _cover(vertices: Float64, triangles: Int32, cell: float) -> Float64:
     """Points on the triangles, closer together than a depth cell."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     longest = np.max(
         [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0
     )
-    steps = np.clip(np.ceil(longest / (CELL * 0.8)).astype(int), 1, 24)
+    steps = np.clip(np.ceil(longest / (cell * 0.8)).astype(int), 1, 24)
     points = [vertices]
     for n in np.unique(steps):
         mine = steps == n
