@@ -120,3 +120,13 @@ def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
         "vertex": np.concatenate(vertices).astype(np.int32),
         "move": np.concatenate(moves),
     }
+
+
+def unpack(stored: Mapping[str, Any], n_vertices: int) -> dict[int, Any]:
+    """What `pack` stored: row number -> (n_vertices, 3)."""
+    rows = {}
+    for k, number in enumerate(stored["row"].tolist()):
+        part = slice(int(stored["start"][k]), int(stored["start"][k + 1]))
+        rows[number] = np.zeros((n_vertices, 3))
+        rows[number][stored["vertex"][part]] = stored["move"][part]
+    return rows
