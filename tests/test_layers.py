@@ -37,9 +37,17 @@ MAY: dict[str, set[str]] = {
         "realizer.speech.utterance",
         "realizer.tables",
     },
-    "realizer.emotion": VALUES | {"realizer.emotion", "realizer.face.model", "realizer.tables"},
+    "realizer.emotion": VALUES | {"realizer.emotion", "realizer.face", "realizer.tables"},
     "realizer.face": VALUES | {"realizer.face", "realizer.tables"},
     "realizer.render": VALUES | {"realizer.face", "realizer.render", "realizer.tables"},
+    "realizer.knowledge": VALUES
+    | {
+        "bml_schema",
+        "realizer.knowledge",
+        "realizer.speech.spelling",
+        "realizer.speech.words",
+        "realizer.tables",
+    },
     "realizer.outputs": VALUES
     | {
         "realizer.animation",

@@ -2,17 +2,39 @@
 
 from realizer.emotion.archetypes import archetypes
 from realizer.emotion.intermediate import Anchor, between, same_category
+from realizer.emotion.measure import (
+    faps_from_features,
+    faps_from_points,
+    features_from_faps,
+    features_from_points,
+)
 from realizer.emotion.profile import Profile
 from realizer.emotion.profile_file import read_profiles, write_profiles
+from realizer.emotion.recognise import Recogniser, Recognition, recogniser
+from realizer.emotion.statistics import from_faces, from_statistics, published_statistics
 from realizer.emotion.wheel import affect, shares, wheel
+from realizer.emotion.words import UnknownWordError, emotion, known_words
 
 __all__ = [
     "Anchor",
     "Profile",
+    "Recogniser",
+    "Recognition",
+    "UnknownWordError",
     "affect",
     "archetypes",
     "between",
+    "emotion",
+    "faps_from_features",
+    "faps_from_points",
+    "features_from_faps",
+    "features_from_points",
+    "from_faces",
+    "from_statistics",
+    "known_words",
+    "published_statistics",
     "read_profiles",
+    "recogniser",
     "same_category",
     "shares",
     "wheel",

@@ -44,7 +44,7 @@ def wheel(
         raise ValueError(f"activation: wanted 0..{most:g}, got {activation:g}")
     ranges: dict[int, tuple[float, float]] = {}
     parts = []
-    for anchor, share in _neighbours(angle, profiles, ring):
+    for anchor, share in neighbours(angle, profiles, ring):
         if not share:
             continue
         parts.append(anchor.profile.name)
@@ -57,8 +57,8 @@ def wheel(
 
 def shares(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str, float]:
     """Archetype -> how much of it shows at that angle; the one or two shares add up to 1."""
-    pairs = _neighbours(angle, profiles, ring)
-    return {anchor.profile.name.rpartition(" ")[0] or NEUTRAL: share for anchor, share in pairs if share}
+    pairs = neighbours(angle, profiles, ring)
+    return {_plain(anchor.profile.name): share for anchor, share in pairs if share}
 
 
 def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
@@ -82,7 +82,7 @@ def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
     return full.scaled(away)
 
 
-def _neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, float], tuple[Anchor, float]]:
+def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, float], tuple[Anchor, float]]:
     """The archetype at or before an angle and the one after it, each with its share."""
     if not math.isfinite(angle):
         raise ValueError(f"angle: wanted a number of degrees, got {angle}")
@@ -91,6 +91,16 @@ def _neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, f
     low, high = anchors[after - 1], anchors[after]
     share = ((angle - low.angle) % 360.0) / ((high.angle - low.angle) % 360.0)
     return (low, 1.0 - share), (high, share)
+
+
+def anchor_of(emotion: str, profiles: str) -> Anchor:
+    """An archetype with the activation that its profile is drawn for, and its angle on Plutchik's ring."""
+    return next(a for a in _anchors(profiles, "plutchik")[0] if _plain(a.profile.name) == emotion)
+
+
+def _plain(name: str) -> str:
+    """The name of a profile without its number."""
+    return name.rpartition(" ")[0] or name
 
 
 @cache

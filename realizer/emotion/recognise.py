@@ -1,0 +1,114 @@
+"""FAPs in, beliefs in profiles and emotions out (Raouzaiou et al. 2002, section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realizer.arrays import Bool, Float64
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.profile import Profile
+from realizer.tables.emotion_model import emotion_model
+
+__all__ = ["Recogniser", "Recognition", "recogniser"]
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What a face shows.
+
+    Attributes:
+        emotion: the one that is believed in most (eq. 11); None where nothing fits.
+        emotions: emotion -> belief 0..1 (eq. 9), all of them.
+        profiles: name of a profile -> belief (eq. 8).
+    """
+
+    emotion: str | None
+    emotions: Mapping[str, float]
+    profiles: Mapping[str, float]
+
+
+class Recogniser:
+    """Fuzzy classes of profiles, ready for whole arrays.
+
+    A value belongs to a FAP's class as far as it lies in the range (`tables/emotion_model.toml`: the drawing
+    of figure 6 is not in the text). A profile is the product of its FAPs, an emotion the best of its
+    profiles. Where two are believed in alike, the one that asks for more FAPs is meant.
+    """
+
+    def __init__(self, profiles: Iterable[Profile], absent: bool = True) -> None:
+        """
+        Args:
+            profiles: at least one; an emotion is the name without the number at its end.
+            absent: what another profile moves and this one does not is in a class of its own, around 0;
+                without it (as published) a profile of few FAPs is believed in wherever one of more is.
+        """
+        self.profiles = tuple(profiles)
+        if not self.profiles:
+            raise ValueError("profiles: wanted at least one, got none")
+        model = emotion_model()
+        shape = (len(self.profiles), 68)
+        self._middle, self._half = np.zeros(shape), np.full(shape, model.absent)
+        self._used = np.zeros(shape, bool)
+        for k, profile in enumerate(self.profiles):
+            for fap, (low, high) in profile.ranges.items():
+                self._middle[k, fap - 1] = (low + high) / 2
+                self._half[k, fap - 1] = max(high - low, model.least_length) / 2
+                self._used[k, fap - 1] = True
+        self._moved = self._used.sum(axis=1)
+        if absent:
+            self._used |= self._used.any(axis=0)
+        self._core, self._base = model.core, model.base
+        self._emotions = [_emotion(profile.name) for profile in self.profiles]
+
+    def beliefs(self, frames: Any, seen: Bool | None = None) -> Float64:
+        """(n, profiles) of FAP frames (n, 68); `seen` (68,) says which FAPs were observed, None is all.
+
+        Raises:
+            ValueError: another shape, or values that are not finite.
+        """
+        values = np.asarray(frames, np.float64)
+        if values.ndim != 2 or values.shape[1] != 68:
+            raise ValueError(f"frames: wanted (n, 68), got {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError("frames: wanted finite values, got NaN or infinity")
+        away = np.abs(values[:, None] - self._middle) / self._half
+        membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
+        judged = self._used if seen is None else self._used & seen
+        product: Float64 = np.where(judged, membership, 1.0).prod(axis=2)
+        # A profile none of whose FAPs was seen is nothing to believe in.
+        return product * judged.any(axis=1)
+
+    def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
+        """The emotion of each frame (eq. 11), None where nothing fits."""
+        return [self._best(row) for row in self.beliefs(frames, seen)]
+
+    def recognise(self, frame: Any, seen: Bool | None = None) -> Recognition:
+        """What one FAP frame (68,) shows."""
+        beliefs = self.beliefs(np.asarray(frame)[None], seen)[0]
+        emotions: dict[str, float] = {}
+        for emotion, belief in zip(self._emotions, beliefs, strict=True):
+            emotions[emotion] = max(emotions.get(emotion, 0.0), float(belief))
+        names = (profile.name for profile in self.profiles)
+        return Recognition(self._best(beliefs), emotions, dict(zip(names, map(float, beliefs), strict=True)))
+
+    def _best(self, beliefs: Float64) -> str | None:
+        best = int(np.lexsort((self._moved, beliefs))[-1])
+        return self._emotions[best] if beliefs[best] > 0 else None
+
+
+def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
+    """That of all profiles of a set: "own", "published" or "raw".
+
+    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised.
+    """
+    every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
+    return Recogniser([*every, Profile("neutral", profiles, {})] if absent else every, absent)
+
+
+def _emotion(name: str) -> str:
+    emotion, _, number = name.rpartition(" ")
+    return emotion if emotion and number.isdecimal() else name

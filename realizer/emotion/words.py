@@ -1,0 +1,83 @@
+"""A word for an emotion -> its profile."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from types import MappingProxyType
+
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.intermediate import between, same_category
+from realizer.emotion.profile import Profile
+from realizer.emotion.wheel import NEUTRAL, anchor_of, neighbours, wheel
+from realizer.tables.feelings import WhissellWord, own_words, ring, whissell_words
+
+__all__ = ["UnknownWordError", "emotion", "known_words"]
+
+
+class UnknownWordError(ValueError):
+    """A word for no emotion that is known; the text says which ones are near it."""
+
+
+def emotion(word: str, profiles: str = "own") -> Profile:
+    """The profile of a word.
+
+    - An emotion of the wheel of Paul 2010 ("anger", "remorse"), and "neutral": as its archetypes themselves.
+    - A word that Whissell rated ("terrified", "guilty"): of the kind of an archetype, as their activations
+      are to each other; else what lies between two archetypes at its angle. There the published sets go by
+      the published rules, our own by the wheel, which has no jumps.
+    - A word of our own list: as the one that it is like.
+    - An archetype and a number ("fear 8"): that profile itself.
+
+    Args:
+        word: either case.
+        profiles: "own", "published" or "raw".
+
+    Raises:
+        UnknownWordError: none of those.
+        ValueError: another set, or "accepting", which has no activation.
+    """
+    asked = " ".join(word.split()).lower()
+    known = archetypes(profiles)
+    name, _, number = asked.rpartition(" ")
+    if name in known and number.isdecimal() and int(number) in known[name]:
+        return known[name][int(number)]
+    meant = own_words()[asked].like if asked in own_words() else asked
+    if meant == NEUTRAL:
+        return Profile(asked, profiles, {})
+    if meant in ring("paul"):
+        return replace(wheel(ring("paul")[meant].angle, None, profiles), name=asked)
+    if meant not in whissell_words():
+        raise UnknownWordError(_unknown(asked))
+    return replace(_rated(whissell_words()[meant], profiles), name=asked)
+
+
+@cache
+def known_words() -> Mapping[str, str]:
+    """Every word that has a profile -> where it comes from: "wheel", "whissell" or "own"."""
+    found = dict.fromkeys([NEUTRAL, *ring("paul")], "wheel")
+    found |= {row.word: "whissell" for row in whissell_words().values() if row.activation is not None}
+    found |= dict.fromkeys(own_words(), "own")
+    return MappingProxyType(found)
+
+
+def _rated(row: WhissellWord, profiles: str) -> Profile:
+    if row.activation is None:
+        raise ValueError(f"{row.word}: nobody rated how activated it is, so it has no face of its own")
+    if row.category:
+        anchor = anchor_of(row.category, profiles)
+        return same_category(anchor.profile, anchor.activation, row.activation)
+    if profiles == "own":
+        return wheel(row.angle, row.activation, profiles, "plutchik")
+    (one, _), (two, _) = neighbours(row.angle, profiles, "plutchik")
+    return between(one, two, row.angle, row.activation)
+
+
+def _unknown(word: str) -> str:
+    near = difflib.get_close_matches(word, list(known_words()), n=3)
+    got = repr(word if len(word) <= 60 else word[:60] + "...")
+    if near:
+        return f"emotion: wanted a word that is known, got {got}, did you mean {' or '.join(near)}?"
+    return f"emotion: wanted one of {', '.join(sorted(known_words()))}; got {got}"

@@ -1,0 +1,66 @@
+"""Words for emotions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.emotion import UnknownWordError, archetypes, emotion, known_words, wheel
+
+
+@pytest.mark.parametrize("profiles", ["own", "published", "raw"])
+def test_every_known_word_has_a_profile_of_its_name(profiles: str) -> None:
+    for word in known_words():
+        made = emotion(word, profiles)
+        assert made.name == word
+        assert made.source == profiles
+        assert made.frame().any() != (word == "neutral")
+
+
+def test_words_tell_where_they_come_from() -> None:
+    sources = known_words()
+    assert (sources["remorse"], sources["guilty"], sources["scared"]) == ("wheel", "whissell", "own")
+    assert "accepting" not in sources
+    assert emotion("scared").ranges == emotion("afraid").ranges
+
+
+def test_an_emotion_of_the_wheel_is_its_archetype_and_a_rated_word_as_much_as_it_is_activated() -> None:
+    anger = archetypes("own")["anger"][0]
+    assert emotion("Anger").ranges == anger.ranges
+    assert emotion(" ANGRY ").ranges[31] == pytest.approx([end * 4.2 / 7 for end in anger.ranges[31]])
+    assert emotion("anger", "published").ranges == archetypes("published")["anger"][3].ranges
+    assert emotion("angry", "published").ranges == archetypes("published")["anger"][3].ranges
+
+
+def test_a_word_of_a_category_goes_by_activation_and_not_by_angle() -> None:
+    afraid, worried, terrified = (emotion(word).frame() for word in ("afraid", "worried", "terrified"))
+    assert np.allclose(worried * 4.9, afraid * 3.9, atol=1e-2)
+    assert np.allclose(terrified * 4.9, afraid * 6.3, atol=1e-2)
+
+
+def test_an_archetype_and_a_number_is_that_profile() -> None:
+    assert emotion("fear 3", "raw") is archetypes("raw")["fear"][3]
+    with pytest.raises(UnknownWordError):
+        emotion("fear 33", "raw")
+
+
+def test_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
+    assert emotion("guilty").ranges == wheel(102.3, 4, "own", "plutchik").ranges
+    assert set(emotion("guilty", "published").ranges) < {3, 5, *range(19, 23), *range(31, 37)}
+
+
+def test_an_unknown_word_gets_those_near_it() -> None:
+    with pytest.raises(UnknownWordError, match="got 'gilty', did you mean guilty"):
+        emotion("Gilty")
+    with pytest.raises(UnknownWordError, match=r"wanted one of .*afraid.*; got 'радость'"):
+        emotion("радость")
+    with pytest.raises(UnknownWordError, match="got ''"):
+        emotion("  ")
+    with pytest.raises(UnknownWordError) as caught:
+        emotion("x" * 10_000)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_word_that_nobody_rated_says_so() -> None:
+    with pytest.raises(ValueError, match="accepting: nobody rated how activated it is"):
+        emotion("accepting")
