@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.arrays import Float64
+from realizer.arrays import Bool, Float64
 from realizer.face import head, paint, parts
 from realizer.face.hair import hair, scalp_of, shadow, style_of
 from realizer.face.lids import Lid
@@ -13,6 +13,7 @@ from realizer.face.parts import Part, smooth
 from realizer.face.patch import Patch, vertex_normals
 from realizer.face.person import Person
 from realizer.face.recipe import Recipe
+from realizer.face.scalp import Scalp
 
 __all__: list[str] = []
 
@@ -37,8 +38,8 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     body = Patch.of_quads(ground.mesh.quads["body"], n)
     body = body.kept((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
     body = body.clipped(body.positions(at)[:, 1] - person.floor)[0]
-    visible = head.under_collar(body.positions(at))
-    skin = body.clipped(0.012 - visible)[0]
+    dressed = head.under_collar(body.positions(at), points["2.1"], person.face)
+    skin = body.clipped(0.012 - dressed)[0]
     colours, gloss = paint.paint_skin(ground, lips, [lid.rings for lid in lids], look)
     style = style_of(recipe.hair)
     scalp = scalp_of(skin, at, points, style)
@@ -62,10 +63,23 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     made += _teeth(person, recipe)
     made.append(_tongue(person, recipe))
     made += hair(scalp, style, look)
-    made.append(head.shirt(body, at, look["shirt"]))
+    made.append(head.shirt(body, at, dressed, look["shirt"]))
     made = sorted(made, key=lambda part: ORDER.index(part.name))
     _bake(made)
-    return made
+    stays = np.zeros(n, bool)
+    stays[list(ground.points.values())] = True
+    stays[lips.fade > 0.5] = True
+    return [_spared(part, person, scalp, stays) for part in made]
+
+
+def _spared(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
+    """What is hidden or plain goes; feature points, lips and the mouth behind them stay."""
+    if part.name not in ("skin", "tongue", "shirt") or part.patch is None:
+        return part
+    single = np.diff(part.patch.mix.indptr) == 1
+    keep = single & stays[part.patch.mix.indices[part.patch.mix.indptr[:-1]]]
+    chin = float(person.ground.point("2.1")[1])
+    return head.spared(part, keep, scalp.off_ear(part.vertices) < 0, chin, person.floor)
 
 
 def _teeth(person: Person, recipe: Recipe) -> list[Part]:

@@ -33,6 +33,22 @@ class Part:
     occlusion: Float64 | None = None
     fields: dict[int, Float64] = field(default_factory=dict)
 
+    def picked(self, index: Any, triangles: Int32) -> Part:
+        """The part with these of its vertices only, (k,) indices, and other triangles over them."""
+        patch = self.patch and Patch(self.patch.mix[index], self.patch.offset[index], triangles)
+        light = None if self.occlusion is None else self.occlusion[index]
+        fields = {number: moves[index] for number, moves in self.fields.items()}
+        return Part(
+            self.name,
+            patch,
+            self.vertices[index],
+            triangles,
+            self.colours[index],
+            self.gloss[index],
+            light,
+            fields,
+        )
+
 
 def smooth(x: Any, low: Any, high: Any) -> Any:
     """0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
@@ -52,7 +68,7 @@ def grid(rows: int, columns: int, closed: bool = False) -> Int32:
 
 
 PUPIL, IRIS = 2.05, 6.35  # mm, radii on the ball
-SEGMENTS = 32
+SEGMENTS = 26
 
 
 def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[float]], inward: float) -> Part:
@@ -64,19 +80,9 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
         inward: +1 where the nose lies at +x, -1 at -x: the white reddens there.
     """
     # Radii in mm on the flat of the eye, then angles: close together where the colour jumps.
-    flat = [1.0, PUPIL - 0.05, PUPIL + 0.18, 3.2, 4.4, 5.4, 5.9, IRIS, IRIS + 0.45, 8.2, 10.2, 12.0]
-    names = [
-        "pupil",
-        "pupil",
-        "iris_inner",
-        "iris_inner",
-        "iris_middle",
-        "iris_outer",
-        "ring",
-        "ring",
-        "white",
-    ]
-    angles = [float(np.arcsin(r / 1000 / radius)) for r in flat] + [1.15, 1.6]
+    flat = [PUPIL - 0.05, PUPIL + 0.18, 3.0, 4.3, 5.5, 6.0, IRIS, IRIS + 0.5, 9.0]
+    names = ["pupil", "iris_inner", "iris_inner", "iris_middle", "iris_outer", "ring", "ring", "white"]
+    angles = [float(np.arcsin(r / 1000 / radius)) for r in flat] + [1.1, 1.55]
     turn = np.arange(SEGMENTS) * 2 * np.pi / SEGMENTS
     points, colours = [np.array([[0, 0, 1.0]])], [np.array([look["pupil"]], float)]
     for k, angle in enumerate(angles):
@@ -94,7 +100,7 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
         ring = np.repeat(base[None], SEGMENTS, 0)
         if k < len(names) and names[k].startswith("iris"):
             # Spokes: every iris has them, and they say which way the eye turns.
-            ring *= (1 + 0.10 * np.cos(turn * 9 + k) + 0.06 * np.cos(turn * 18 + 2.0 * k))[:, None]
+            ring *= (1 + 0.09 * np.cos(turn * 7 + k) + 0.07 * np.cos(turn * 11 + 2.0 * k))[:, None]
         if k >= len(names):
             red = smooth(points[-1][:, 0] * inward, 0.35, 0.95)[:, None] * 0.8
             red = np.maximum(red, smooth(-points[-1][:, 0] * inward, 0.55, 1.0)[:, None] * 0.5)
@@ -116,7 +122,7 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     )
     # Dilation: the pupil's edge moves out, the iris gives way up to its rim.
     out = np.hypot(ball[:, 0], ball[:, 1]) * radius * 1000
-    edge = flat[1]  # the outermost ring that is black
+    edge = flat[0]  # the outermost ring that is black
     share = np.where(out < edge + 1e-6, out / edge, np.clip((IRIS - out) / (IRIS - PUPIL - 0.2), 0, 1))
     ways = np.zeros_like(ball)
     ways[:, :2] = ball[:, :2] / np.maximum(np.hypot(ball[:, 0], ball[:, 1]), 1e-9)[:, None]
@@ -144,16 +150,15 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
     t = np.linspace(0, np.pi * 0.62, 2000)
     x, z = width * np.sin(t), depth * (np.cos(t) - 1)
     run = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
-    # Three ridges a tooth: gap, two on the crown; the gaps stand back and are darker.
+    # Gap and two ridges a tooth; the gaps stand back and are darker.
     stations: list[tuple[float, int, bool]] = []
     at = 0.0
     for k, size in enumerate(sizes):
         size /= 1000
         stations += [
             (at, k, True),
-            (at + 0.16 * size, k, False),
-            (at + 0.5 * size, k, False),
-            (at + 0.84 * size, k, False),
+            (at + 0.18 * size, k, False),
+            (at + 0.82 * size, k, False),
         ]
         at += size
     stations.append((at, len(sizes) - 1, True))
@@ -175,8 +180,7 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
         dark = (0.72 if gap else 1.0) * (1 - 0.05 * k)
         # From behind the biting edge over the front to the gum.
         for dy, dn, tint in (
-            (edge + 0.004, -0.0030, white * dark * 0.8),
-            (edge + 0.0002, -0.0014, white * dark),
+            (edge + 0.0012, -0.0024, white * dark * 0.8),
             (edge, -0.0002, white * dark),
             (height * 0.45, 0.0004, white * dark),
             (height * 0.86 - (0.001 if gap else 0), 0.0000, root * dark),
@@ -192,14 +196,14 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
             )
             tints.append(tint)
     vertices = np.array(rows)
-    triangles = grid(len(side), 7)
+    triangles = grid(len(side), 6)
     if up < 0:
         triangles = triangles[:, [0, 2, 1]]
     gloss = np.full(len(vertices), 0.75)
     # Light reaches the front teeth between open lips and not the back of the mouth.
     depth_in = (front[2] - vertices[:, 2]) / depth
     occlusion = 0.86 * smooth(depth_in, 0.75, 0.02) + 0.12
-    occlusion *= np.tile([0.4, 0.8, 1, 1, 0.8, 0.55, 0.4], len(side))
+    occlusion *= np.tile([0.6, 1, 1, 0.8, 0.55, 0.4], len(side))
     return Part(name, None, vertices, triangles, np.array(tints), gloss, occlusion)
 
 

@@ -74,12 +74,15 @@ class Scalp:
 
         steep = np.abs(line(degrees + 2) - line(degrees - 2)) / (4 * np.pi / 180 * 0.08)
         height = (at[:, 1] - line(degrees)) / np.sqrt(1 + steep**2)
+        return np.asarray(np.minimum(height, self.off_ear(at)))
+
+    def off_ear(self, at: Float64) -> Float64:
+        """Metres (about) of places from the bald spot around an ear; negative in it."""
         y, z, tall, wide = self._ear
         # The ear leans back: its ellipse does too.
         lean = at[:, 1] - y
         around = np.hypot(lean / tall, (at[:, 2] - z + EAR_LEAN * lean) / wide)
-        off_ear = np.where(np.abs(at[:, 0]) > EARS_FROM, (around - 1) * wide, np.inf)
-        return np.asarray(np.minimum(height, off_ear))
+        return np.where(np.abs(at[:, 0]) > EARS_FROM, (around - 1) * wide, np.inf)
 
     def height(self, line: Any, at: Float64) -> Float64:
         """(n,) metres above the eyes of a line (degrees, metres on the head it was drawn on) over places."""
