@@ -67,6 +67,7 @@ MAY: dict[str, set[str]] = {
         "realizer.outputs.files",
         "realizer.scheduling.timing",
     },
+    "realizer.mapping": VALUES | {"realizer.animation", "realizer.face", "realizer.tables"},
     "realizer.planning": VALUES
     | {
         "bml_schema",
@@ -94,6 +95,7 @@ MAY: dict[str, set[str]] = {
         "realizer.composition",
         "realizer.scheduling",
         "realizer.speech.utterance",
+        "realizer.tables.cooccurrence",
     },
     "realizer.pipeline": VALUES
     | {
@@ -102,6 +104,7 @@ MAY: dict[str, set[str]] = {
         "realizer.behaviours",
         "realizer.composition.playing",
         "realizer.face",
+        "realizer.mapping",
         "realizer.player",
         "realizer.scheduling",
         "realizer.speech",

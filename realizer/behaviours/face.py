@@ -118,11 +118,8 @@ def _faults(parts: Iterable[Part]) -> tuple[Fault, ...]:
             if part.lexeme.upper() not in face_lexemes():
                 faults.append(unknown_lexeme(part.lexeme, face_lexemes()))
         elif part.au not in known:
-            near = sorted(sorted(known, key=lambda number: (abs(number - part.au), number))[:3])
-            said = ", ".join(f"{number} ({known[number].name})" for number in near)
-            faults.append(
-                Fault("CANNOT_CREATE_BEHAVIOR", f"au: wanted a FACS action unit, got {part.au}; near: {said}")
-            )
+            said = f"au: wanted a FACS action unit, got {part.au}; near: {tables.nearest(part.au)}"
+            faults.append(Fault("CANNOT_CREATE_BEHAVIOR", said))
         elif part.side != "BOTH" and not known[part.au].sides:
             name = f"AU{part.au} ({known[part.au].name})"
             faults.append(

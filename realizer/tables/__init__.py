@@ -23,8 +23,9 @@ __all__ = [
     "Fap",
     "action_units",
     "au_to_fap",
+    "by_number",
     "faps",
-    "override",
+    "nearest",
     "read_csv",
     "read_toml",
 ]
@@ -182,12 +183,13 @@ def au_to_fap() -> tuple[AuToFap, ...]:
     return read_csv(text_of("au_to_fap.csv"), AuToFap, "au_to_fap.csv")
 
 
-def override(rows: tuple[AuToFap, ...], own: tuple[AuToFap, ...]) -> tuple[AuToFap, ...]:
-    """`rows` with every polyline (au, side, fap) that `own` names replaced by `own`'s: a face's few rows."""
-    replaced = {row.key for row in own}
-    return (*(row for row in rows if row.key not in replaced), *own)
-
-
 def by_number(rows: tuple[ActionUnit, ...]) -> Mapping[int, ActionUnit]:
     """AU number -> row."""
     return {row.au: row for row in rows}
+
+
+def nearest(number: int) -> str:
+    """The three action units nearest to a number, for messages: "2 (Outer brow raiser), 4 (...), ..."."""
+    known = by_number(action_units())
+    near = sorted(sorted(known, key=lambda au: (abs(au - number), au))[:3])
+    return ", ".join(f"{au} ({known[au].name})" for au in near)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from realizer import tables
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames
+from realizer.animation.mapping import FapMapping
 from realizer.animation.targets import AU_NAMES, axis, fap, presence
 from realizer.arrays import Float32
 from realizer.tables import AuToFap
@@ -66,7 +67,7 @@ def test_rotations_add_up() -> None:
 def test_a_polyline_bends_at_its_knots_and_stays_level_beyond_its_end() -> None:
     rows = (AuToFap(26, "", 3, 0.2, 0.6, 0.0, 100.0), AuToFap(26, "", 3, 0.6, 0.8, 100.0, 300.0))
     au = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 1.0])
-    got = to_fap(frames(*({"26": v} for v in au)), rows).values[:, 2]
+    got = to_fap(frames(*({"26": v} for v in au)), FapMapping(rows, ())).values[:, 2]
     assert got == pytest.approx([0, 0, 50, 100, 200, 300, 300], abs=1e-3)
 
 

@@ -181,13 +181,6 @@ def test_the_jaw_drop_includes_the_parting_of_the_lips(upper: int, lower: int) -
     assert gaps[0] > 0
 
 
-def test_an_own_row_replaces_the_whole_polyline() -> None:
-    own = (tables.AuToFap(12, "L", 12, 0.0, 1.0, 0.0, 99.0),)
-    rows = tables.override(ROWS, own)
-    assert [row.fap_to for row in rows if row.key == (12, "L", 12)] == [99.0]
-    assert len(rows) == len(ROWS)
-
-
 HEAD = "# source: x\n# units: x\n# licence: x\n"
 
 

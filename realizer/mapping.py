@@ -1,0 +1,41 @@
+"""A face's name and a user's file in, the mapping of AUs to FAPs in force out: the one place that asks."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from realizer.animation.mapping import FapMapping, standard
+from realizer.errors import TableError
+from realizer.tables.mappings import FORMS, read_mapping
+
+__all__ = ["mapping_of"]
+
+OWN = "au_to_fap"  # .txt or .csv: a face's own rows
+
+
+def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
+    """What action units ask of FAPs: an action unit is as the file says, else as the face, else as the table.
+
+    Args:
+        face: name of a face folder; its `au_to_fap.csv` or `au_to_fap.txt` says what it has of its own.
+        file: a user's own mapping, in either form.
+
+    Raises:
+        FaceError: no such face.
+        TableError: a file that cannot be used, with the line.
+    """
+    from realizer.face.load import folder_of
+
+    return _mapping(folder_of(face), file)
+
+
+@lru_cache(maxsize=16)
+def _mapping(folder: Path, file: Path | None) -> FapMapping:
+    own = [folder / f"{OWN}{form}" for form in FORMS if (folder / f"{OWN}{form}").is_file()]
+    if len(own) > 1:
+        raise TableError(f"{folder}: wanted one of {' and '.join(path.name for path in own)}, got both")
+    mapping = standard()
+    for path in (*own, *([file] if file else [])):
+        mapping = mapping.replaced(read_mapping(path), str(path))
+    return mapping

@@ -1,0 +1,217 @@
+"""Mappings of AUs to FAPs as files: Paul's plain text (2010, 5.2), or CSV as `au_to_fap.csv`, and back.
+
+His text has two kinds of lines. `AU`, `AU<tab>L` or `AU<tab>R` names an action unit; each line of five
+numbers after it, `FAP AU-start AU-end FAP-start FAP-end`, says what it asks of a FAP. Empty lines and
+comments do not count. He shows no comment and leaves some cases open; we read them so: a comment begins
+with #; blanks do as well as tabs; below its AU range a line asks nothing and above it what it asks at its
+end; several lines of one FAP are pieces of one polyline; an action unit without lines asks nothing. Where he
+gives no side to an action unit that has sides here, each FAP goes with the side of the face it is on, and
+those in the middle with both; where he gives sides to one that has none here (23), the lines of both sides
+are together its lines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import Literal, TypeAlias, cast
+
+from realizer.errors import TableError
+from realizer.tables import AuToFap, action_units, au_to_fap, by_number, faps, nearest, read_csv
+
+__all__ = ["FORMS", "Units", "read_mapping", "write_mapping"]
+
+Side: TypeAlias = Literal["L", "R", ""]
+Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]
+Line: TypeAlias = tuple[int, AuToFap]
+FORMS = (".txt", ".csv")
+COLUMNS = ("au", "side", "fap", "au_from", "au_to", "fap_from", "fap_to")
+NUMBERS = ("AU-start", "AU-end", "FAP-start", "FAP-end")
+
+
+def read_mapping(path: Path) -> Units:
+    """What a file says of action units: (au, side of the axis) -> rows; those it does not name are not there.
+
+    Args:
+        path: .csv as `au_to_fap.csv`; anything else is Paul's text.
+
+    Raises:
+        TableError: a file that cannot be read, or a line that cannot be used; with the line, what was wanted,
+            and what came.
+    """
+    try:
+        text = path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise TableError(f"{path}: wanted a mapping of action units to FAPs, got {error}") from None
+    named, lines = _read_csv(text, path) if path.suffix == ".csv" else _read_text(text, path)
+    units: dict[tuple[int, Side], list[Line]] = {(au, side): [] for key in named for au, side in _sides(*key)}
+    for number, row in lines:
+        _check(row, f"{path}, line {number}")
+        for side in _sides_of(row):
+            units[row.au, side].append((number, replace(row, side=side)))
+    return {key: _joined(found, path) for key, found in sorted(units.items())}
+
+
+def write_mapping(path: Path, rows: Iterable[AuToFap], source: str) -> None:
+    """Write rows of the axis as .csv, or else as Paul's text; reading them back gives the same rows.
+
+    Args:
+        source: where they come from, for the file's head.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path.write_text((_as_csv if path.suffix == ".csv" else as_text)(rows, source), "utf-8")
+
+
+def as_text(rows: Iterable[AuToFap], source: str) -> str:
+    """Rows of the axis as Paul's text."""
+    lines = [
+        f"# AU to FAP: {source}",
+        "# AU and side, then FAP, AU-start, AU-end, FAP-start, FAP-end of each FAP it moves",
+    ]
+    units = _by_unit(rows)
+    for unit in action_units():
+        for _, side in _sides(unit.au, ""):
+            lines += ["", f"# {unit.name}{'; ' + unit.no_fap if unit.no_fap else ''}"]
+            lines.append(f"{unit.au}\t{side}" if side else str(unit.au))
+            lines += [
+                f"{r.fap}\t{r.au_from!r}\t{r.au_to!r}\t{r.fap_from:.10g}\t{r.fap_to:.10g}"
+                for r in units.get((unit.au, side), ())
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def _as_csv(rows: Iterable[AuToFap], source: str) -> str:
+    units = _by_unit(rows)
+    lines = [
+        f"# source: {source}",
+        "# units: au_from, au_to = intensity 0..1; fap_from, fap_to in the FAP's own unit",
+        "# licence: that of its source",
+        ",".join(COLUMNS),
+    ]
+    # An action unit that asks nothing any more has to be named, or the table would speak for it.
+    silent = {(r.au, r.side): replace(r, fap_from=0.0, fap_to=0.0) for r in au_to_fap()}
+    for key in sorted(silent.keys() | units.keys()):
+        for r in units.get(key) or (silent[key],):
+            lines.append(
+                f"{r.au},{r.side},{r.fap},{r.au_from:.10g},{r.au_to:.10g},{r.fap_from:.10g},{r.fap_to:.10g}"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _by_unit(rows: Iterable[AuToFap]) -> dict[tuple[int, Side], list[AuToFap]]:
+    ordered = sorted(rows, key=lambda row: (*row.key, row.au_from))
+    return {key: list(group) for key, group in groupby(ordered, key=lambda row: (row.au, row.side))}
+
+
+def _read_csv(text: str, path: Path) -> tuple[set[tuple[int, str]], list[Line]]:
+    rows = read_csv(text, AuToFap, str(path))
+    numbers = [n for n, line in enumerate(text.splitlines(), 1) if line and not line.startswith("#")]
+    lines = list(zip(numbers[1:], rows, strict=True))
+    for number, row in lines:
+        _known(row.au, f"{path}, line {number}")
+    return {(row.au, row.side) for row in rows}, lines
+
+
+def _read_text(text: str, path: Path) -> tuple[set[tuple[int, str]], list[Line]]:
+    named: set[tuple[int, str]] = set()
+    lines: list[Line] = []
+    au, side = 0, ""
+    for number, line in enumerate(text.splitlines(), 1):
+        fields, where = line.partition("#")[0].split(), f"{path}, line {number}"
+        if not fields:
+            continue
+        if len(fields) <= 2:
+            au, side = _whole(fields[0], "an action unit's number", where), (fields[1:] or [""])[0]
+            if side not in ("", "L", "R"):
+                raise TableError(f"{where}: wanted L or R beside AU{au}, got {side!r}")
+            _known(au, where)
+            named.add((au, side))
+        elif len(fields) != 5:
+            raise TableError(
+                f"{where}: wanted an action unit (AU, or AU and L or R) or FAP, {', '.join(NUMBERS)}; "
+                f"got {len(fields)} fields"
+            )
+        elif not au:
+            raise TableError(f"{where}: wanted an action unit before its FAPs, got {line.strip()!r}")
+        else:
+            fap = _whole(fields[0], "a FAP's number", where)
+            spans = [_number(field, name, where) for field, name in zip(fields[1:], NUMBERS, strict=True)]
+            lines.append((number, AuToFap(au, cast(Side, side), fap, *spans)))
+    if not named:
+        raise TableError(f"{path}: wanted action units and what they ask of FAPs, got none")
+    return named, lines
+
+
+def _whole(field: str, what: str, where: str) -> int:
+    if not (field.isascii() and field.isdecimal()):
+        raise TableError(f"{where}: wanted {what}, got {field!r}")
+    return int(field)
+
+
+def _number(field: str, name: str, where: str) -> float:
+    try:
+        return float(field)
+    except ValueError:
+        raise TableError(f"{where}: {name}: wanted a number, got {field!r}") from None
+
+
+def _known(au: int, where: str) -> None:
+    if au not in by_number(action_units()):
+        raise TableError(f"{where}: wanted a FACS action unit, got {au}; near: {nearest(au)}")
+
+
+def _check(row: AuToFap, where: str) -> None:
+    if not 3 <= row.fap <= 68:
+        raise TableError(f"{where}: wanted a FAP of 3..68, got {row.fap}")
+    if not 0 <= row.au_from < row.au_to <= 1:
+        raise TableError(
+            f"{where}: wanted an AU range that rises within 0..1, got {row.au_from:g} to {row.au_to:g}"
+        )
+    fap = faps()[row.fap - 1]
+    for value in (row.fap_from, row.fap_to):
+        if not (math.isfinite(value) and fap.least <= value <= fap.most):
+            raise TableError(
+                f"{where}: FAP {row.fap} ({fap.name}): wanted {fap.least:g}..{fap.most:g}, got {value:g}"
+            )
+
+
+def _sides(au: int, side: str) -> list[tuple[int, Side]]:
+    """What a file's action unit is on our axis."""
+    if not by_number(action_units())[au].sides:
+        return [(au, "")]
+    return [(au, cast(Side, side))] if side else [(au, "L"), (au, "R")]
+
+
+def _sides_of(row: AuToFap) -> list[Side]:
+    """The sides of the axis that a file's row is for."""
+    sides = [side for _, side in _sides(row.au, row.side)]
+    parts = faps()[row.fap - 1].name.split("_")  # stretch_l_cornerlip, lower_t_lip_rm_o
+    own: list[Side] = ["L"] if {"l", "lm"} & {*parts} else ["R"] if {"r", "rm"} & {*parts} else []
+    return own if len(sides) == 2 and own else sides
+
+
+def _joined(lines: list[Line], path: Path) -> tuple[AuToFap, ...]:
+    """The rows in order; a row said twice counts once."""
+    out: list[AuToFap] = []
+    ordered = sorted(lines, key=lambda line: (*line[1].key, line[1].au_from, line[0]))
+    for number, row in ordered:
+        if row in out:
+            continue
+        before = out[-1] if out and out[-1].key == row.key else None
+        end, value = (before.au_to, before.fap_to) if before else (0.0, 0.0)
+        name = f"{path}, line {number}: AU{row.au}{row.side}, FAP {row.fap}"
+        if row.au_from < end:
+            raise TableError(
+                f"{name}: wanted it to begin at {end:g}, where another line ends, got {row.au_from:g}"
+            )
+        if row.fap_from != value:
+            raise TableError(
+                f"{name}: wanted FAP-start {value:g}, or the face would jump there, got {row.fap_from:g}"
+            )
+        out.append(row)
+    return tuple(out)

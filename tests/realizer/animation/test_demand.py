@@ -1,0 +1,38 @@
+"""Polylines become hinges and stay what they were."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.animation.demand import Demand
+from realizer.animation.targets import AU_NAMES, au
+from realizer.arrays import Float32
+from realizer.tables import AuToFap
+
+AT = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0)
+
+
+def asked(rows: tuple[AuToFap, ...], fap: int) -> Float32:
+    """What the rows ask of a FAP as AU26 rises."""
+    aus = np.zeros((len(AU_NAMES()), len(AT)), np.float32)
+    aus[au(26)[0].column] = AT
+    positive, negative = Demand.of(rows).extremes(aus)
+    total: Float32 = (positive + negative)[fap - 1]
+    return total
+
+
+def test_a_gap_between_two_pieces_is_level() -> None:
+    rows = (AuToFap(26, "", 3, 0.1, 0.3, 0.0, 100.0), AuToFap(26, "", 3, 0.7, 0.9, 100.0, 300.0))
+    assert asked(rows, 3) == pytest.approx([0, 0, 50, 100, 100, 100, 300, 300], abs=1e-3)
+
+
+def test_no_rows_ask_nothing() -> None:
+    assert not asked((), 3).any()
+
+
+def test_the_mask_holds_what_rows_and_speech_may_use() -> None:
+    mask = Demand.of((AuToFap(9, "L", 63, 0.0, 1.0, 0.0, 30.0),)).mask
+    assert mask[62]
+    assert mask[2]  # speech opens the jaw
+    assert not mask[[0, 1, 30]].any()

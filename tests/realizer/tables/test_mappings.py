@@ -1,0 +1,145 @@
+"""Mappings read as Paul wrote them, read back as they were written, and are refused with their line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from realizer import tables
+from realizer.errors import TableError
+from realizer.tables import AuToFap
+from realizer.tables.mappings import FORMS, read_mapping, write_mapping
+
+# Paul 2010, figure 5.2.
+FIGURE = """
+23\tL
+53\t0.0\t1.0\t0\t-300
+
+23\tR
+54\t0.0\t1.0\t0\t-300
+
+24
+16\t0.0\t1.0\t0\t1000
+17\t0.0\t1.0\t0\t500
+25
+3\t0.0\t1.0\t0\t900
+4\t0.5\t1.0\t0\t-100
+5\t0.0\t1.0\t0\t-1000
+10\t0.2\t1.0\t0\t-1000
+11\t0.2\t1.0\t0\t-1000
+"""
+HEAD = "# source: x\n# units: x\n# licence: x\nau,side,fap,au_from,au_to,fap_from,fap_to\n"
+
+
+def written(folder: Path, text: str, name: str = "own.txt") -> Path:
+    path = folder / name
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_the_figure_of_the_thesis_is_read(tmp_path: Path) -> None:
+    units = read_mapping(written(tmp_path, FIGURE))
+    assert units[23, ""] == tuple(AuToFap(23, "", fap, 0.0, 1.0, 0.0, -300.0) for fap in (53, 54))
+    assert [row.fap_to for row in units[24, ""]] == [1000, 500]
+    assert [(row.fap, row.au_from, row.fap_to) for row in units[25, ""]] == [
+        (3, 0.0, 900),
+        (4, 0.5, -100),
+        (5, 0.0, -1000),
+        (10, 0.2, -1000),
+        (11, 0.2, -1000),
+    ]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_is_written_reads_back_the_same(tmp_path: Path, form: str) -> None:
+    rows = tables.au_to_fap()
+    write_mapping(tmp_path / f"all{form}", rows, "the table")
+    units = read_mapping(tmp_path / f"all{form}")
+    assert sorted((row for unit in units.values() for row in unit), key=repr) == sorted(rows, key=repr)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_an_action_unit_that_asks_nothing_is_written_too(tmp_path: Path, form: str) -> None:
+    write_mapping(tmp_path / f"few{form}", [row for row in tables.au_to_fap() if row.au != 25], "without 25")
+    assert not any(row.fap_to for row in read_mapping(tmp_path / f"few{form}")[25, ""])
+
+
+def test_a_blank_comments_and_a_byte_order_mark_do_not_count(tmp_path: Path) -> None:
+    units = read_mapping(written(tmp_path, "\ufeff# mine\r\n\r\n26 # the jaw\r\n 3 0 1  0 500 # down\r\n"))
+    assert units == {(26, ""): (AuToFap(26, "", 3, 0.0, 1.0, 0.0, 500.0),)}
+
+
+def test_an_action_unit_without_lines_asks_nothing(tmp_path: Path) -> None:
+    assert read_mapping(written(tmp_path, "12\tL\n9\n")) == {(9, "L"): (), (9, "R"): (), (12, "L"): ()}
+
+
+def test_without_a_side_each_fap_goes_with_the_side_it_is_on_and_the_middle_with_both(tmp_path: Path) -> None:
+    units = read_mapping(written(tmp_path, "10\n8 0 1 0 -90\n56 0 1 0 -80\n4 0 1 0 -70\n"))
+    assert {side: [row.fap for row in unit] for (_, side), unit in units.items()} == {
+        "L": [4, 8],
+        "R": [4, 56],
+    }
+
+
+@pytest.mark.parametrize(
+    "row", [row for row in tables.faps()[2:] if row.mirror != row.fap], ids=lambda r: r.name
+)
+def test_every_fap_that_has_a_mirror_has_a_side(tmp_path: Path, row: tables.Fap) -> None:
+    units = read_mapping(written(tmp_path, f"12\n{row.fap} 0 1 0 9\n{row.mirror} 0 1 0 9\n"))
+    assert {len(unit) for unit in units.values()} == {1}
+
+
+def test_a_line_said_for_both_sides_of_a_unit_that_has_none_counts_once(tmp_path: Path) -> None:
+    assert len(read_mapping(written(tmp_path, "17 L\n18 0 1 0 50\n17 R\n18 0 1 0 50\n"))[17, ""]) == 1
+
+
+def test_pieces_of_one_fap_join(tmp_path: Path) -> None:
+    units = read_mapping(written(tmp_path, "26\n3 0.5 1 300 400\n3 0 0.5 0 300\n"))
+    assert [row.fap_to for row in units[26, ""]] == [300, 400]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "wanted action units and what they ask of FAPs, got none"),
+        ("3 0 1 0 9\n", "line 1: wanted an action unit before its FAPs"),
+        ("12 B\n", "line 1: wanted L or R beside AU12, got 'B'"),
+        ("\ntwelve\n", "line 2: wanted an action unit's number, got 'twelve'"),
+        ("40\n", r"line 1: wanted a FACS action unit, got 40; near: 38 \(Nostril dilator\), 39"),
+        ("26\n3 0 1\n", "line 2: wanted an action unit .* got 3 fields"),
+        ("26\nx 0 1 0 5\n", "line 2: wanted a FAP's number, got 'x'"),
+        ("26\n3 0 1 0 far\n", "line 2: FAP-end: wanted a number, got 'far'"),
+        ("26\n69 0 1 0 5\n", r"line 2: wanted a FAP of 3\.\.68, got 69"),
+        ("26\n2 0 1 0 5\n", r"line 2: wanted a FAP of 3\.\.68, got 2"),
+        ("26\n3 0.5 0.5 0 5\n", r"line 2: wanted an AU range that rises within 0\.\.1, got 0.5 to 0.5"),
+        ("26\n3 0 2 0 5\n", "line 2: wanted an AU range"),
+        ("26\n3 0 nan 0 5\n", "line 2: wanted an AU range"),
+        ("26\n3 0 1 0 -5\n", r"line 2: FAP 3 \(open_jaw\): wanted 0\.\.4320, got -5"),
+        ("26\n5 0 1 0 nan\n", "line 2: FAP 5 .*got nan"),
+        ("26\n3 0 1 100 500\n", "line 2: AU26, FAP 3: wanted FAP-start 0, or the face would jump"),
+        ("26\n3 0 .5 0 5\n3 .5 1 6 7\n", "line 3: AU26, FAP 3: wanted FAP-start 5"),
+        ("26\n3 0 1 0 5\n\n3 .5 1 5 7\n", "line 4: AU26, FAP 3: wanted it to begin at 1"),
+    ],
+)
+def test_a_bad_line_is_refused_with_what_was_wanted(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(TableError, match=f"own.txt.*{says}"):
+        read_mapping(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("40,,3,0,1,0,5\n", "line 5: wanted a FACS action unit, got 40"),
+        ("\n# a word\n26,,3,0,1,0,-5\n", r"line 7: FAP 3 \(open_jaw\)"),
+        ("26,,3,0,1\n", "line 5: wanted 7 cells"),
+    ],
+)
+def test_a_bad_row_is_refused_with_its_line(tmp_path: Path, rows: str, says: str) -> None:
+    with pytest.raises(TableError, match=f"own.csv.*{says}"):
+        read_mapping(written(tmp_path, HEAD + rows, "own.csv"))
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(TableError, match=r"none\.txt: wanted a mapping of action units to FAPs"):
+        read_mapping(tmp_path / "none.txt")
