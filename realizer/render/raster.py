@@ -22,6 +22,7 @@ NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-real
 PLAIN = (0.5,)
 SMOOTH = (0.375, 0.875, 0.125, 0.625)
 THREADS = 4  # at most
+LEAST, MOST = np.float32(0), np.float32(255.5)  # of a tone
 
 
 class Raster:
@@ -35,10 +36,10 @@ class Raster:
             smooth: four samples a pixel, otherwise one.
         """
         width, height = size
-        self._samples = np.array(SMOOTH if smooth else PLAIN, np.float64)
-        rows = height * len(self._samples)
-        self._nearest = np.zeros((rows, width), np.float32)
-        self._tones = np.zeros((rows, width), np.uint32)
+        self._samples = SMOOTH if smooth else PLAIN
+        # A pixel's samples side by side: what a small triangle writes is near in memory.
+        self._nearest = np.zeros((height, width, len(self._samples)), np.float32)
+        self._tones = np.zeros((height, width, len(self._samples)), np.uint32)
         self._picture = np.zeros((height, width), np.uint32)
         # A band of rows for each processor: the loops let go of Python's lock.
         bands = max(1, min(THREADS, os.cpu_count() or 1, height))
@@ -61,15 +62,14 @@ class Raster:
         fill, mean = _compiled()
         points = np.ascontiguousarray(points, np.float64)
         nearness = np.ascontiguousarray(nearness, np.float32)
-        # Samples lie inside their triangle: no tone leaves its corners' by more than rounding.
-        tones = np.ascontiguousarray(colours * np.float32(254.9) + np.float32(0.52), np.float32)
+        tones = np.ascontiguousarray(colours * np.float32(255) + np.float32(0.5), np.float32)
 
         def band(rows: tuple[int, int]) -> None:
-            first, last = (n * len(self._samples) for n in rows)
-            self._nearest[first:last] = 0
-            self._tones[first:last] = 0
-            fill(points, nearness, triangles, tones, self._samples, first, last, self._nearest, self._tones)
-            mean(self._tones[first:last], len(self._samples), self._picture[slice(*rows)])
+            part = slice(*rows)
+            self._nearest[part] = 0
+            self._tones[part] = 0
+            fill(points, nearness, triangles, tones, self._samples, *rows, self._nearest, self._tones)
+            mean(self._tones[part], self._picture[part])
 
         list(self._pool.map(band, self._bands))
         return self._picture.view(np.uint8).reshape(*self._picture.shape, 4)
@@ -115,14 +115,14 @@ def _fill(
 ) -> None:
     """Write each triangle's samples where nothing nearer is: nearness, and RGBA in one number.
 
-    Args as `Raster.__call__`, but colours 0.5..255.5; `nearest` and `tones` are (rows of samples, w), and
-    those rows from `begin` to `stop` are written.
+    Args as `Raster.__call__`, but colours 0.5..255.5 and a tuple of samples; `nearest` and `tones` are
+    (h, w, samples), and those rows from `begin` to `stop` are written.
     """
     width = nearest.shape[1]
     per = len(samples)
-    lowest, highest = np.empty(3), np.empty(3)  # rows that an edge spans
-    slope, at = np.empty(3), np.empty(3)
-    rises = np.empty(3, np.bool_)
+    pitch = 1.0 / per
+    firsts, lasts = np.empty(per, np.int64), np.empty(per, np.int64)
+    beside = np.empty(per, np.float32)  # how much nearer a sample is than its pixel's middle
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = points[a, 0], points[a, 1]
@@ -132,19 +132,31 @@ def _fill(
         if not turn < 0:  # seen from behind, without area, or not a number
             continue
         # Half-open, so that what two triangles share belongs to one of them.
-        top = int(np.ceil(max((ay + min(0.0, uy, vy)) * per - 0.5, float(begin))))
-        end = int(np.ceil(min((ay + max(0.0, uy, vy)) * per - 0.5, float(stop))))
+        top = int(np.ceil(max((ay + min(0.0, uy, vy)) * per - 0.5, float(begin * per))))
+        end = int(np.ceil(min((ay + max(0.0, uy, vy)) * per - 0.5, float(stop * per))))
         if top >= end:
             continue
-        for k in range(3):
-            i, j = triangles[t, k], triangles[t, (k + 1) % 3]
-            x0, y0, x1, y1 = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
-            rises[k] = y1 > y0
-            if y1 < y0:  # from its upper end, whichever triangle asks
-                x0, y0, x1, y1 = x1, y1, x0, y0
-            slope[k] = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
-            at[k] = x0 - slope[k] * y0
-            lowest[k], highest[k] = y0, y1
+        # From the highest corner to the lowest goes one long edge; two short ones go by the third corner.
+        high, mid, low = a, b, c
+        if points[mid, 1] < points[high, 1]:
+            high, mid = mid, high
+        if points[low, 1] < points[mid, 1]:
+            mid, low = low, mid
+            if points[mid, 1] < points[high, 1]:
+                high, mid = mid, high
+        x0, y0, x1, y1, x2, y2 = (
+            points[high, 0],
+            points[high, 1],
+            points[mid, 0],
+            points[mid, 1],
+            points[low, 0],
+            points[low, 1],
+        )
+        # Each from its upper end, whichever triangle asks, so that neighbours agree to the last bit.
+        long_slope = (x2 - x0) / (y2 - y0)
+        long_at = x0 - long_slope * y0
+        bend = min(max(int(np.ceil(y1 * per - 0.5)), top), end)
+        right = (x1 - x0) * (y2 - y0) > (x2 - x0) * (y1 - y0)  # the third corner
         # What a triangle carries grows by so much a pixel to the right and down.
         px, py, qx, qy = vy / turn, vx / turn, uy / turn, ux / turn
         n0, n1, n2 = nearness[a], nearness[b] - nearness[a], nearness[c] - nearness[a]
@@ -154,46 +166,61 @@ def _fill(
         nx, rx = np.float32(n1 * px - n2 * qx), np.float32(r1 * px - r2 * qx)
         gx, bx = np.float32(g1 * px - g2 * qx), np.float32(b1 * px - b2 * qx)
         ny, ry, gy, by = n2 * qy - n1 * py, r2 * qy - r1 * py, g2 * qy - g1 * py, b2 * qy - b1 * py
-        for row in range(top, end):
-            y = (row + 0.5) / per
-            shift = samples[row % per]
-            low, high = 0.0, width + shift
-            for k in range(3):
-                if lowest[k] < highest[k]:
-                    edge = slope[k] * y + at[k]
-                    if rises[k]:
-                        low = max(low, edge)
-                    else:
-                        high = min(high, edge)
-            first, last = int(np.ceil(low - shift)), min(int(np.ceil(high - shift)), width)
-            if first >= last:
-                continue
-            dx, dy = first + shift - ax, y - ay
+        over, under = y1 - y0, y2 - y1
+        upper_slope = (x1 - x0) / over if over > 0 else 0.0
+        lower_slope = (x2 - x1) / under if under > 0 else 0.0
+        upper_at, lower_at = x0 - upper_slope * y0, x1 - lower_slope * y1
+        for k in range(per):
+            beside[k] = nx * (samples[k] - 0.5) + ny * ((k + 0.5) * pitch - 0.5)
+        for line in range(top // per, (end + per - 1) // per):
+            left, beyond = width, 0
+            for k in range(per):
+                row = line * per + k
+                first, last = width, 0
+                if top <= row < end:
+                    y = (row + 0.5) * pitch
+                    short = upper_slope * y + upper_at if row < bend else lower_slope * y + lower_at
+                    long = long_slope * y + long_at
+                    first = max(int(np.ceil((long if right else short) - samples[k])), 0)
+                    last = min(int(np.ceil((short if right else long) - samples[k])), width)
+                    if first < last:
+                        left, beyond = min(left, first), max(beyond, last)
+                firsts[k], lasts[k] = first, last
+            # One tone a pixel, that of its middle; how near it is, a sample.
+            dx, dy = left + 0.5 - ax, line + 0.5 - ay
             near, red = np.float32(n0 + nx * dx + ny * dy), np.float32(r0 + rx * dx + ry * dy)
             green, blue = np.float32(g0 + gx * dx + gy * dy), np.float32(b0 + bx * dx + by * dy)
-            for x in range(first, last):
-                if near > nearest[row, x]:
-                    nearest[row, x] = near
-                    tones[row, x] = (
-                        np.int32(red) | (np.int32(green) << 8) | (np.int32(blue) << 16) | np.int64(0xFF000000)
-                    )
+            for x in range(left, beyond):
+                # The middle may lie beside the triangle.
+                tone = np.uint32(
+                    np.int32(min(max(red, LEAST), MOST))
+                    | (np.int32(min(max(green, LEAST), MOST)) << 8)
+                    | (np.int32(min(max(blue, LEAST), MOST)) << 16)
+                    | np.int64(0xFF000000)
+                )
+                for k in range(per):
+                    if firsts[k] <= x < lasts[k]:
+                        here = near + beside[k]
+                        if here > nearest[line, x, k]:
+                            nearest[line, x, k] = here
+                            tones[line, x, k] = tone
                 near += nx
                 red += rx
                 green += gx
                 blue += bx
 
 
-def _mean(tones: Any, per: int, picture: Any) -> None:
-    """The mean of each pixel's samples, of which four stand one below the other; all four bytes at once."""
+def _mean(tones: Any, picture: Any) -> None:
+    """The mean of each pixel's samples, one or four; all four bytes at once."""
     height, width = picture.shape
-    if per == 1:
-        picture[:] = tones
+    if tones.shape[2] == 1:
+        picture[:] = tones[:, :, 0]
         return
     upper, lower, half = np.uint32(0x3F3F3F3F), np.uint32(0x03030303), np.uint32(0x02020202)
     two = np.uint32(2)
     for y in range(height):
         for x in range(width):
-            a, b, c, d = tones[4 * y, x], tones[4 * y + 1, x], tones[4 * y + 2, x], tones[4 * y + 3, x]
+            a, b, c, d = tones[y, x, 0], tones[y, x, 1], tones[y, x, 2], tones[y, x, 3]
             quarters = (
                 ((a >> two) & upper) + ((b >> two) & upper) + ((c >> two) & upper) + ((d >> two) & upper)
             )
