@@ -52,6 +52,7 @@ SCALE = (260, 16)  # pixels of the colour scale
     multiple=True,
     help=f"{options.CAMERAS} Repeat it to see each pose from several sides.  [default: front]",
 )
+@options.deformer
 @options.light
 @options.colour
 @click.option("--size", default="220x280", show_default=True, callback=options.size, help="Of each picture.")
@@ -66,6 +67,7 @@ def sheet(
     value: float,
     intensity: float,
     cameras: tuple[str, ...],
+    deformer: str | None,
     light: str | None,
     background: str | None,
     size: tuple[int, int],
@@ -102,7 +104,7 @@ def sheet(
     with _progress(count * len(cameras), context.obj["quiet"]) as step:
         groups = [
             Group(part.heading, cells, part.columns)
-            for part, cells in _cells(name, series, cameras, size, light, background, step)
+            for part, cells in _cells(name, deformer, series, cameras, size, light, background, step)
         ]
     words = f"{name}: {', '.join(cameras)}. Left as drawn, right the difference to the neutral face"
     pixels = album(groups, _scale(), words)
@@ -113,6 +115,7 @@ def sheet(
 
 def _cells(
     name: str,
+    deformer: str | None,
     series: list[Series],
     cameras: tuple[str, ...],
     size: tuple[int, int],
@@ -123,8 +126,9 @@ def _cells(
     """Each series with its cells; the first pose of all is the neutral one."""
     import numpy as np
 
-    from realizer.animation.fap import to_fap
+    from realizer.animation.pose import poses as poses_of
     from realizer.cli import poses
+    from realizer.face import takes
     from realizer.render import Renderer
     from realizer.render.difference import difference, faint, flatten
     from realizer.render.light import preset
@@ -135,11 +139,13 @@ def _cells(
     if background:
         behind = np.frombuffer(bytes.fromhex(background[1:]), np.uint8)
     every = [pose for part in series for pose in part.poses]
-    rows = to_fap(poses.frames(series)).values
+    rows = poses_of(poses.frames(series), takes(name, deformer=deformer))
     shown: list[list[Any]] = [[] for _ in every]
     for camera in cameras:
         neutral = below = None
-        with Renderer(name, size, camera, light=light, background="transparent") as renderer:
+        with Renderer(
+            name, size, camera, light=light, background="transparent", deformer=deformer
+        ) as renderer:
             for k, drawn in enumerate(renderer.frames(rows)):
                 picture = flatten(drawn, behind)
                 if neutral is None or below is None:

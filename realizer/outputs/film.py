@@ -178,7 +178,7 @@ def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
     form = FORMATS[Path(path).suffix.lower()]
     size = (drawing.size[0] + drawing.size[0] % 2, drawing.size[1] + drawing.size[1] % 2)
     rows = realization.poses
-    with replacing(path) as draft, drawing.renderer(realization.face_name, size) as renderer:
+    with replacing(path) as draft, drawing.renderer(realization, size) as renderer:
         pictures = renderer.frames(rows)
         encode_film(draft, form, pictures, len(rows), realization.fps, realization.sound(RATE))
 

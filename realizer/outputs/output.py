@@ -24,11 +24,19 @@ class Drawing:
     light: str | None = None  # a preset; None: as `realizer.render.Renderer` takes it, as is
     background: str | None = None  # "#rrggbb", or of one picture "transparent"
 
-    def renderer(self, face: str, size: tuple[int, int], *, alpha: bool = False) -> Renderer:
-        """What draws like that, at this size; `alpha` where the picture may be transparent."""
+    def renderer(self, realization: Realization, size: tuple[int, int], *, alpha: bool = False) -> Renderer:
+        """What draws poses of a realization like that; `alpha` where the picture may be transparent."""
         from realizer.render import Renderer
 
-        return Renderer(face, size, self.camera, light=self.light, background=self.background, alpha=alpha)
+        return Renderer(
+            realization.face_name,
+            size,
+            self.camera,
+            light=self.light,
+            background=self.background,
+            alpha=alpha,
+            deformer=realization.deformer,
+        )
 
 
 @dataclass(frozen=True)

@@ -78,13 +78,13 @@ def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
     from realizer.render.sheets import sheet
 
     if drawing.at is not None:
-        with drawing.renderer(realization.face_name, drawing.size, alpha=True) as renderer:
+        with drawing.renderer(realization, drawing.size, alpha=True) as renderer:
             (picture,) = renderer.draw(row_at(realization, drawing.at)[None])
         write_bytes(path, encode_png(picture))
         return
     shown = moments(realization)
     half = (max(1, drawing.size[0] // 2), max(1, drawing.size[1] // 2))
-    with drawing.renderer(realization.face_name, half) as renderer:
+    with drawing.renderer(realization, half) as renderer:
         pictures = renderer.draw(realization.poses[[moment.frame for moment in shown]])
     titles = [f"{moment.time:.2f} s" for moment in shown]
     write_bytes(path, encode_png(sheet(list(pictures), titles, [moment.points for moment in shown])))

@@ -1,0 +1,168 @@
+"""Documents in, faces out, by both deformers: each shows the same, each its own way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import realizer
+from realizer.cli import cli
+from realizer.face import deform, load_face
+from realizer.face.model import Face
+from realizer.player import Player
+from realizer.render import Renderer
+from realizer.server.streams import Timeline
+from realizer.settings import Settings, SettingsError
+
+BOTH = ("mpeg4", "au")
+SPEECH = '<speech id="s" start="0.2"><text>Maybe you would both prefer a warm moment of fun.</text></speech>'
+WHEN = 'start="0" attackPeak="0.4" relax="1" end="1.4"'
+PEAK = 15  # the frame at 25 fps that is looked at
+
+
+def facs(au: int, side: str = "BOTH") -> str:
+    return f'<faceFacs id="f" au="{au}" side="{side}" amount="1" {WHEN}/>'
+
+
+def lexeme(name: str) -> str:
+    return f'<faceLexeme id="f" lexeme="{name}" {WHEN}/>'
+
+
+def play(inner: str, deformer: str, **options: Any) -> realizer.Realization:
+    document = f'<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">{inner}</bml>'
+    return realizer.realize(document, deformer=deformer, voice="silent", **{"idle": False, **options})
+
+
+@pytest.fixture(scope="module")
+def faces() -> dict[str, Face]:
+    return {name: load_face(deformer=name) for name in BOTH}
+
+
+@pytest.mark.parametrize(
+    ("inner", "points"),
+    [
+        (lexeme("SMILE"), ("8.3", "8.4")),
+        (facs(12, "LEFT"), ("8.3",)),
+        (facs(15), ("8.3", "8.4")),
+        (lexeme("OPEN_MOUTH"), ("2.3", "2.1", "8.2")),
+        (facs(27), ("2.3", "2.1", "8.2")),
+        (lexeme("RAISE_BROWS"), ("4.1", "4.2", "4.3", "4.4", "4.5", "4.6")),
+        (lexeme("LOWER_BROWS"), ("4.1", "4.2", "4.3", "4.4")),
+        (facs(43), ("3.1", "3.2")),
+        (facs(5), ("3.1", "3.2")),
+    ],
+    ids=["smile", "smile-left", "frown", "open", "stretch", "brows-up", "brows-down", "closed", "wide"],
+)
+def test_both_take_a_landmark_the_same_way(
+    faces: dict[str, Face], inner: str, points: tuple[str, ...]
+) -> None:
+    moved = {}
+    for name, face in faces.items():
+        pose = play(inner, name).poses[[PEAK]]
+        moved[name] = deform(face, pose)[0].astype(float) - face.vertices
+    for point in points:
+        vertex = faces["au"].feature_points[point]
+        one, other = (moved[name][vertex] for name in BOTH)
+        long, length = np.linalg.norm(one), np.linalg.norm(other)
+        assert one @ other > 0.85 * long * length, f"{point} goes another way"
+        assert 0.5 < length / long < 2.2, f"{point} goes {length / long:.2f} times as far"
+
+
+@pytest.mark.parametrize("extra", ["", lexeme("SMILE"), lexeme("OPEN_MOUTH")], ids=["", "smile", "open"])
+def test_a_face_of_units_speaks_as_one_of_faps(faces: dict[str, Face], extra: str) -> None:
+    gaps = {}
+    for name, face in faces.items():
+        played = play(SPEECH + extra.replace('end="1.4"', 'end="9"').replace('relax="1"', 'relax="8"'), name)
+        spoken = played.poses[: round(25 * (played.speech[0][0] + played.speech[0][1].duration))]
+        vertices = deform(face, spoken)
+        upper, lower = (face.feature_points[point] for point in ("2.2", "2.3"))
+        gaps[name] = (vertices[:, upper, 1] - vertices[:, lower, 1])[12:-8]
+    assert gaps["mpeg4"].max() > 0.004, "it speaks"
+    assert gaps["au"] == pytest.approx(gaps["mpeg4"], abs=0.0006)
+
+
+@pytest.mark.parametrize(
+    "inner",
+    [
+        '<gaze id="g" target="cup" influence="HEAD" start="0" ready="0.3" relax="1" end="1.4"/>',
+        '<head id="n" lexeme="NOD" start="0" end="1"/>',
+        f'<faceFacs id="f" au="61" side="BOTH" amount="0.6" {WHEN}/>',
+    ],
+    ids=["gaze", "nod", "eyes"],
+)
+def test_gaze_and_head_turn_by_both_to_the_last_bit(faces: dict[str, Face], inner: str) -> None:
+    made = [
+        deform(face, play(inner, name, scene={"cup": (0.4, -0.1, 0.6)}).poses) for name, face in faces.items()
+    ]
+    assert np.array_equal(made[0], made[1])
+    assert np.abs(made[0] - made[0][0]).max() > 0.002
+
+
+def test_fap_streams_and_files_do_not_know_who_draws() -> None:
+    one, other = (play(lexeme("SMILE") + SPEECH, name) for name in BOTH)
+    assert np.array_equal(one.faps.values, other.faps.values)
+    assert json.dumps(one.to_json()) == json.dumps(other.to_json())
+    assert np.array_equal(one.poses, one.faps.values)
+    assert other.poses.shape[1] > 68
+
+
+def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None:
+    from realizer.face import quantise
+
+    face = faces["au"]
+    player = Player(idle=True, seed=3)
+    window = Timeline(player, 0, 25, lambda: face).window(0, 20)
+    assert window.poses.shape == (50, len(face.takes))
+    assert np.array_equal(window.mesh, quantise(face, deform(face, window.poses)))
+    assert not np.array_equal(window.mesh[0], window.mesh[-1])
+
+
+@pytest.fixture(scope="module")
+def renderers() -> Iterator[dict[str, Renderer]]:
+    made = {name: Renderer("default", (160, 160), "close", deformer=name) for name in BOTH}
+    yield made
+    for renderer in made.values():
+        renderer.close()
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(
+    "inner",
+    [facs(12), facs(43), lexeme("RAISE_BROWS"), facs(26)],
+    ids=["smile", "closed", "brows", "jaw"],
+)
+def test_both_change_the_picture_at_the_same_place(renderers: dict[str, Renderer], inner: str) -> None:
+    places = []
+    for name, renderer in renderers.items():
+        still, shown = renderer.draw(play(inner, name).poses[[0, PEAK]]).astype(float).sum(axis=3)
+        change = np.abs(shown - still)
+        assert change.max() > 60
+        change[change < 0.1 * change.max()] = 0
+        places.append((np.arange(160) @ change.sum(axis=1)) / change.sum())
+    assert abs(places[0] - places[1]) < 10, f"rows {places}"
+
+
+@pytest.mark.gl
+def test_a_still_is_drawn_by_the_deformer_that_was_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "x.bml").write_text(f'<bml id="b">{facs(12)}</bml>')
+    pictures = []
+    for name in BOTH:
+        out = tmp_path / f"{name}.png"
+        words = ["realize", str(tmp_path / "x.bml"), "-o", str(out), "--at", "0.6", "--size", "96x96"]
+        done = CliRunner().invoke(cli, [*words, "--no-idle", "--voice", "silent", "--deformer", name])
+        assert done.exit_code == 0, done.output
+        pictures.append(out.read_bytes())
+    assert pictures[0] != pictures[1]
+
+
+def test_the_deformer_is_a_setting() -> None:
+    assert Settings.read(environment={"REALIZER_DEFORMER": "au"}).deformer == "au"
+    assert Settings().deformer is None
+    with pytest.raises(SettingsError, match="deformer: wanted mpeg4 or au, got 'bones'"):
+        Settings(deformer="bones")
