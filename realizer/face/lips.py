@@ -159,7 +159,7 @@ class Lips:
 
 
 def close_lips(ground: Ground) -> Float64:
-    """The base mesh with its lips closed, (n, 3): where they stand apart at rest, each goes half the way."""
+    """The base mesh with its lips just closed, (n, 3): each goes half the way to where they meet."""
     lips = Lips(ground)
     at = ground.at.copy()
     for k, share in ((0, 1.0), (1, 1.0), (2, 0.55), (3, 0.25), (4, 0.10)):
@@ -169,9 +169,9 @@ def close_lips(ground: Ground) -> Float64:
         for i in lips.rings[k]:
             x = ground.at[i, 0]
             high, low = (np.interp(x, ground.at[row, 0], ground.at[row, 1]) for row in (upper, lower))
+            # Some people's overlap: those are parted.
             apart = high - low - APART
-            if apart > 0:
-                at[i, 1] += share * apart / 2 * (-1 if lips.is_upper[i] else 1)
+            at[i, 1] += share * apart / 2 * (-1 if lips.is_upper[i] else 1)
     return at
 
 
