@@ -5,7 +5,7 @@ from __future__ import annotations
 from bml_schema.behaviours import AMOUNT, PEAK, SIDES
 from bml_schema.nodes import Behaviour, Part, own
 from bml_schema.shape import attribute, children, node
-from bml_schema.values import integer, number, one_of, word
+from bml_schema.values import integer, number, one_of, string, word
 
 __all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood"]
 
@@ -57,12 +57,17 @@ class Mood(Feeling):
 
 @node
 class Expression(Behaviour):
-    """Show an expression of the expression library, such as "template:astonishment"."""
+    """Show an expression of the expression library, such as "template:astonishment".
+
+    Attributes:
+        because: what placed it, in words; for whoever reads the document.
+    """
 
     tag = own("expression")
     sync_points = PEAK
     name: str = attribute(word)
     intensity: float = attribute(AMOUNT, default=0.5)
+    because: str | None = attribute(string, default=None)
 
 
 @node

@@ -6,12 +6,13 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from realizer.cli import options
+from realizer.cli.enrich import mood, role
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from bml_schema import Behaviour, Block
     from realizer.player import Player
     from realizer.scheduling.timing import Schedule, Warning
+    from realizer.tables.knowledge import Mood, Role
 
 __all__: list[str] = []
 
@@ -29,6 +31,8 @@ MOST_ADVICE = 20  # on one block: one slip is often made all over a document
 @options.documents
 @click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
 @options.media
+@role
+@mood
 @click.option(
     "--long/--short",
     "long",
@@ -41,12 +45,15 @@ def check(
     documents: tuple[str, ...],
     scene: str | None,
     media: Path | None,
+    role: Role,
+    mood: Mood | None,
     long: bool | None,
 ) -> int:
     """Explain every fault of documents, with line, column and path.
 
     Standard output holds the faults and nothing else; a line each, unless it is a terminal. Advice on what is
-    no fault but looks like a slip goes to standard error, and does not count.
+    no fault but looks like a slip goes to standard error, and does not count; so does advice on expressions
+    that last, follow each other or go with words otherwise than people's do, as who talks or listens.
     """
     from bml_schema import Block, read
     from bml_schema.source import Source
@@ -54,8 +61,10 @@ def check(
     from realizer.cli.advice import advice
     from realizer.cli.diagnostics import Finding, one_line, render
     from realizer.cli.findings import finding_of
-    from realizer.pipeline import warning_of
+    from realizer.cli.habits import habits
+    from realizer.pipeline import speak, warning_of
     from realizer.player import Player
+    from realizer.speech import SilentVoice
 
     long = sys.stdout.isatty() if long is None else long
     width = shutil.get_terminal_size((100, 24)).columns
@@ -87,7 +96,10 @@ def check(
             for finding in sorted(findings, key=lambda finding: finding.spot or (0,)):
                 show(finding, source)
             if isinstance(item, Block) and schedule is not None and not context.obj["quiet"]:
-                for finding in islice(advice(name, source, item, schedule, player), MOST_ADVICE):
+                said = speak(player.wants(item), SilentVoice())
+                slips = advice(name, source, item, schedule, player)
+                unusual = habits(name, source, item, schedule, said, role, mood)
+                for finding in islice(chain(slips, unusual), MOST_ADVICE):
                     show(finding, source, err=True)
         if not found and not context.obj["quiet"]:
             click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)

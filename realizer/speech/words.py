@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from realizer.speech.ssml import Break, Mark, Script
 
-__all__ = ["Item", "Pause", "Spelled", "items"]
+__all__ = ["Item", "Pause", "Spelled", "items", "words_in"]
 
 # Ideographs and kana are words of their own (there are no blanks between words to go by).
 SINGLE = r"[\u3040-\u30ff\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"

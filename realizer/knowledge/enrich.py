@@ -1,0 +1,227 @@
+"""A text or a block in, a block with expressions where the knowledge base puts them out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from bml_schema import Block, Expression, Speech, Sync, SyncRef
+from bml_schema.behaviours import SpeechText
+from realizer.knowledge.placing import Placement, place
+from realizer.knowledge.sentences import sentences
+from realizer.tables.emotional_words import WordList, word_list
+from realizer.tables.knowledge import Company, Knowledge, Mood, Role, knowledge
+from realizer.tables.templates import Template, templates
+from realizer.tables.timing import gaps
+
+__all__ = ["Enricher", "template_of"]
+
+PREFIX = "template:"
+INTENSITY = 0.7  # of what is placed: people talk with less than a full face
+NEVER = 0.2  # s; what would be shorter than that is not placed
+
+
+def template_of(node: object) -> str:
+    """The template that a behaviour shows, lower case; "" for any other behaviour."""
+    name = node.name.lower() if isinstance(node, Expression) else ""
+    if not name.startswith(PREFIX):
+        return ""
+    return " ".join(name.removeprefix(PREFIX).replace("-", " ").replace("_", " ").split())
+
+
+@dataclass(frozen=True)
+class Enricher:
+    """What is known of who is animated.
+
+    Attributes:
+        role: who talks, or who listens to what is said.
+        mood: how often, and for how long, expressions come; None: as on average.
+        language: BCP-47 of the text.
+        words: a word list of the user's; None: the one of the language, if one ships.
+    """
+
+    role: Role = "speaker"
+    mood: Mood | None = None
+    language: str = "en"
+    words: WordList | None = None
+
+    def text(self, text: str, block: str = "bml1") -> Block:
+        """A block that says `text` with the face of a speaker, or that shows who hears it."""
+        if self.role == "listener":
+            return self.listener(((text, 0.0),), block)
+        speech = Speech(id="speech1", text=SpeechText(parts=(text,)))
+        return self.block(Block(id=block, children=(speech,)))
+
+    def block(self, block: Block) -> Block:
+        """A speaker's block with expressions at its words, and with company for the expressions it has.
+
+        What the block says already is left as it is; doing it twice adds nothing.
+        """
+        names = _Names(block)
+        speeches: dict[str, Speech] = {}
+        placed: list[Expression] = []
+        for node in block.behaviours:
+            if isinstance(node, Speech) and node.text is not None and not node.descriptions:
+                speeches[node.id], shown = self._speech(node, block, names)
+                placed += shown
+        shown_now = [node for node in block.behaviours if isinstance(node, Expression)] + placed
+        for node in list(shown_now):
+            placed += self._company(node, shown_now, names)
+        children = _replaced(block.children, speeches)
+        return replace(block, children=(*children, *placed), places={})
+
+    def listener(self, said: Iterable[tuple[str, float]], block: str) -> Block:
+        """A block of expressions for who hears texts that begin at given seconds."""
+        names = _Names(Block(id=block))
+        placed: list[Expression] = []
+        for text, begin in said:
+            for placement in self._placements(text):
+                for name in placement.rule.show:
+                    start = SyncRef(offset=round(begin + placement.word.start, 3))
+                    placed.append(self._expression(name, start, placement.rule.says, names))
+        for node in list(placed):
+            placed += self._company(node, placed, names)
+        return Block(id=block, children=tuple(placed))
+
+    def _placements(self, text: str) -> tuple[Placement, ...]:
+        words = self.words if self.words is not None else word_list(self.language)
+        return place(sentences(text, self.language), self.knowledge, self.role, self.mood, words)
+
+    @property
+    def knowledge(self) -> Knowledge:
+        return knowledge()
+
+    def _speech(self, node: Speech, block: Block, names: _Names) -> tuple[Speech, list[Expression]]:
+        """The speech with a mark before each word that something begins at, and what begins there."""
+        assert node.text is not None
+        marks = _marks(node.text.parts)
+        begun = {(str(e.syncs.get("start")), template_of(e)) for e in block.behaviours}
+        placed = []
+        new: dict[int, str] = {}
+        for placement in self._placements(str(node.text)):
+            at = placement.word.place
+            id = marks.get(at) or new.get(at) or names.mark(node)
+            start = SyncRef(behaviour=node.id, sync=id)
+            shown = [name for name in placement.rule.show if (str(start), name) not in begun]
+            placed += [self._expression(name, start, placement.rule.says, names) for name in shown]
+            if shown and at not in marks:
+                new[at] = id
+        return replace(node, text=SpeechText(parts=_marked(node.text.parts, new))), placed
+
+    def _expression(
+        self, name: str, start: SyncRef, because: str, names: _Names, end: SyncRef | None = None
+    ) -> Expression:
+        id = names.behaviour(name)
+        syncs: dict[str, SyncRef] = {"start": start}
+        if end is not None:
+            syncs["end"] = end
+        elif self.mood is not None:
+            held = _evident(templates()[name.upper()], self.mood.length)
+            syncs["relax"] = SyncRef(behaviour=id, sync="attackPeak", offset=round(held, 3))
+        return Expression(id=id, name=PREFIX + name, intensity=INTENSITY, because=because, syncs=syncs)
+
+    def _company(self, node: Expression, beside: Sequence[Expression], names: _Names) -> Iterator[Expression]:
+        """What comes with an expression and is not there yet."""
+        for company in self.knowledge.companies:
+            if company.offered or company.of != template_of(node):
+                continue
+            if any(template_of(e) == company.other and _refers(e, node.id) for e in beside):
+                continue
+            start, end = _around(node, company)
+            if start is not None:
+                other = self._expression(company.other, start, company.says, names, end)
+                yield replace(other, intensity=node.intensity)
+
+
+class _Names:
+    """Ids that nothing in a block has yet."""
+
+    def __init__(self, block: Block) -> None:
+        self.taken = {node.id for node in block.behaviours}
+
+    def behaviour(self, stem: str) -> str:
+        return self._new(stem.replace(" ", "-"), self.taken)
+
+    def mark(self, speech: Speech) -> str:
+        taken = {*speech.marked, *speech.sync_points, *self.taken}
+        name = self._new("w", taken)
+        self.taken.add(name)
+        return name
+
+    def _new(self, stem: str, taken: set[str]) -> str:
+        number = 1
+        while f"{stem}{number}" in taken:
+            number += 1
+        taken.add(f"{stem}{number}")
+        return f"{stem}{number}"
+
+
+def _around(node: Expression, company: Company) -> tuple[SyncRef | None, SyncRef | None]:
+    """Where the other expression starts and ends; no start: there is no room for it."""
+
+    def point(sync: str, offset: float = 0.0) -> SyncRef:
+        return SyncRef(behaviour=node.id, sync=sync, offset=offset)
+
+    begin = node.syncs.get("start")
+    room = begin.offset if begin is not None and begin.behaviour is None else company.lead
+    lead = min(company.lead, room)
+    if company.by == "around":
+        return point("start", -lead), point("end", company.lead)
+    if company.by == "before":
+        return (point("start", -lead) if lead >= NEVER else None), point("attackPeak")
+    if company.by == "after":
+        return point("relax"), None
+    return point("start"), point("end")
+
+
+def _refers(node: Expression, id: str) -> bool:
+    return any(ref.behaviour == id for ref in node.syncs.values())
+
+
+def _evident(template: Template, length: float) -> float:
+    """Seconds from attackPeak to relax, so that it can be seen `length` times as long as usual."""
+    attack, _, relax = gaps("face").gaps
+    seen = template.evident * length
+    if template.possible is not None:
+        seen = min(max(seen, template.possible[0]), template.possible[1])
+    return max(seen - attack.preferred / 2 - relax.preferred / 2, 0.0)
+
+
+def _marks(parts: Sequence[str | Sync]) -> dict[int, str]:
+    """Characters of text before each mark, with the blanks after it -> the mark's id."""
+    found: dict[int, str] = {}
+    at = 0
+    for part, following in zip(parts, (*parts[1:], ""), strict=False):
+        if isinstance(part, str):
+            at += len(part)
+        else:
+            blanks = len(following) - len(following.lstrip()) if isinstance(following, str) else 0
+            found[at + blanks] = part.id
+    return found
+
+
+def _marked(parts: Sequence[str | Sync], new: Mapping[int, str]) -> tuple[str | Sync, ...]:
+    """The parts with marks at places in the text, counted in characters."""
+    found: list[str | Sync] = []
+    at = 0
+    for part in parts:
+        if not isinstance(part, str):
+            found.append(part)
+            continue
+        cut = 0
+        for spot in sorted(spot for spot in new if at <= spot < at + len(part)):
+            if spot > at + cut:
+                found.append(part[cut : spot - at])
+            found.append(Sync(id=new[spot]))
+            cut = spot - at
+        found.append(part[cut:])
+        at += len(part)
+    return tuple(found)
+
+
+def _replaced(children: tuple, speeches: Mapping[str, Speech]) -> Iterator:  # type: ignore[type-arg]
+    for child in children:
+        if hasattr(child, "children"):
+            yield replace(child, children=tuple(_replaced(child.children, speeches)))
+        else:
+            yield speeches.get(getattr(child, "id", None) or "", child)

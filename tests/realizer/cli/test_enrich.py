@@ -1,0 +1,83 @@
+"""`realizer enrich` as its user sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from bml_schema import read
+from realizer.cli import cli
+
+DOCUMENT = (
+    '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="{}"><speech id="s"><text>Really?</text>{}'
+    "</speech></bml>"
+)
+
+
+def enrich(*arguments: str, stdin: str = "") -> Result:
+    return CliRunner().invoke(cli, ["enrich", *arguments], input=stdin, standalone_mode=False)
+
+
+def starts(text: str) -> dict[str, str]:
+    """Block:behaviour -> start of what was placed."""
+    return {
+        f"{block.id}:{node.id}": str(node.syncs["start"])
+        for block in read(text)
+        for node in block.behaviours
+        if getattr(node, "because", "")
+    }
+
+
+def test_a_text_goes_in_and_a_document_comes_out() -> None:
+    done = enrich("Are you sure?")
+    assert done.return_value == 0
+    assert starts(done.stdout) == {"bml1:surprise1": "speech1:w1"}
+
+
+def test_documents_of_a_file_keep_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "two.bml"
+    path.write_text(DOCUMENT.format("a", "") + DOCUMENT.format("b", ""), "utf-8")
+    assert starts(enrich(str(path)).stdout) == {"a:surprise1": "s:w1", "b:surprise1": "s:w1"}
+
+
+def test_text_comes_from_standard_input_and_goes_to_a_file(tmp_path: Path) -> None:
+    done = enrich("-", "-o", str(tmp_path / "o.bml"), stdin="Nonsense. Go away!")
+    assert (done.stdout, done.return_value) == ("", 0)
+    assert "2 expressions placed" in done.stderr
+    assert set(starts((tmp_path / "o.bml").read_text())) == {"bml1:anger1", "bml1:anger2"}
+
+
+def test_a_listener_of_a_document_gets_a_block_of_his_own() -> None:
+    done = enrich("-", "--role", "listener", stdin=DOCUMENT.format("a", ""))
+    assert starts(done.stdout) == {"a-listener:sadness1": "0"}
+
+
+def test_a_broken_document_is_told_and_the_others_are_done() -> None:
+    done = enrich("-", stdin="<bml id='x'><spech></bml>" + DOCUMENT.format("b", ""))
+    assert done.return_value == 1
+    assert set(starts(done.stdout)) == {"b:surprise1"}
+    assert "realizer:" in done.stderr
+
+
+def test_words_of_another_language_come_from_a_file(tmp_path: Path) -> None:
+    words = tmp_path / "de.csv"
+    words.write_text(
+        "# source: own\n# units: none\n# licence: MIT\nword,category,origin\nunsinn,disapproval,own\n"
+    )
+    assert "no emotional words for language 'de'" in enrich("Unsinn.", "--language", "de").stderr
+    done = enrich("Unsinn.", "--language", "de", "--words", str(words))
+    assert starts(done.stdout) == {"bml1:anger1": "speech1:w1"}
+
+
+@pytest.mark.parametrize("text", ["", "  \n "])
+def test_an_empty_text_is_refused_in_words(text: str) -> None:
+    done = enrich("-", stdin=text)
+    assert "wanted a text or a BML document" in str(done.exception)
+
+
+def test_an_unknown_mood_names_those_that_are_near() -> None:
+    assert "wanted a word such as happy, happiness; got 'happi'" in str(
+        enrich("Hi.", "--mood", "happi").exception
+    )

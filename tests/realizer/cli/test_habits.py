@@ -1,0 +1,44 @@
+"""`realizer check` gives the advice of the knowledge base, with the place it is about."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+
+HEAD = '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" xmlns:r="urn:bml-realizer:1" id="b1">\n'
+
+
+def check(tmp_path: Path, body: str, *options: str) -> Result:
+    document = tmp_path / "d.bml"
+    document.write_text(HEAD + body + "\n</bml>", "utf-8")
+    return CliRunner().invoke(cli, ["check", str(document), *options], standalone_mode=False)
+
+
+def test_advice_stands_on_standard_error_with_its_place_and_does_not_count(tmp_path: Path) -> None:
+    done = check(tmp_path, '<r:expression id="e" name="template:disgust"/>')
+    assert (done.return_value, done.stdout) == (0, "")
+    assert "d.bml:2:2: ADVICE b1:e: line 2, /bml/expression[1]: disgust stands alone" in done.stderr
+
+
+def test_a_word_is_looked_up_where_it_is_spoken(tmp_path: Path) -> None:
+    speech = '<speech id="s" start="2"><text>I say: <sync id="k"/>nonsense.</text></speech>'
+    missing = '"nonsense" is said without anger'
+    assert missing in check(tmp_path, speech).stderr
+    with_anger = speech + '<r:expression id="a" name="template:anger" start="s:k"/>'
+    assert missing not in check(tmp_path, with_anger).stderr
+    too_early = speech + '<r:expression id="a" name="template:anger" start="0"/>'
+    assert missing in check(tmp_path, too_early).stderr
+
+
+def test_a_listener_is_measured_as_a_listener(tmp_path: Path) -> None:
+    body = '<r:expression id="e" name="template:happiness"/>'
+    assert "a listener shows happiness" in check(tmp_path, body, "--role", "listener").stderr
+    assert "a listener" not in check(tmp_path, body).stderr
+
+
+def test_faces_that_are_no_templates_are_nobodys_business(tmp_path: Path) -> None:
+    done = check(tmp_path, '<faceLexeme id="e" lexeme="RAISE_BROWS" start="0" end="60"/>')
+    assert "ADVICE" not in done.stderr

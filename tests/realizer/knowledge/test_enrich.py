@@ -1,0 +1,137 @@
+"""Text and documents get expressions where the knowledge base puts them, and nothing is lost."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import realizer
+from bml_schema import Block, Expression, Speech, parse, write
+from realizer.knowledge.enrich import Enricher, template_of
+from realizer.tables.knowledge import knowledge
+
+TEXT = "Are you really sure? This is nonsense! There was a terrible accident. Yes. Go away!"
+HEAD = '<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0" xmlns:r="urn:bml-realizer:1">'
+
+
+def document(*behaviours: str) -> Block:
+    return parse(HEAD + "".join(behaviours) + "</bml>")
+
+
+def placed(block: Block) -> dict[str, str]:
+    """Template and start of what was placed."""
+    return {
+        node.id: f"{template_of(node)} {node.syncs['start']}"
+        for node in block.behaviours
+        if getattr(node, "because", "")
+    }
+
+
+def test_a_text_becomes_a_document_that_says_it_with_expressions_at_its_words() -> None:
+    block = Enricher().text(TEXT)
+    speech = block["speech1"]
+    assert isinstance(speech, Speech)
+    assert str(speech.text) == TEXT
+    assert placed(block) == {
+        "surprise1": "surprise speech1:w1",
+        "anger1": "anger speech1:w2",
+        "surprise2": "surprise speech1:w3",
+        "grief1": "grief speech1:w3",
+        "surprise3": "surprise speech1:w4",
+        "anger2": "anger speech1:w5",
+    }
+
+
+def test_every_placed_expression_says_which_rule_placed_it() -> None:
+    nodes = [node for node in Enricher().text(TEXT).behaviours if isinstance(node, Expression)]
+    assert nodes
+    assert all("Wojdel" in (node.because or "") for node in nodes)
+
+
+def test_what_is_written_plays_without_a_warning() -> None:
+    text = write(Enricher().text(TEXT))
+    assert parse(text) == Enricher().text(TEXT)
+    schedule = realizer.schedule(text)
+    assert not schedule.warnings
+    assert set(placed(parse(text))) < set(schedule.times)
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "starts"),
+    [
+        ('<r:expression id="a" name="template:astonishment" start="3"/>', "surprise a:start - 0.12"),
+        ('<r:expression id="a" name="template:disgust" start="3"/>', "anger a:start - 0.12"),
+        ('<r:expression id="a" name="template:disbelief"/>', "anger a:relax"),
+        ('<r:expression id="a" name="Template:Happiness" start="3"/>', "surprise a:start - 0.6"),
+    ],
+)
+def test_an_expression_gets_the_company_it_is_seen_in(behaviour: str, starts: str) -> None:
+    assert list(placed(Enricher().block(document(behaviour))).values()) == [starts]
+
+
+def test_nothing_is_placed_before_the_block_starts() -> None:
+    block = Enricher().block(document('<r:expression id="a" name="template:happiness" start="0"/>'))
+    assert placed(block) == {}
+    block = Enricher().block(document('<r:expression id="a" name="template:astonishment" start="0.05"/>'))
+    assert placed(block) == {"surprise1": "surprise a:start - 0.05"}
+    assert not realizer.schedule(write(block)).warnings
+
+
+def test_a_document_keeps_what_it_says_and_its_own_marks() -> None:
+    block = document(
+        '<required><speech id="w1" start="1"><text>Hm, <sync id="k"/>really? No?</text></speech></required>',
+        '<head id="surprise1" lexeme="NOD" stroke="w1:k"/>',
+    )
+    rich = Enricher().block(block)
+    assert rich.required == {"w1"}
+    speech = rich["w1"]
+    assert isinstance(speech, Speech)
+    assert speech.marked == ("k", "w2")
+    assert rich["surprise1"] == block["surprise1"]
+    assert placed(rich) == {"surprise2": "surprise w1:k", "surprise3": "surprise w1:w2"}
+
+
+def test_speech_in_another_form_is_left_as_it_is() -> None:
+    speech = (
+        '<speech id="s"><text>Really?</text><description priority="1" type="application/ssml+xml">'
+        '<speak xmlns="http://www.w3.org/2001/10/synthesis">Really?</speak></description></speech>'
+    )
+    assert Enricher().block(document(speech)) == document(speech)
+
+
+def test_a_mood_makes_expressions_last_longer_or_shorter() -> None:
+    def held(mood: str) -> float:
+        block = Enricher(mood=knowledge().mood(mood)).text("Are you sure about it?")
+        return float(block["surprise1"].syncs["relax"].offset)
+
+    assert held("confused") < held("depressed")
+
+
+def test_a_listener_says_nothing_and_is_shown_when_the_words_fall() -> None:
+    block = Enricher(role="listener").text("Do you know it?")
+    assert [type(node) for node in block.behaviours] == [Expression]
+    assert placed(block) == {"sadness1": "sadness 0.6"}
+
+
+WORDS = [
+    "really",
+    "nonsense",
+    "yes",
+    "horrible",
+    "not",
+    "furious",
+    "I",
+    "understand",
+    "day",
+    "?",
+    "!",
+    ".",
+    "<&>",
+]
+
+
+@given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
+def test_doing_it_twice_adds_nothing(text: str) -> None:
+    block = parse(write(Enricher().text(text)))
+    assert Enricher().block(block) == block

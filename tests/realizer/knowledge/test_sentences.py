@@ -1,0 +1,49 @@
+"""A text falls into sentences, and its words get times by their vowels."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.knowledge.sentences import sentences
+
+
+def test_sentences_end_with_their_marks() -> None:
+    found = sentences("Is it 3.5 metres? Yes, it is! Mind the step\n\nbelow")
+    assert [[word.text for word in one.words] for one in found] == [
+        ["Is", "it", "3.5", "metres"],
+        ["Yes", "it", "is"],
+        ["Mind", "the", "step"],
+        ["below"],
+    ]
+    assert [(one.question, one.exclamation) for one in found] == [(True, False), (False, True)] + [
+        (False,) * 2
+    ] * 2
+
+
+@pytest.mark.parametrize("text", ["真的吗？", "هل أنت بخير؟", "“Really?” she said", "Really?!"])
+def test_questions_of_other_scripts_and_in_quotes_are_questions(text: str) -> None:
+    assert sentences(text)[0].question
+
+
+def test_words_last_as_many_units_as_they_have_vowels_and_marks_last_one() -> None:
+    (one,) = sentences("banana, cat")
+    assert [[word.start, word.end] for word in one.words] == [
+        pytest.approx([0.0, 0.6]),
+        pytest.approx([0.8, 1.0]),
+    ]
+
+
+@pytest.mark.parametrize("text", ["", "   ", "?!", "… — …"])
+def test_a_text_without_words_has_no_sentences(text: str) -> None:
+    assert sentences(text) == ()
+
+
+@given(st.text(max_size=80))
+def test_any_text_gives_words_in_its_order_at_rising_times(text: str) -> None:
+    words = [word for one in sentences(text) for word in one.words]
+    assert all(text[word.place :].startswith(word.text) for word in words)
+    assert all(a.end <= b.start + 1e-9 and a.place < b.place for a, b in pairwise(words))

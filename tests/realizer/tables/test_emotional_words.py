@@ -1,0 +1,60 @@
+"""Words find their category: phrases before words, words before beginnings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from realizer.errors import TableError
+from realizer.tables.emotional_words import CATEGORIES, read_words, word_list, words_of
+
+HEAD = "# source: test\n# units: none\n# licence: MIT\nword,category,origin\n"
+
+
+def categories(text: str) -> list[str]:
+    words = word_list("en-GB")
+    assert words is not None
+    return words.categories(text.split())
+
+
+def test_english_has_words_of_every_category() -> None:
+    words = word_list("en")
+    assert words is not None
+    found = {category for some in words.phrases.values() for _, category in some}
+    assert found | set(words.beginnings.values()) == set(CATEGORIES)
+
+
+def test_a_phrase_wins_over_its_words() -> None:
+    assert categories("I understand but you understand") == ["approval", "approval", "", "", "assent"]
+
+
+def test_a_longer_beginning_wins_over_a_shorter_one() -> None:
+    assert categories("Sadists sadly") == ["fright", "sorrow"]
+
+
+def test_typographic_apostrophes_are_apostrophes() -> None:
+    assert categories("you’re right") == ["assent", "assent"]
+
+
+def test_a_language_without_a_list_has_none() -> None:
+    assert word_list("pl") is None
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        ("gut,lob,own", "wanted one of praise, pleasure"),
+        ("g*,praise,own", "wanted three letters or more"),
+        ("gut,praise,own\ngut,sorrow,own", "wanted a word that stands once"),
+    ],
+)
+def test_a_bad_row_says_what_was_wanted(tmp_path: Path, row: str, says: str) -> None:
+    with pytest.raises(TableError, match=says):
+        read_words(HEAD + row + "\n", "mine.csv")
+
+
+def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
+    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\xff")
+    with pytest.raises(TableError, match=r"bytes\.csv: wanted a list of words"):
+        words_of(tmp_path / "bytes.csv")
