@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from realizer.animation.mapping import FapMapping, standard
-from realizer.errors import TableError
+from realizer.errors import FaceError, TableError
 from realizer.tables.mappings import FORMS, read_mapping
 
 __all__ = ["mapping_of"]
@@ -22,8 +22,8 @@ def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
         file: a user's own mapping, in either form.
 
     Raises:
-        FaceError: no such face.
-        TableError: a file that cannot be used, with the line.
+        FaceError: no such face, or its own file cannot be used; with the line.
+        TableError: the user's file cannot be used; with the line.
     """
     from realizer.face.load import folder_of
 
@@ -34,8 +34,11 @@ def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
 def _mapping(folder: Path, file: Path | None) -> FapMapping:
     own = [folder / f"{OWN}{form}" for form in FORMS if (folder / f"{OWN}{form}").is_file()]
     if len(own) > 1:
-        raise TableError(f"{folder}: wanted one of {' and '.join(path.name for path in own)}, got both")
+        raise FaceError(f"{folder}: wanted one of {' and '.join(path.name for path in own)}, got both")
     mapping = standard()
-    for path in (*own, *([file] if file else [])):
-        mapping = mapping.replaced(read_mapping(path), str(path))
-    return mapping
+    try:
+        for path in own:
+            mapping = mapping.replaced(read_mapping(path), str(path))
+    except TableError as error:
+        raise FaceError(str(error)) from None
+    return mapping.replaced(read_mapping(file), str(file)) if file else mapping

@@ -18,6 +18,7 @@ from bml_schema import Block, BMLError, WarningFeedback, read
 from realizer.animation.curves import gain_at
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float32, Int16
@@ -25,6 +26,7 @@ from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
 from realizer.composition.playing import Speaking
 from realizer.errors import RealizerError, VoiceError
+from realizer.mapping import mapping_of
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.fitting import fitted, stretched
@@ -62,6 +64,7 @@ class Realization:
         duration: seconds, to the end of the last block.
         face_name: which face folder pictures are drawn with.
         deformer: "mpeg4" or "au", what moves that face; None is what it says itself.
+        mapping: what its AUs ask of FAPs.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
         feedback: BML feedback as XML text, in order.
@@ -80,6 +83,7 @@ class Realization:
     refused: tuple[str, ...] = ()
     speaking: tuple[Speaking, ...] = field(default=())
     deformer: str | None = None
+    mapping: FapMapping = field(default_factory=standard)
 
     @property
     def frames(self) -> int:
@@ -121,7 +125,7 @@ class Realization:
         """
         from realizer.face import takes
 
-        return poses(self.aus, takes(self.face_name, deformer=self.deformer))
+        return poses(self.aus, takes(self.face_name, deformer=self.deformer), self.mapping)
 
     def sound(self, rate: int = 22050) -> Int16:
         """(round(duration x rate),) int16 mono: all that is said, mixed; silence where nobody speaks."""
@@ -167,12 +171,13 @@ def realize(
     language: str = "en-US",
     media: Path | None = None,
     cooccurrence: str = "on",
+    mapping: Path | None = None,
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
 
     Args:
         documents: BML text, or several texts; all are submitted at t = 0, in order.
-        face: name of a face folder; only pictures need it.
+        face: name of a face folder.
         deformer: what moves it: "mpeg4" (FAPs) or "au" (its model of action units); None is what it says.
         fps: frames a second.
         voice: a voice or its name; None takes espeak-ng where it is installed, otherwise the silent voice.
@@ -181,13 +186,16 @@ def realize(
         idle: blinks and small head motion.
         media: the folder of the files that documents may name.
         cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
+        mapping: a file of what AUs ask of FAPs; it goes before what the face says.
 
     Raises:
-        TableError: a file of rules that cannot be used.
+        FaceError: no such face.
+        TableError: a file of rules, or a mapping, that cannot be used.
         VoiceError: the named voice is not installed.
     """
     from realizer.face import face_name
 
+    in_force = mapping_of(face, mapping)
     texts = [documents] if isinstance(documents, str | bytes) else list(documents)
     if not (math.isfinite(fps) and fps > 0):
         raise ValueError(f"fps: wanted a number above 0, got {fps}")
@@ -217,7 +225,7 @@ def realize(
         step = max(1, int(WINDOW * fps))
         windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
         aus = AUFrames(times, np.concatenate([w.values for w in windows]), player.rules)
-        characters[name] = Performance(aus, to_fap(aus))
+        characters[name] = Performance(aus, to_fap(aus, in_force))
     speaking = player.speech()
     # Those of planning say more than what is told of them; others arise while blocks play.
     planned = {(w.id, w.type, w.text): w for w in (*refused, *(w for s in schedules for w in s.warnings))}
@@ -234,6 +242,7 @@ def realize(
         refused=tuple(w.text for w in refused),
         speaking=speaking,
         deformer=deformer,
+        mapping=in_force,
     )
 
 

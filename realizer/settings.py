@@ -82,6 +82,13 @@ def _folder(value: Any) -> Path:
     return path
 
 
+def _file(value: Any) -> Path:
+    path = Path(value)
+    if not path.is_file():
+        raise ValueError("a file that is there")
+    return path
+
+
 def _switch_or_file(value: Any) -> str:
     """ "on", "off", or the name of a file."""
     try:
@@ -137,6 +144,9 @@ class Settings:
     seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
     cooccurrence: str = _setting("on", _switch_or_file, "rules of AUs together: on, off, or a file of them")
+    mapping: Path | None = _setting(
+        None, _optional(_file), "a file of what AUs ask of FAPs; none: as each face"
+    )
     keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")
     drain: float = _setting(5.0, _number(float, 0, 3600), "seconds given to what plays when the service ends")
     max_message: int = _setting(16 * 2**20, _number(int, 1, 2**31), "bytes of one WebSocket message")

@@ -6,13 +6,14 @@ import numpy as np
 
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames
+from realizer.animation.mapping import FapMapping
 from realizer.animation.targets import AU_NAMES, axis
 from realizer.arrays import Float32
 
 __all__ = ["poses"]
 
 
-def poses(frames: AUFrames, takes: tuple[str, ...]) -> Float32:
+def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
     """What a face is drawn by: stills, films, sheets and streams of pictures and meshes alike.
 
     A column for each name, in its order: action units as they move a face (0..1), presences (0..1), and FAPs
@@ -22,6 +23,7 @@ def poses(frames: AUFrames, takes: tuple[str, ...]) -> Float32:
     Args:
         frames: n frames.
         takes: names of `targets.axis()` (`Face.takes`).
+        mapping: what AUs ask of FAPs; None is the one that ships.
 
     Returns:
         (n, len(takes)) float32.
@@ -35,5 +37,5 @@ def poses(frames: AUFrames, takes: tuple[str, ...]) -> Float32:
     values[:, :count] = frames.moving.T
     rest = values.copy()
     rest[:, [column for column in columns if column < count]] = 0
-    values[:, count : count + 68] = to_fap(AUFrames(frames.times, rest)).values
+    values[:, count : count + 68] = to_fap(AUFrames(frames.times, rest), mapping).values
     return np.ascontiguousarray(values[:, columns])

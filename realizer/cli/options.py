@@ -47,6 +47,14 @@ deformer = click.option(
 )
 
 
+mapping = click.option(
+    "--mapping",
+    metavar="FILE",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="What action units ask of FAPs, as `realizer faces mapping` writes it; before what the face says.",
+)
+
+
 class Number(click.FloatRange):
     """A finite number in a range; click lets NaN through."""
 

@@ -42,6 +42,7 @@ TRANSPARENT = "transparent"
 @click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]")
 @click.option("--no-idle", is_flag=True, help="No blinks, no small head motion.")
 @options.cooccurrence
+@options.mapping
 @options.playing
 @click.pass_context
 def realize(
@@ -59,6 +60,7 @@ def realize(
     seed: int | None,
     no_idle: bool,
     cooccurrence: str | None,
+    mapping: Path | None,
     voice: str | None,
     scene: str | None,
     media: Path | None,
@@ -88,6 +90,7 @@ def realize(
         seed=seed,
         idle=False if no_idle else None,
         cooccurrence=cooccurrence,
+        mapping=mapping,
     )
     if writer is not None and writer.suffix in PICTURES:
         options.check_camera(chosen.face, camera)
@@ -109,6 +112,7 @@ def realize(
         language=chosen.language,
         media=chosen.media,
         cooccurrence=chosen.cooccurrence,
+        mapping=chosen.mapping,
     )
     if any(speaking.utterance.pcm is None for speaking in realization.speaking):
         options.tell_silence(chosen.voice)

@@ -33,6 +33,8 @@ __all__: list[str] = []
 @options.media
 @click.option("--seed", type=int, help="Of idle motion.  [default: 0]")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion.  [default: idle]")
+@options.cooccurrence
+@options.mapping
 @click.option(
     "--config", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="A TOML file of settings."
 )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
+from realizer.animation.mapping import FapMapping
 from realizer.player import Player
 from realizer.server.connection import (
     Connection,
@@ -38,12 +39,20 @@ class Broadcast:
 
     Args:
         face: (character index) -> the face its meshes are made of.
+        mapping: (character index) -> what its AUs ask of FAPs.
         face_name: (character index) -> its name, for pictures.
     """
 
-    def __init__(self, player: Player, face: Callable[[int], Face], face_name: Callable[[int], str]) -> None:
+    def __init__(
+        self,
+        player: Player,
+        face: Callable[[int], Face],
+        mapping: Callable[[int], FapMapping],
+        face_name: Callable[[int], str],
+    ) -> None:
         self.player = player
         self._face = face
+        self._mapping = mapping
         self._face_name = face_name
         self._timelines: dict[tuple[int, float], Timeline] = {}
         self._sounds: dict[tuple[int | None, int], Sound] = {}
@@ -55,7 +64,9 @@ class Broadcast:
         """The frames of one character at one rate."""
         key = (index, fps)
         if key not in self._timelines:
-            self._timelines[key] = Timeline(self.player, index, fps, lambda: self._face(index))
+            self._timelines[key] = Timeline(
+                self.player, index, fps, lambda: self._face(index), lambda: self._mapping(index)
+            )
         return self._timelines[key]
 
     def frames(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.animation.targets import AU_NAMES
 from realizer.errors import FaceError, VoiceError
+from realizer.mapping import mapping_of
 from realizer.server.connection import (
     Connection,
     FeedbackFilter,
@@ -180,6 +181,7 @@ def _mesh_of(session: Session, index: int) -> dict[str, Any]:
 def _character(session: Session, message: CharacterMessage) -> None:
     if message.face is not None:
         session.load_face(message.face)
+        mapping_of(message.face, session.settings.mapping)
     if message.voice is not None:
         from realizer.speech import find_voice
 

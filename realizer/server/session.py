@@ -10,9 +10,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from bml_schema import Block, BMLError, read
+from realizer.animation.mapping import FapMapping
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError, VoiceError
+from realizer.mapping import mapping_of
 from realizer.pipeline import as_it_is, warning_of, warped
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
@@ -101,7 +103,7 @@ class Session:
         self.faces: dict[int, str] = {}
         self.voices: dict[int, str] = {}
         self.voice_fault: str | None = None
-        self.broadcast = Broadcast(self.player, self.face, self.face_name)
+        self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
         self.preparation = Preparation()
         self._speaks = 0
         self._connections: dict[int, Connection] = {}
@@ -424,6 +426,9 @@ class Session:
 
     def face(self, index: int) -> Face:
         return self.load_face(self.face_name(index))
+
+    def mapping(self, index: int) -> FapMapping:
+        return mapping_of(self.face_name(index), self.settings.mapping)
 
     def reply(self, connection: int, reply: Any) -> None:
         self._effects.append(Send(connection, reply.text()))

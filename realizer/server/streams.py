@@ -11,6 +11,7 @@ import numpy as np
 
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
 from realizer.arrays import Float32, Int16, Int32
 from realizer.pipeline import CUT, heard
@@ -45,11 +46,14 @@ def last_at(now: float, fps: float) -> int:
 class Window:
     """Frames `first` .. `first + n - 1` of one character; all but AUs is made when first asked for."""
 
-    def __init__(self, first: int, fps: float, aus: AUFrames, face: Callable[[], Face]) -> None:
+    def __init__(
+        self, first: int, fps: float, aus: AUFrames, face: Callable[[], Face], mapping: FapMapping
+    ) -> None:
         self.first = first
         self.fps = fps
         self.aus = aus
         self._face = face
+        self._mapping = mapping
 
     @property
     def end(self) -> int:
@@ -58,7 +62,7 @@ class Window:
     @cached_property
     def faps(self) -> FAPFrames:
         """In FAPU."""
-        return to_fap(self.aus)
+        return to_fap(self.aus, self._mapping)
 
     @cached_property
     def integers(self) -> Int32:
@@ -73,7 +77,7 @@ class Window:
     @cached_property
     def poses(self) -> Float32:
         """(n, k) float32: what the face is drawn by."""
-        return poses(self.aus, self._face().takes)
+        return poses(self.aus, self._face().takes, self._mapping)
 
     @cached_property
     def mesh(self) -> Int16:
@@ -89,13 +93,22 @@ class Timeline:
 
     Args:
         face: what is drawn; called when the first mesh or pose is asked for.
+        mapping: what its AUs ask of FAPs; called for each window.
     """
 
-    def __init__(self, player: Player, character: int, fps: float, face: Callable[[], Face]) -> None:
+    def __init__(
+        self,
+        player: Player,
+        character: int,
+        fps: float,
+        face: Callable[[], Face],
+        mapping: Callable[[], FapMapping] = standard,
+    ) -> None:
         self.player = player
         self.character = character
         self.fps = fps
         self._face = face
+        self._mapping = mapping
         self._window: Window | None = None
         self._revision = -1
 
@@ -111,7 +124,7 @@ class Timeline:
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
             times = np.arange(first, first + count) / self.fps
             aus = self.player.frames(times, self.character)
-            window = self._window = Window(first, self.fps, aus, self._face)
+            window = self._window = Window(first, self.fps, aus, self._face, self._mapping())
             self._revision = self.player.revision
         return window
 
