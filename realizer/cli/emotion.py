@@ -1,0 +1,171 @@
+"""`emotion`: what a word, or a place on the wheel of emotions, looks like, in FAPs and as a picture."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from realizer.cli import options
+
+if TYPE_CHECKING:
+    from realizer.emotion import Profile
+
+__all__: list[str] = []
+
+RINGS = (1.0, 3.0, 5.0, 7.0)  # activations of the picture of the wheel, as in Paul 2010, 6.4
+WRITES = (".png", ".txt")
+
+
+@click.command()
+@click.argument("word", required=False)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: ranges, and the 68 values.")
+@click.option(
+    "--profiles",
+    type=click.Choice(["own", "published", "raw"]),
+    default="own",
+    show_default=True,
+    help="Ours; those of Raouzaiou et al. 2002, corrected; the same as printed.",
+)
+@click.option("--angle", type=options.Number(), metavar="DEGREES", help="Place on Paul's wheel; any turn.")
+@click.option(
+    "--activation", type=options.Number(0, 7), help="0 the middle to 7 the rim.  [default: as full]"
+)
+@click.option("--valence", type=options.Number(-1, 1), help="With --arousal, instead of an angle: -1 to 1.")
+@click.option("--arousal", type=options.Number(-1, 1), help="-1 to 1.")
+@click.option("--seed", type=int, help="Draw within the ranges instead of their middle.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Picture (.png), or the profile as a line of Paul's file (.txt).",
+)
+@click.option(
+    "--wheel",
+    "chart",
+    type=click.Path(path_type=Path),
+    metavar="FILE.png",
+    help="Draw the wheel: 16 angles, 4 activations.",
+)
+@click.option("--face", default="default", show_default=True, help="Whose face.")
+@click.option("--camera", default="close", show_default=True, help=options.CAMERAS)
+def emotion(
+    word: str | None,
+    as_json: bool,
+    profiles: str,
+    angle: float | None,
+    activation: float | None,
+    valence: float | None,
+    arousal: float | None,
+    seed: int | None,
+    output: Path | None,
+    chart: Path | None,
+    face: str,
+    camera: str,
+) -> None:
+    """Say which FAPs an emotion moves, and how far: of WORD, or of a place on the wheel.
+
+    \b
+    realizer emotion guilty
+    realizer emotion --angle 67.5 --activation 5 -o awe.png
+    realizer emotion --valence -0.6 --arousal 0.4 --json
+    realizer emotion --wheel wheel.png
+    """
+    for path, suffixes in ((output, WRITES), (chart, (".png",))):
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise click.UsageError(f"{path}: wanted a name that ends in {' or '.join(suffixes)}")
+    if output or chart:
+        options.check_camera(face, camera)
+    profile = _asked(word, profiles, angle, activation, valence, arousal, bool(chart))
+    if profile is not None:
+        _tell(profile, seed, as_json)
+        if output is not None:
+            _write(profile, seed, output, face, camera)
+    elif output is not None or as_json or seed is not None:
+        raise click.UsageError("wanted a WORD, or a place, for what was asked; got only --wheel")
+    if chart is not None:
+        _draw_wheel(profiles, chart, face, camera)
+
+
+def _asked(
+    word: str | None,
+    profiles: str,
+    angle: float | None,
+    activation: float | None,
+    valence: float | None,
+    arousal: float | None,
+    other: bool,
+) -> Profile | None:
+    from realizer.emotion import affect, wheel
+    from realizer.emotion import emotion as profile_of
+
+    if (valence is None) != (arousal is None):
+        raise click.UsageError("wanted --valence and --arousal together, got one of them")
+    if activation is not None and angle is None:
+        raise click.UsageError("wanted --angle with --activation, got it alone")
+    if (ways := sum(way is not None for way in (word, angle, valence))) > 1 or not (ways or other):
+        raise click.UsageError("wanted one of WORD, --angle, or --valence with --arousal")
+    if angle is not None:
+        return wheel(angle, activation, profiles)
+    if valence is not None and arousal is not None:
+        return affect(valence, arousal, profiles)
+    if word is None:
+        return None
+    try:
+        return profile_of(word, profiles)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def _tell(profile: Profile, seed: int | None, as_json: bool) -> None:
+    from realizer.tables import faps
+
+    values = profile.frame() if seed is None else profile.draw(seed)
+    names = {row.fap: row.name for row in faps()}
+    if as_json:
+        ranges = {names[fap]: list(ends) for fap, ends in profile.ranges.items()}
+        said = {"emotion": profile.name, "profiles": profile.source, "ranges": ranges}
+        click.echo(json.dumps(said | {"values": [round(float(value), 3) for value in values]}))
+        return
+    click.echo(f"{profile.name or 'neutral'} ({profile.source})")
+    for fap, (low, high) in profile.ranges.items():
+        click.echo(f"F{fap:<3} {names[fap]:<22} {low:8.1f} .. {high:7.1f}   {values[fap - 1]:8.1f}")
+
+
+def _write(profile: Profile, seed: int | None, path: Path, face: str, camera: str) -> None:
+    from realizer.emotion import write_profiles
+
+    if path.suffix.lower() == ".txt":
+        path.write_text(write_profiles([profile]), "utf-8")
+        return
+    from PIL import Image
+
+    from realizer.render import Renderer
+
+    pose = profile.frame() if seed is None else profile.draw(seed)
+    with Renderer(face, (512, 512), camera) as renderer:
+        Image.fromarray(renderer.draw(pose[None])[0]).save(path)
+
+
+def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
+    """The faces of 16 angles (columns) and 4 activations (rows), labelled."""
+    import numpy as np
+    from PIL import Image
+
+    from realizer.emotion import wheel
+    from realizer.render import Renderer
+    from realizer.render.sheets import sheet
+    from realizer.tables.feelings import ring
+
+    places = [(place, activation) for activation in RINGS for place in ring("paul").values()]
+    rows = np.stack([wheel(place.angle, activation, profiles).frame() for place, activation in places])
+    with Renderer(face, (160, 160), camera) as renderer:
+        pictures = renderer.draw(rows)
+    titles = [f"{place.name} {place.angle:g}°" for place, _ in places]
+    notes = [(f"activation {activation:g}",) for _, activation in places]
+    columns = len(places) // len(RINGS)
+    Image.fromarray(sheet(list(pictures), titles, notes, columns)).save(path)
+    click.echo(f"{path}: {len(places)} faces", err=True)

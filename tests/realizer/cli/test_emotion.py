@@ -1,0 +1,102 @@
+"""`realizer emotion`: words and places to FAPs, files and pictures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+from realizer.emotion import affect, emotion, read_profiles, wheel
+
+
+def run(*args: str) -> Result:
+    return CliRunner().invoke(cli, ["emotion", *args], standalone_mode=True)
+
+
+def test_a_word_is_told_with_its_ranges_and_middles() -> None:
+    said = run("joy").stdout.splitlines()
+    assert said[0] == "joy (own)"
+    low, high = emotion("joy").ranges[12]
+    line = next(line for line in said if "raise_l_cornerlip " in line)
+    assert line.split() == [
+        "F12",
+        "raise_l_cornerlip",
+        f"{low:.1f}",
+        "..",
+        f"{high:.1f}",
+        f"{(low + high) / 2:.1f}",
+    ]
+
+
+def test_json_has_ranges_and_the_68_values() -> None:
+    said = json.loads(run("afraid", "--profiles", "published", "--json").stdout)
+    assert said["ranges"]["open_jaw"] == [400, 560]
+    assert len(said["values"]) == 68
+    assert said["values"][2] == 480
+
+
+def test_a_seed_draws_within_the_ranges() -> None:
+    values = [json.loads(run("joy", "--json", "--seed", seed).stdout)["values"] for seed in ("1", "1", "2")]
+    assert values[0] == values[1] != values[2]
+    assert values[2] == pytest.approx(emotion("joy").draw(2), abs=1e-3)
+
+
+def test_places_go_by_angle_and_by_valence_and_arousal() -> None:
+    by_angle = json.loads(run("--angle", "-700", "--activation", "5", "--json").stdout)
+    assert np.allclose(by_angle["values"], wheel(20, 5).frame(), atol=1e-2)
+    by_affect = json.loads(run("--valence", "-0.6", "--arousal", "0.4", "--json").stdout)
+    assert np.allclose(by_affect["values"], affect(-0.6, 0.4).frame(), atol=1e-2)
+
+
+def test_a_profile_is_written_as_a_file_of_pauls(tmp_path: Path) -> None:
+    assert run("fear 3", "--profiles", "raw", "-o", str(tmp_path / "fear.txt")).exit_code == 0
+    (back,) = read_profiles((tmp_path / "fear.txt").read_text())
+    assert back.name == "Fear 3"
+    assert back.ranges == emotion("fear 3", "raw").ranges
+
+
+def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path: Path) -> None:
+    from PIL import Image
+
+    chart, picture = tmp_path / "wheel.png", tmp_path / "awe.png"
+    done = run("awe", "--wheel", str(chart), "-o", str(picture))
+    assert (done.exit_code, "64 faces" in done.stderr) == (0, True)
+    with Image.open(picture) as alone, Image.open(chart) as drawn:
+        assert alone.size == (512, 512)
+        pixels = np.asarray(drawn, np.int16)
+    assert pixels.shape[1] == 16 * 166 + 6
+    # Calm and full fear are different faces, full fear and full anger too.
+    cell = [
+        pixels[6 + row * (pixels.shape[0] - 6) // 4 :][:160, 6 + k * 166 :][:, :160]
+        for row, k in ((0, 2), (3, 2), (3, 10))
+    ]
+    assert np.abs(cell[0] - cell[1]).mean() > 1
+    assert np.abs(cell[1] - cell[2]).mean() > 1
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["gilty"], "got 'gilty', did you mean guilty?"),
+        (["accepting"], "accepting: nobody rated how activated it is"),
+        (["joy", "--angle", "3"], "wanted one of WORD, --angle, or --valence with --arousal"),
+        ([], "wanted one of WORD"),
+        (["--valence", "0.3"], "wanted --valence and --arousal together"),
+        (["--activation", "3"], "wanted --angle with --activation"),
+        (["--angle", "3", "--activation", "40"], "40.0 is not in the range 0<=x<=7"),
+        (["--angle", "nan"], "wanted a finite number, got nan"),
+        (["--valence", "7", "--arousal", "0"], "not in the range -1<=x<=1"),
+        (["joy", "-o", "joy.gif"], "joy.gif: wanted a name that ends in .png or .txt"),
+        (["--wheel", "wheel.svg"], "wheel.svg: wanted a name that ends in .png"),
+        (["--wheel", "w.png", "--json"], "wanted a WORD, or a place, for what was asked"),
+        (["joy", "-o", "x.png", "--camera", "above"], "--camera"),
+    ],
+)
+def test_what_cannot_be_done_is_said_and_wrong_usage(args: list[str], said: str, tmp_path: Path) -> None:
+    done = run(*args)
+    assert done.exit_code == 2
+    assert said in " ".join(done.stderr.split())
