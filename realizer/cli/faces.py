@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
+from realizer.cli.bring import import_
 from realizer.cli.fit import fit
+from realizer.cli.mapping import mapping
 from realizer.cli.sheet import sheet
 
 __all__: list[str] = []
@@ -18,6 +20,8 @@ def faces() -> None:
 
 
 faces.add_command(fit)
+faces.add_command(import_)
+faces.add_command(mapping)
 faces.add_command(sheet)
 
 
