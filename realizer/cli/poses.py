@@ -95,7 +95,7 @@ def of_aus(intensity: float) -> list[Series]:
             _poses(
                 [{(number, "BOTH"): intensity} for number in region.members],
                 [f"AU{number} {names[number].name}" for number in region.members],
-                [f"{intensity:g}" for _ in region.members],
+                [names[number].no_fap or f"{intensity:g}" for number in region.members],
             ),
         )
         for region in au_regions()

@@ -15,6 +15,7 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from realizer.animation.mapping import FapMapping
     from realizer.cli.poses import Series
     from realizer.render.sheets import Cell
 
@@ -53,6 +54,7 @@ SCALE = (260, 16)  # pixels of the colour scale
     help=f"{options.CAMERAS} Repeat it to see each pose from several sides.  [default: front]",
 )
 @options.deformer
+@options.mapping
 @options.light
 @options.colour
 @click.option("--size", default="220x280", show_default=True, callback=options.size, help="Of each picture.")
@@ -68,6 +70,7 @@ def sheet(
     intensity: float,
     cameras: tuple[str, ...],
     deformer: str | None,
+    mapping: Path | None,
     light: str | None,
     background: str | None,
     size: tuple[int, int],
@@ -84,6 +87,7 @@ def sheet(
     from PIL import Image
 
     from realizer.cli import poses
+    from realizer.mapping import mapping_of
     from realizer.render.sheets import Group, album
 
     if output.suffix != ".png":
@@ -93,6 +97,7 @@ def sheet(
         options.check_camera(name, camera)
     if not (faps or aus or emotions):
         faps = aus = True
+    in_force = mapping_of(name, options.settings(mapping=mapping).mapping)
     series = [poses.neutral()]
     if faps:
         series += poses.of_faps(value)
@@ -104,7 +109,9 @@ def sheet(
     with _progress(count * len(cameras), context.obj["quiet"]) as step:
         groups = [
             Group(part.heading, cells, part.columns)
-            for part, cells in _cells(name, deformer, series, cameras, size, light, background, step)
+            for part, cells in _cells(
+                name, deformer, in_force, series, cameras, size, light, background, step
+            )
         ]
     words = f"{name}: {', '.join(cameras)}. Left as drawn, right the difference to the neutral face"
     pixels = album(groups, _scale(), words)
@@ -116,6 +123,7 @@ def sheet(
 def _cells(
     name: str,
     deformer: str | None,
+    mapping: FapMapping,
     series: list[Series],
     cameras: tuple[str, ...],
     size: tuple[int, int],
@@ -139,7 +147,7 @@ def _cells(
     if background:
         behind = np.frombuffer(bytes.fromhex(background[1:]), np.uint8)
     every = [pose for part in series for pose in part.poses]
-    rows = poses_of(poses.frames(series), takes(name, deformer=deformer))
+    rows = poses_of(poses.frames(series), takes(name, deformer=deformer), mapping)
     shown: list[list[Any]] = [[] for _ in every]
     for camera in cameras:
         neutral = below = None

@@ -22,7 +22,7 @@ from typing import Literal, TypeAlias, cast
 from realizer.errors import TableError
 from realizer.tables import AuToFap, action_units, au_to_fap, by_number, faps, nearest, read_csv
 
-__all__ = ["FORMS", "Units", "read_mapping", "write_mapping"]
+__all__ = ["FORMS", "Units", "as_text", "read_mapping", "write_mapping"]
 
 Side: TypeAlias = Literal["L", "R", ""]
 Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]

@@ -1,0 +1,38 @@
+"""`faces mapping` writes what is in force, in a form that can be played again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from realizer import tables
+from realizer.cli.mapping import mapping
+from realizer.tables.mappings import read_mapping
+
+
+def test_the_mapping_of_a_face_is_printed_in_pauls_form() -> None:
+    said = CliRunner().invoke(mapping, ["ada"])
+    assert said.exit_code == 0
+    assert said.stdout.startswith("# AU to FAP: ada: au_to_fap.csv\n")
+    assert "# Lip corner puller\n12\tL\n" in said.stdout
+    assert "# Head forward; FAPs turn the head and do not move it\n57\n" in said.stdout
+
+
+@pytest.mark.parametrize("form", ["txt", "csv"])
+def test_what_is_written_is_the_table_with_the_users_rows_in_place(tmp_path: Path, form: str) -> None:
+    (tmp_path / "mine.txt").write_text("26\n3 0 1 0 111\n", "utf-8")
+    asked = ["ada", "-o", str(tmp_path / f"all.{form}"), "--mapping", str(tmp_path / "mine.txt")]
+    said = CliRunner().invoke(mapping, asked)
+    assert said.exit_code == 0, said.output
+    units = read_mapping(tmp_path / f"all.{form}")
+    assert [(row.fap, row.fap_to) for row in units[26, ""]] == [(3, 111)]
+    others = sorted((row for (au, _), unit in units.items() for row in unit if au != 26), key=repr)
+    assert others == sorted((row for row in tables.au_to_fap() if row.au != 26), key=repr)
+
+
+def test_another_ending_is_refused(tmp_path: Path) -> None:
+    said = CliRunner().invoke(mapping, ["ada", "-o", str(tmp_path / "all.xml")])
+    assert said.exit_code == 2
+    assert "wanted a name that ends in .txt or .csv" in said.output
