@@ -57,11 +57,13 @@ class Terms:
 
     Attributes:
         weaker: (m,) the row of the unit, rising.
-        rows: (2, 2, m) the rows of the two stronger units, each of two sides (twice the same where one).
-        start, low, high: (2, m, 1) membership at 0, and its slopes below and above 0.5.
+        stronger: (2, m) of `rows`: a and b, twice the same where there is one.
+        rows: (2, k) the rows of a unit that is stronger somewhere, of two sides; twice the same where one.
+        start, low, high: (k, 1) its membership at 0, and the slopes below and above 0.5.
     """
 
     weaker: Index
+    stronger: Index
     rows: Index
     start: Float32
     low: Float32
@@ -81,14 +83,15 @@ def _least(aus: Float32, terms: Terms) -> Float32:
     """(n_au, n): what the terms leave of each unit."""
     left = aus.copy()
     up: Bool = np.asarray(aus.any(axis=1), bool)
-    live = np.flatnonzero(up[terms.weaker] & (up[terms.rows[:, 0]] | up[terms.rows[:, 1]]).all(axis=0))
+    strong: Bool = np.asarray(up[terms.rows].any(axis=0), bool)
+    live = np.flatnonzero(up[terms.weaker] & strong[terms.stronger].all(axis=0))
     if not len(live):
         return left
-    rows = terms.rows[:, :, live]
-    value = np.maximum(aus[rows[:, 0]], aus[rows[:, 1]])  # (2, m, n): of two sides the stronger
+    value = np.maximum(aus[terms.rows[0]], aus[terms.rows[1]])  # (k, n): of two sides the stronger
     half = np.minimum(value, np.float32(0.5))
-    degree = terms.start[:, live] + terms.low[:, live] * half + terms.high[:, live] * (value - half)
-    bound = 1 - np.minimum(degree[0], degree[1])
+    degree = terms.start + terms.low * half + terms.high * (value - half)
+    first, second = terms.stronger[:, live]
+    bound = 1 - np.minimum(degree[first], degree[second])
     weaker = terms.weaker[live]
     begin = np.flatnonzero(np.diff(weaker, prepend=-1))
     which = weaker[begin]
@@ -131,14 +134,13 @@ def _terms(chosen: list[Rule], rules: Rules) -> Terms:
         for rule in chosen
         for row, side in _sides(rule.weaker)
     )
-    pairs = [pair for _, pair in lines]
-    sets = np.array([[degree for _, degree in pair] for pair in pairs], np.float32).reshape(-1, 2, 3)
-    at_0, at_half, at_1 = (sets[:, :, i].T[:, :, None] for i in range(3))
+    distinct = list(dict.fromkeys(member for _, pair in lines for member in pair))
+    sets = np.array([degrees for _, degrees in distinct], np.float32).reshape(-1, 3)
+    at_0, at_half, at_1 = (sets[:, i : i + 1] for i in range(3))
     return Terms(
         np.array([row for row, _ in lines], np.intp),
-        np.array([[rows for rows, _ in pair] for pair in pairs], np.intp)
-        .reshape(-1, 2, 2)
-        .transpose(1, 2, 0),
+        np.array([[distinct.index(m) for m in pair] for _, pair in lines], np.intp).reshape(-1, 2).T,
+        np.array([rows for rows, _ in distinct], np.intp).reshape(-1, 2).T,
         at_0,
         2 * (at_half - at_0),
         2 * (at_1 - at_half),

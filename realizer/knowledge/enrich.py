@@ -138,21 +138,21 @@ class _Names:
 
     def __init__(self, block: Block) -> None:
         self.taken = {node.id for node in block.behaviours}
+        self.numbers: dict[str, int] = {}
 
     def behaviour(self, stem: str) -> str:
-        return self._new(stem.replace(" ", "-"), self.taken)
+        return self._new(stem.replace(" ", "-"))
 
     def mark(self, speech: Speech) -> str:
-        taken = {*speech.marked, *speech.sync_points, *self.taken}
-        name = self._new("w", taken)
-        self.taken.add(name)
-        return name
+        self.taken.update((*speech.marked, *speech.sync_points))
+        return self._new("w")
 
-    def _new(self, stem: str, taken: set[str]) -> str:
-        number = 1
-        while f"{stem}{number}" in taken:
+    def _new(self, stem: str) -> str:
+        number = self.numbers.get(stem, 1)
+        while f"{stem}{number}" in self.taken:
             number += 1
-        taken.add(f"{stem}{number}")
+        self.numbers[stem] = number + 1
+        self.taken.add(f"{stem}{number}")
         return f"{stem}{number}"
 
 

@@ -53,7 +53,7 @@ def place(
         apart = usual if mood is None else usual * mood.distance / knowledge.usual_distance
     kept: list[Placement] = []
     for placement in sorted(asked, key=lambda one: (rules.index(one.rule), one.word.start)):
-        near = any(abs(placement.word.start - other.word.start) < apart for other in kept)
+        near = apart > 0 and any(abs(placement.word.start - other.word.start) < apart for other in kept)
         if placement.rule.keep or not near:
             kept.append(placement)
     return tuple(sorted(kept, key=lambda one: one.word.place))

@@ -33,6 +33,7 @@ def syllable_facts() -> dict[str, Any]:
     return tables.read_toml(tables.text_of("syllables.toml"), "syllables.toml")
 
 
+@lru_cache(maxsize=4096)  # a text says the same words again and again
 def units(word: str, language: str) -> int:
     """How many vowel units a word lasts; at least 1. Digits count by their names.
 

@@ -1,0 +1,57 @@
+"""What the knowledge of faces costs: medians in ms.
+
+python tests/benchmarks/knowledge.py
+"""
+
+from __future__ import annotations
+
+import random
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from realizer.animation.cooccurrence import cooccur
+from realizer.animation.targets import AU_NAMES
+from realizer.knowledge.enrich import Enricher
+from realizer.tables.cooccurrence import rules
+
+SENTENCES = (
+    "Are you really sure about it?", "This is nonsense!", "There was a terrible accident on the road.",
+    "Yes.", "I am not afraid of you, but of what comes after you.", "Go away!",
+    "The train leaves at nine and arrives at noon.",
+)  # fmt: skip
+
+
+def median(work: Callable[[], object], repeats: int = 15) -> float:
+    """Milliseconds; the first run, which fills caches, does not count."""
+    work()
+    spent = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - began)
+    return 1000 * statistics.median(spent)
+
+
+def main() -> None:
+    """Rules of co-occurrence on 250 frames, and a text of 1,000 words."""
+    dice = np.random.default_rng(1)
+    every = dice.random((len(AU_NAMES()), 250), np.float32)
+    few = np.where(dice.random((len(AU_NAMES()), 1)) < 0.2, every, 0).astype(np.float32)
+    for says, aus in (("all", every), ("a fifth", few)):
+        spent = median(lambda aus=aus: cooccur(aus, rules()))  # type: ignore[misc]
+        print(f"rules on 250 frames, {says} of {len(aus)} units up  {spent:6.3f} ms")
+    chosen = random.Random(1)
+    text = ""
+    while len(text.split()) < 1000:
+        text += chosen.choice(SENTENCES) + " "
+    block = Enricher().text(text)
+    placed = sum(bool(getattr(node, "because", None)) for node in block.behaviours)
+    spent = median(lambda: Enricher().text(text))
+    print(f"enrich {len(text.split())} words, {placed} expressions  {spent:6.1f} ms")
+
+
+if __name__ == "__main__":
+    main()
