@@ -12,6 +12,7 @@ from realizer.cli.check import check
 from realizer.cli.demo import demo
 from realizer.cli.doctor import doctor
 from realizer.cli.emotion import emotion
+from realizer.cli.enrich import enrich
 from realizer.cli.faces import faces
 from realizer.cli.lists import outputs, voices
 from realizer.cli.play import realize, schedule
@@ -36,13 +37,14 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     realizer schedule hello.bml            when every sync point falls
     realizer check hello.bml               every fault, with line and path
     realizer emotion guilty                what an emotion looks like, in FAPs or as a picture
+    realizer enrich "Are you sure?"        a text becomes BML with expressions
 
     DOC may be - for standard input. Settings may also come from REALIZER_* variables.
     """
     options.speak_up(context, quiet=quiet, verbose=verbose)
 
 
-for command in (serve, realize, schedule, check, emotion, faces, voices, outputs, doctor, demo):
+for command in (serve, realize, schedule, check, emotion, enrich, faces, voices, outputs, doctor, demo):
     options.loudness(command)
     cli.add_command(command)
 
