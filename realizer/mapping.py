@@ -7,11 +7,9 @@ from pathlib import Path
 
 from realizer.animation.mapping import FapMapping, standard
 from realizer.errors import FaceError, TableError
-from realizer.tables.mappings import FORMS, read_mapping
+from realizer.tables.mappings import own_file, read_mapping
 
 __all__ = ["mapping_of"]
-
-OWN = "au_to_fap"  # .txt or .csv: a face's own rows
 
 
 def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
@@ -32,13 +30,10 @@ def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
 
 @lru_cache(maxsize=16)
 def _mapping(folder: Path, file: Path | None) -> FapMapping:
-    own = [folder / f"{OWN}{form}" for form in FORMS if (folder / f"{OWN}{form}").is_file()]
-    if len(own) > 1:
-        raise FaceError(f"{folder}: wanted one of {' and '.join(path.name for path in own)}, got both")
     mapping = standard()
     try:
-        for path in own:
-            mapping = mapping.replaced(read_mapping(path), str(path))
+        if own := own_file(folder):
+            mapping = mapping.replaced(read_mapping(own), str(own))
     except TableError as error:
         raise FaceError(str(error)) from None
     return mapping.replaced(read_mapping(file), str(file)) if file else mapping

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.errors import FaceError
+from realizer.errors import FaceError, TableError
 from realizer.face.archive import read_arrays
 from realizer.face.basis import ARRAYS
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
 from realizer.face.load import MESH, folder_of, load_face, read_head
 from realizer.face.model import Face
 from realizer.tables import faps
+from realizer.tables.mappings import own_file, read_mapping
 
 __all__ = ["check_face"]
 
@@ -33,10 +34,11 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
         lambda: read_arrays(folder / "mesh.npz", MESH),
         lambda: read_features(folder / "features.csv"),
         lambda: read_arrays(folder / "fields.npz", ARRAYS),
+        lambda: _read_mapping(folder),
     ):
         try:
             read()
-        except FaceError as error:
+        except (FaceError, TableError) as error:
             faults.append(str(error))
     if faults:
         return tuple(faults)
@@ -55,6 +57,12 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     except FaceError as error:
         faults.append(str(error))
     return tuple(faults)
+
+
+def _read_mapping(folder: Path) -> None:
+    own = own_file(folder)
+    if own is not None:
+        read_mapping(own)
 
 
 def _mesh_faults(

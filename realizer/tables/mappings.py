@@ -22,12 +22,13 @@ from typing import Literal, TypeAlias, cast
 from realizer.errors import TableError
 from realizer.tables import AuToFap, action_units, au_to_fap, by_number, faps, nearest, read_csv
 
-__all__ = ["FORMS", "Units", "as_text", "read_mapping", "write_mapping"]
+__all__ = ["FORMS", "Units", "as_text", "own_file", "read_mapping", "write_mapping"]
 
 Side: TypeAlias = Literal["L", "R", ""]
 Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]
 Line: TypeAlias = tuple[int, AuToFap]
 FORMS = (".txt", ".csv")
+OWN = "au_to_fap"  # .txt or .csv: what a face has of its own
 COLUMNS = ("au", "side", "fap", "au_from", "au_to", "fap_from", "fap_to")
 NUMBERS = ("AU-start", "AU-end", "FAP-start", "FAP-end")
 
@@ -53,6 +54,18 @@ def read_mapping(path: Path) -> Units:
         for side in _sides_of(row):
             units[row.au, side].append((number, replace(row, side=side)))
     return {key: _joined(found, path) for key, found in sorted(units.items())}
+
+
+def own_file(folder: Path) -> Path | None:
+    """The file of a face folder that holds the face's own mapping; None where it has none.
+
+    Raises:
+        TableError: it has two.
+    """
+    own = [path for path in (folder / f"{OWN}{form}" for form in FORMS) if path.is_file()]
+    if len(own) > 1:
+        raise TableError(f"{folder}: wanted one of {' and '.join(path.name for path in own)}, got both")
+    return own[0] if own else None
 
 
 def write_mapping(path: Path, rows: Iterable[AuToFap], source: str) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from realizer.animation.mapping import FapMapping, standard
 from realizer.errors import FaceError, TableError
-from realizer.face import takes
+from realizer.face import check_face, takes
 from realizer.face.load import folder_of
 from realizer.mapping import mapping_of
 from realizer.pipeline import realize
@@ -62,6 +62,7 @@ def test_a_bad_file_is_named_with_its_line(own: Path) -> None:
     (own / "au_to_fap.txt").write_text("26\n3 0 1 0 jaw\n", "utf-8")
     with pytest.raises(FaceError, match=r"own/au_to_fap.txt, line 2: FAP-end"):
         mapping_of("own")
+    assert any("own/au_to_fap.txt, line 2: FAP-end" in fault for fault in check_face("own"))
     with pytest.raises(TableError, match=r"own/au_to_fap.txt, line 2: FAP-end"):
         mapping_of("default", own / "au_to_fap.txt")
 
