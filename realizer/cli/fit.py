@@ -11,6 +11,7 @@ from realizer.errors import FaceError
 __all__: list[str] = []
 
 SHAPES = "au_shapes.npz"
+FORMS = ("published", "extended")
 
 
 @click.command()
@@ -27,18 +28,33 @@ SHAPES = "au_shapes.npz"
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder of the unpacked CC0 head data: take the shapes from there, keep them in the face's folder.",
 )
-@click.option("--form", type=click.Choice(["published", "extended"]), default="extended", show_default=True,
-              help="published: one or two Gaussians; extended: up to four.")  # fmt: skip
-@click.option("-o", "--output", required=True, metavar="FILE.toml", type=click.Path(path_type=Path))
-def fit(name: str, measurements: Path | None, data: Path | None, form: str, output: Path) -> None:
-    """Fit how action units move a face, and print how near it comes (Wojdel 2005, table 4.3)."""
+@click.option(
+    "--form",
+    type=click.Choice([*FORMS, "both"]),
+    help="published: one or two Gaussians; extended: up to four.  [default: both; extended for a FILE]",
+)
+@click.option("-o", "--output", metavar="FOLDER|FILE.toml", type=click.Path(path_type=Path),
+              help="Where au_FORM.toml goes, or one form's file.  [default: the face's folder]")  # fmt: skip
+@click.pass_context
+def fit(
+    context: click.Context,
+    name: str,
+    measurements: Path | None,
+    data: Path | None,
+    form: str | None,
+    output: Path | None,
+) -> None:
+    """Fit how action units move a face, and print how near it comes (Wojdel 2005, table 4.3).
+
+    The deformer au draws a face by the extended form. A face that was built anew is measured anew by --data.
+    """
     import os
 
     # Small products, thousands of them: a second thread only costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from realizer.face import load_face
     from realizer.face.au import (
-        fit_model,
+        fit_models,
         read_measured,
         read_shapes,
         table,
@@ -50,7 +66,8 @@ def fit(name: str, measurements: Path | None, data: Path | None, form: str, outp
 
     if measurements and data:
         raise click.UsageError("wanted --from or --data, got both")
-    folder, face = folder_of(name), load_face(name)
+    folder, face = folder_of(name), load_face(name, deformer="mpeg4")
+    files = _files(output or folder, form)
     source = face.source
     if data:
         from realizer.face.au.shapes import measure_shapes
@@ -71,9 +88,23 @@ def fit(name: str, measurements: Path | None, data: Path | None, form: str, outp
     def say(words: str) -> None:
         nonlocal done
         done += 1
-        click.echo(f"{done}/{len(measured)} {words}", err=True)
+        if not (context.obj or {}).get("quiet"):
+            click.echo(f"{done}/{len(measured)} {words}", err=True)
 
-    model = fit_model(face, measured, form, say, source)
-    write_model(output, model)
-    click.echo(table_text(table(model, measured)))
-    click.echo(f"{output}: written", err=True)
+    for kind, model in fit_models(face, measured, tuple(files), say, source).items():
+        write_model(files[kind], model)
+        click.echo(f"{kind} form\n{table_text(table(model, measured))}")
+        click.echo(f"{files[kind]}: written", err=True)
+
+
+def _files(output: Path, form: str | None) -> dict[str, Path]:
+    """Form -> the file that it goes to."""
+    if output.suffix == ".toml":
+        if form == "both":
+            raise click.BadParameter(f"wanted a folder for two forms, got {output}", param_hint="-o")
+        return {form or "extended": output}
+    if not output.is_dir():
+        raise click.BadParameter(
+            f"wanted a folder that is there, or FILE.toml, got {output}", param_hint="-o"
+        )
+    return {kind: output / f"au_{kind}.toml" for kind in FORMS if form in (None, "both", kind)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +12,14 @@ from realizer.errors import FaceError
 from realizer.face.au.measure import Measured
 from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.face.au.mouth import fit_mouth
-from realizer.face.au.solve import STILL, Fit
+from realizer.face.au.solve import STILL, Fit, Found
 from realizer.face.au.units import units
 from realizer.face.model import Face
 from realizer.tables import action_units
 
-__all__ = ["FORMS", "Row", "fit_model", "table", "table_text"]
+__all__ = ["FORMS", "Row", "fit_models", "table", "table_text"]
 
-FORMS = {"published": 2, "extended": 4}  # form -> most Gaussians of a density
+FORMS = ("published", "extended")  # one or two Gaussians; up to four
 MOVES = 0.01  # of the largest move: what moves less does not count as displaced
 NEAR = 0.01  # m around what is displaced; further off, one point in FAR shows whether anything leaks
 FAR = 4
@@ -45,49 +45,63 @@ class Row:
         return self.e / self.d_max
 
 
-def fit_model(
+def fit_models(
     face: Face,
     measured: Mapping[int, Measured],
-    form: str = "extended",
+    forms: Sequence[str] = FORMS,
     say: Callable[[str], None] = lambda _: None,
     source: str = "",
-) -> Model:
+) -> dict[str, Model]:
     """Fit the displacement units that were measured; the turns come from the face's own pivots.
 
-    Each function is fitted by its own cost first (4.8, 4.9), then both are polished together.
+    Each function is fitted by its own cost first (4.8, 4.9), then both are polished together. The extended
+    form grows out of the published one.
 
     Args:
-        form: "published" (one or two Gaussians) or "extended" (up to four).
+        forms: of "published" (one or two Gaussians) and "extended" (up to four).
         say: told of each action unit when it is done.
-        source: what was measured, for the model's head.
+        source: what was measured, for the models' heads.
+
+    Returns:
+        A model of each form.
 
     Raises:
         FaceError: an unknown form, or a measurement from which nothing can be fitted.
     """
-    if form not in FORMS:
-        raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
+    for form in forms:
+        if form not in FORMS:
+            raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
     mouth, jaw = fit_mouth(face), _jaw(face)
-    fitted: dict[int, UnitModel] = {}
+    fitted: dict[str, dict[int, UnitModel]] = {form: {} for form in forms}
     for au, one in measured.items():
-        fitted[au] = _fit_unit(one, mouth, FORMS[form])
-        if au in (26, 27):
-            fitted[au] = UnitModel(au, fitted[au].motions, _jaw_degrees(face, fitted[au], mouth, jaw))
-        say(f"AU{au}: e/d_max {_row(fitted[au], one, mouth).ratio:.3f}")
+        ratios = []
+        for form, unit in _fit_unit(one, mouth, forms).items():
+            if au in (26, 27):
+                unit = UnitModel(au, unit.motions, _jaw_degrees(face, unit, mouth, jaw))
+            fitted[form][au] = unit
+            ratios.append(f"{_row(unit, one, mouth).ratio:.3f}")
+        say(f"AU{au}: e/d_max {', '.join(ratios)}")
     by_number = {row.au: row for row in action_units()}
     left, right = (_triple(centre) for _, centre in face.basis["eyes"])
-    return Model(
-        form=form,
-        source=source or face.source,
-        licence=face.licence,
-        mouth=mouth,
-        head=_head(face),
-        eyes=(left, right),
-        jaw=jaw,
-        units=fitted,
-        degrees={
-            unit.au: by_number[unit.au].degrees for unit in units().values() if unit.kind != "displacement"
-        },
-    )
+    head = _head(face)
+    return {
+        form: Model(
+            form=form,
+            source=source or face.source,
+            licence=face.licence,
+            mouth=mouth,
+            head=head,
+            eyes=(left, right),
+            jaw=jaw,
+            units=fitted[form],
+            degrees={
+                unit.au: by_number[unit.au].degrees
+                for unit in units().values()
+                if unit.kind != "displacement"
+            },
+        )
+        for form in forms
+    }
 
 
 def table(model: Model, measured: Mapping[int, Measured]) -> tuple[Row, ...]:
@@ -121,7 +135,7 @@ def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
     )
 
 
-def _fit_unit(one: Measured, mouth: Mouth, most: int) -> UnitModel:
+def _fit_unit(one: Measured, mouth: Mouth, forms: Sequence[str]) -> dict[str, UnitModel]:
     # Her units are even: what was measured on one side holds for the other, so all of it is laid on the left.
     flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     at, moves = one.at * flip, one.moves * flip
@@ -132,26 +146,24 @@ def _fit_unit(one: Measured, mouth: Mouth, most: int) -> UnitModel:
     weight = np.where(one.seen, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
     # A point in the middle stands for itself alone, any other for its twin too.
     weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
-    if not units()[one.au].split:
-        return UnitModel(one.au, {"whole": _fit_motion(at, moves, weight, size, most)})
-    upper = mouth.upper(at) if one.upper is None else one.upper
-    return UnitModel(
-        one.au,
-        {
-            "upper": _fit_motion(at, moves, weight * upper, size, most),
-            "lower": _fit_motion(at, moves, weight * (1 - upper), size, most),
-        },
-    )
+    halves = {"whole": weight}
+    if units()[one.au].split:
+        upper = mouth.upper(at) if one.upper is None else one.upper
+        halves = {"upper": weight * upper, "lower": weight * (1 - upper)}
+    motions = {half: _fit_motion(at, moves, mine, size, forms) for half, mine in halves.items()}
+    return {form: UnitModel(one.au, {half: found[form] for half, found in motions.items()}) for form in forms}
 
 
-def _fit_motion(at: Float64, moves: Float64, weight: Float64, size: float, most: int) -> Motion:
+def _fit_motion(
+    at: Float64, moves: Float64, weight: Float64, size: float, forms: Sequence[str]
+) -> dict[str, Motion]:
     long = np.linalg.norm(moves, axis=1)
     here = weight > 1e-3
     moved = here & (long > MOVES * size)
     if not moved.any():  # this half keeps still
         bell = np.array([[0, 0, 0, 0, 1, 0, 1, 0, 0, 1.0]])
         still = np.zeros(19)
-        return Motion(np.zeros(3), bell, still, still)
+        return dict.fromkeys(forms, Motion(np.zeros(3), bell, still, still))
     low, high = at[moved].min(axis=0) - NEAR, at[moved].max(axis=0) + NEAR
     near = here & ((at > low) & (at < high)).all(axis=1)
     # What does not count in the table is there to keep the functions tame: a part of it does.
@@ -163,7 +175,14 @@ def _fit_motion(at: Float64, moves: Float64, weight: Float64, size: float, most:
     share = weight * long[use]
     origin = share @ at[use] / share.sum()
     origin[0] = 0
-    found = Fit((at[use] - origin) / CENTIMETRE, moves[use] / size, weight).best(most)
+    fit = Fit((at[use] - origin) / CENTIMETRE, moves[use] / size, weight)
+    found = {"published": fit.published()}
+    if "extended" in forms:
+        found["extended"] = fit.extended(found["published"])
+    return {form: _motion(origin, found[form], size) for form in forms}
+
+
+def _motion(origin: Float64, found: Found, size: float) -> Motion:
     gaussians = found.gaussians.copy()
     gaussians[:, 0] *= size
     return Motion(origin, gaussians, found.alpha, found.beta)

@@ -18,6 +18,7 @@ SOFT = 0.004  # of the largest move; a miss below it counts by its square, so th
 # Pull towards the start: too weak to change a fit to many points, it keeps what they do not decide from
 # running away; of few landmarks more is undecided.
 CALM, FEW = 1e-3, 5.0
+TINY = 1e-6  # of what is made least: what a step gains less is not worth taking
 # How often the weights of a sum of lengths are renewed: in the direction's cost, and in the joint one.
 ROUNDS = (4, 8)
 
@@ -65,42 +66,73 @@ def mirrored_gaussians(layout: str) -> Free:
     return Free(matrix, np.zeros(rows))
 
 
-LAYOUTS = {1: ("c",), 2: ("c", "cc", "p"), 4: ("p", "pcc", "pp")}
+PUBLISHED, EXTENDED = ("c", "cc", "p"), ("pp", "pcc")  # layouts tried from the start, others by growth
+MOST = 4  # Gaussians of the extended form
+WIDE = (0.6, 1.4)  # cm; how wide a Gaussian that is added begins
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a fit found: (k, 10) Gaussians, (19,) alpha and beta; what it costs."""
+    """What a fit found: a layout, free parameters of its Gaussians and of the angles; what it costs."""
 
-    gaussians: Float64
-    alpha: Float64
-    beta: Float64
+    layout: str
+    bells: Float64
+    angles: Float64
     cost: float
+
+    @property
+    def gaussians(self) -> Float64:
+        """(k, 10)."""
+        return mirrored_gaussians(self.layout)(self.bells).reshape(-1, GAUSSIAN)
+
+    @property
+    def alpha(self) -> Float64:
+        """(19,)."""
+        return mirrored_angles()[0](self.angles[:7])
+
+    @property
+    def beta(self) -> Float64:
+        """(19,)."""
+        return mirrored_angles()[1](self.angles[7:])
 
 
 def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, evaluations: int) -> Float64:
-    """The parameters that make the squares of the residual least; `residual` gives it and its derivatives."""
-    from scipy.optimize import least_squares
+    """The parameters that make the squares of the residual least; `residual` gives it and its derivatives.
 
-    calm = max(CALM, FEW / len(residual(start)[0])) * np.eye(len(start))
-    cache: dict[bytes, tuple[Float64, Float64]] = {}
+    Levenberg's and Marquardt's method on the normal equations, damped as Nielsen (1999) says: with some fifty
+    parameters and thousands of residuals many times quicker than one that factors the derivatives.
+    """
+    calm = max(CALM, FEW / len(residual(start)[0])) ** 2
 
-    def both(x: Float64) -> tuple[Float64, Float64]:
-        key = x.tobytes()
-        if key not in cache:
-            cache.clear()
-            value, by = residual(x)
-            cache[key] = np.concatenate([value, calm @ (x - start)]), np.concatenate([by, calm])
-        return cache[key]
+    def look(x: Float64) -> tuple[float, Float64, Float64]:
+        value, by = residual(x)
+        away = x - start
+        square = by.T @ by
+        square[np.diag_indices_from(square)] += calm
+        return float(value @ value + calm * away @ away), by.T @ value + calm * away, square
 
-    def miss(x: Float64) -> Float64:
-        return both(x)[0]
-
-    def slopes(x: Float64) -> Float64:
-        return both(x)[1]
-
-    found = least_squares(miss, start, slopes, method="lm", x_scale="jac", max_nfev=evaluations)
-    return np.asarray(found.x, np.float64)
+    x = start
+    cost, slope, square = look(x)
+    scale = np.diag(square).copy()
+    damping, growth = 1e-3, 2.0
+    for _ in range(evaluations):
+        step = np.linalg.solve(square + np.diag(damping * scale), -slope)
+        # What is promised: half the fall of the square model.
+        promised = float(step @ (damping * scale * step - slope))
+        if promised <= TINY * cost:
+            break
+        there, slope_there, square_there = look(x + step)
+        if there < cost:
+            gain = (cost - there) / promised
+            small = cost - there <= TINY * cost
+            x, cost, slope, square = x + step, there, slope_there, square_there
+            scale = np.maximum(scale, np.diag(square))
+            damping, growth = damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), 2.0
+            if small:
+                break
+        else:
+            damping, growth = damping * growth, growth * 2
+    return np.asarray(x, np.float64)
 
 
 def lengths(miss: Float64, weight: Float64) -> Float64:
@@ -200,24 +232,42 @@ class Fit:
                 best, cost = (x, now) if now < cost else (best, cost)
                 break
             best, cost = x, now
-        return Found(
-            form(best[:split]).reshape(-1, GAUSSIAN),
-            self.alpha(best[split : split + 7]),
-            self.beta(best[split + 7 :]),
-            cost,
-        )
+        return Found(layout, best[:split], best[split:], cost)
 
-    def best(self, most: int, say: Callable[[str], None] = lambda _: None) -> Found:
-        """The best of the layouts with up to `most` Gaussians (2: her published form)."""
+    def published(self) -> Found:
+        """The best of one or two Gaussians."""
         ways = self.directions()
         ways = [ways[0], *(one for one in ways[1:] if one[1] > ways[0][1] * 1.02)][:2]
-        found = []
-        for layout in LAYOUTS[most]:
-            bells, _ = self.densities(layout)
-            for angles, _ in ways if len(layout) < 3 else ways[:1]:
-                found.append(self.joint(layout, bells, angles))
-                say(f"{layout} {found[-1].cost:.3f}")
+        found = [
+            self.joint(layout, self.densities(layout)[0], angles)
+            for layout in PUBLISHED
+            for angles, _ in ways
+        ]
+        found += [self.joint(*start) for one in found[: len(ways)] for start in self._grown(one, 2)]
         return min(found, key=lambda one: one.cost)
+
+    def extended(self, published: Found) -> Found:
+        """The best of up to four Gaussians: some added where most is missing, or four from the start."""
+        found = [self.joint(layout, self.densities(layout)[0], published.angles) for layout in EXTENDED]
+        grown = published
+        while len(grown.gaussians) < MOST:
+            more = min((self.joint(*start) for start in self._grown(grown, MOST)), key=lambda one: one.cost)
+            if more.cost >= grown.cost:
+                break
+            grown = more
+        return min([*found, grown], key=lambda one: one.cost)
+
+    def _grown(self, found: Found, most: int) -> Iterator[tuple[str, Float64, Float64]]:
+        """Starts with one more Gaussian, or one more on each side, at the point that lacks most."""
+        way = self._way(found.angles, self.at)[0]
+        lack = np.einsum("ij,ij->i", self.moves, way) - density(found.gaussians, self.at)[0]
+        worst = int(np.argmax(self.weight * np.abs(lack)))
+        high, (x, y, z) = lack[worst] / 2, self.at[worst]
+        pair = len(found.gaussians) + 2 <= most
+        for wide in WIDE:
+            root = (1 / wide, 0, 1 / wide, 0, 0, 1 / wide)
+            more = (high, x, y, z, *root) if pair else (high, y, z, 1 / wide, 1 / wide, 0, 1 / wide)
+            yield found.layout + ("p" if pair else "c"), np.append(found.bells, more), found.angles
 
     def _way(self, x: Float64, at: Float64) -> tuple[Float64, Float64]:
         """Directions (n, 3) and their derivatives (n, 3, 20) by the free parameters."""

@@ -12,7 +12,7 @@ from realizer.errors import FaceError
 from realizer.face import list_faces, load_face
 from realizer.face.au import (
     Model,
-    fit_model,
+    fit_models,
     read_measured,
     read_model,
     read_shapes,
@@ -51,7 +51,7 @@ def test_a_unit_that_her_form_can_show_is_found_again_from_landmarks(known: Mode
     path.write_text(landmarks(known, (1, 15)))
     measured = read_measured(path)
     told: list[str] = []
-    model = fit_model(load_face(), measured, "published", told.append)
+    model = fit_models(load_face(), measured, ("published",), told.append)["published"]
     rows = table(model, measured)
     assert [row.au for row in rows] == [1, 15]
     assert max(row.ratio for row in rows) < 0.02, table_text(rows)
@@ -73,6 +73,15 @@ def test_the_table_is_hers(known: Model) -> None:
         assert row.n > 100
 
 
+def test_more_gaussians_come_nearer() -> None:
+    folder = next(info.path for info in list_faces() if info.name == load_face().name)
+    shapes = read_shapes(folder / "au_shapes.npz")
+    models = fit_models(load_face(), {1: shapes[1]})
+    (few,), (many,) = (table(models[form], {1: shapes[1]}) for form in ("published", "extended"))
+    assert many.ratio < 0.95 * few.ratio
+    assert len(models["extended"].units[1].motions["whole"].gaussians) <= 4
+
+
 def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
     (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,)))
     command = [sys.executable, "-m", "realizer", "faces", "fit", "default", "--from", "landmarks.csv"]
@@ -88,6 +97,39 @@ def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path:
     assert "e/d_max" in done.stdout
     assert "1/1 AU2" in done.stderr
     assert set(read_model(tmp_path / "mine.toml").units) == {2}
+
+
+@pytest.mark.parametrize(
+    ("words", "files"),
+    [
+        ([], ["au_published.toml", "au_extended.toml"]),
+        (["--form", "extended"], ["au_extended.toml"]),
+        (["--form", "both"], ["au_published.toml", "au_extended.toml"]),
+    ],
+)
+def test_the_command_writes_a_file_for_each_form(
+    known: Model, tmp_path: Path, words: list[str], files: list[str]
+) -> None:
+    from click.testing import CliRunner
+
+    from realizer.cli.fit import fit
+
+    (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,), 30))
+    given = ["default", "--from", str(tmp_path / "landmarks.csv"), "-o", str(tmp_path)]
+    done = CliRunner().invoke(fit, [*given, *words], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in tmp_path.glob("*.toml")) == sorted(files)
+
+
+@pytest.mark.parametrize("output", ["mine.toml", "nowhere"])
+def test_two_forms_want_a_folder_that_is_there(tmp_path: Path, output: str) -> None:
+    from click.testing import CliRunner
+
+    from realizer.cli.fit import fit
+
+    done = CliRunner().invoke(fit, ["default", "--form", "both", "-o", str(tmp_path / output)])
+    assert done.exit_code == 2
+    assert "wanted a folder" in done.output
 
 
 def test_a_face_without_shapes_says_what_to_give(tmp_path: Path) -> None:
@@ -128,7 +170,7 @@ def test_bad_measurements_are_refused_with_their_place(text: str, words: str, tm
 
 def test_an_unknown_form_is_refused() -> None:
     with pytest.raises(FaceError, match="published, extended"):
-        fit_model(load_face(), {}, "secret")
+        fit_models(load_face(), {}, ("secret",))
 
 
 def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
