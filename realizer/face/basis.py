@@ -11,6 +11,7 @@ import numpy as np
 from realizer.arrays import Float32, Int32
 from realizer.errors import FaceError
 from realizer.face.archive import read_arrays
+from realizer.face.contours import contours_of
 from realizer.face.model import Fapu
 from realizer.tables import faps
 
@@ -51,6 +52,7 @@ def basis_from(
         head: (n, 1) float32 0..1; head_pivot: (3,).
         chin: (2,) float64, y and z of 2.1 about the jaw's axis.
         eyes: ((first, last + 1), (3,) centre) for left and right; thrust: metres per FAPU of 27 and 28.
+        contours: which FAPs of the lips hold together.
         lid, lid_eye, lid_radius: (k,) each.
 
     Raises:
@@ -93,6 +95,7 @@ def basis_from(
         ),
         "thrust": np.float32(fapu.metres("ES")),
         "open_jaw": np.float64(fapu.metres("MNS")),
+        "contours": contours_of(points, fapu),
         "lid": stored["lid"].astype(np.int32),
         "lid_eye": stored["lid_eye"].astype(np.int32),
         "lid_radius": stored["lid_radius"].astype(np.float32),

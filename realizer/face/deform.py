@@ -9,6 +9,7 @@ import numpy as np
 from realizer.arrays import Bool, Float32, Float64
 from realizer.face.au.deformer import moves_of
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
+from realizer.face.contours import together
 from realizer.face.model import Face
 from realizer.units import ANGLE_UNIT
 
@@ -100,7 +101,7 @@ def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
 def _weights(basis: Any, rows: Float32) -> Float32:
     """(n, 73): what the rows of the basis are multiplied by."""
     weights = np.zeros((len(rows), ROWS), np.float32)
-    weights[:, 2:FAPS] = rows[:, 2:]
+    weights[:, 2:FAPS] = together(basis["contours"], rows)[:, 2:]
     weights[:, DRIVEN] = 0
     jaw, slid = jaw_pose(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
     weights[:, JAW_COS], weights[:, JAW_SIN] = 1 - np.cos(jaw), np.sin(jaw)

@@ -9,13 +9,19 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
+from realizer.face.contours import CONTOURS, contours_of, together
 from realizer.face.ground import FORWARD, LEFT, UP, Ground, scaled
 from realizer.face.lids import lid_fields
 from realizer.face.lips import Lips, lip_fields
+from realizer.face.mpeg4.reach import usual
 from realizer.face.parts import smooth
+from realizer.face.untangle import untangled
 from realizer.tables import faps
 
 __all__: list[str] = []
+
+PASSES = 2  # neighbours that were mended change what a field has to fit
+LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
 
 
 def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:
@@ -29,7 +35,37 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     fields |= _nose(ground, lips)
     fields |= _ears(ground)
     fields |= _tongue(ground)
-    return _mirrored(ground, fields), lips
+    return _untangled(ground, _mirrored(ground, fields)), lips
+
+
+def _untangled(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
+    """The fields without triangles that turn over at what is usual of their FAPs; points keep their moves."""
+    table, fapu = faps(), ground.fapu()
+    quads = ground.mesh.quads["body"]
+    near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
+    triangles = np.concatenate([near[:, [0, 1, 2]], near[:, [0, 2, 3]]]).astype(np.int32)
+    fixed = list(ground.points.values())
+    contours = contours_of({name: np.asarray(ground.point(name), np.float32) for name in ground.points}, fapu)
+    partner = {**CONTOURS, **{outer: inner for inner, outer in CONTOURS.items()}}
+    for _ in range(PASSES):
+        for number in sorted(n for n in fields if n <= FAPS):
+            row, plays = table[number - 1], []
+            if not np.abs(fields[number][ground.body]).any():
+                continue
+            for sign in (1, -1) if row.least < 0 else (1,):
+                asked = np.zeros((2, FAPS), np.float32)
+                asked[:, number - 1] = sign * usual(number, sign)
+                # A contour of the lips drags the other one along, or goes together with it.
+                asked[1, partner.get(number, number) - 1] = asked[0, number - 1]
+                for values in together(contours, asked):
+                    along = np.zeros_like(ground.at)
+                    for k in np.flatnonzero(values).tolist():
+                        if k != number - 1:
+                            along += float(values[k]) * fapu.metres(table[k].unit) * fields[k + 1]
+                    plays.append((float(values[number - 1]) * fapu.metres(row.unit), along))
+            fields[number] = untangled(fields[number], ground.at, triangles, plays, fixed)
+        fields = _mirrored(ground, fields)
+    return fields
 
 
 def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:

@@ -9,7 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from realizer.arrays import Float64
+from realizer.face.features import fapu_of
 from realizer.face.hm08 import BaseMesh
+from realizer.face.model import Fapu
 
 __all__: list[str] = []
 
@@ -43,6 +45,13 @@ class Ground:
     def point(self, name: str) -> Float64:
         """Where a feature point lies, (3,) metres."""
         return np.asarray(self.at[self.points[name]])
+
+    def fapu(self) -> Fapu:
+        """The person's distances; pupils stand before the middle of the lids."""
+        places = {name: np.asarray(self.at[vertex], np.float32) for name, vertex in self.points.items()}
+        for name, high, low in (("3.5", "3.1", "3.3"), ("3.6", "3.2", "3.4")):
+            places[name] = np.asarray((places[high] + places[low]) / 2, np.float32)
+        return fapu_of(places)
 
     def smoothed(self, field: Float64, times: int = 1) -> Float64:
         """A field on the body with its kinks softened."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from realizer.arrays import Float64
@@ -12,6 +14,8 @@ __all__: list[str] = []
 
 # Two vertices each of the rings around the left eye, from the edge of the lid outwards.
 RINGS = ((13352, 13369), (6785, 6844), (11465, 11485), (6787, 6845), (6789, 6846), (11515, 11493))
+
+DEEP, LINING = 6, 0.85  # rings of the lining that follow the edge, and how much each does of the one before
 
 
 class Lid:
@@ -39,8 +43,8 @@ class Lid:
             rings = [[int(i) for i in twin[ring]] for ring in rings]
         self.rings = rings
         edge = rings[0]
-        inner = min(edge, key=lambda i: float(at[i, 0] * side))
-        outer = max(edge, key=lambda i: float(at[i, 0] * side))
+        # The ring is widest a little above the corner where the lids meet.
+        inner, outer = (ground.points[name] for name in (("3.11", "3.7") if side > 0 else ("3.8", "3.12")))
         self.inner, self.outer = inner, outer
         one, other = self._halves(edge, inner, outer)
         self.upper, self.lower = (one, other) if at[one, 1].mean() > at[other, 1].mean() else (other, one)
@@ -49,6 +53,36 @@ class Lid:
         x = np.linspace(at[inner, 0] * side, at[outer, 0] * side, 60)
         high, low = (np.interp(x, at[row, 0] * side, at[row, 1]) for row in (self.upper, self.lower))
         self.x, self.high, self.low = x, high, low
+
+    def followers(self, ground: Ground) -> tuple[dict[int, int], list[tuple[int, list[int], int]]]:
+        """What goes with each vertex of the edge.
+
+        Returns:
+            vertex of a ring -> the edge's vertex that it lies behind; and of the lids' lining, inwards:
+            (vertex, those that it follows, how many steps from the edge).
+        """
+        near = ground.average
+        beside = {
+            int(i): {int(j) for j in near.indices[near.indptr[i] : near.indptr[i + 1]]}
+            for i in np.flatnonzero(np.linalg.norm(ground.at - ground.at[self.inner], axis=1) < 0.06)
+        }
+        leader = {vertex: vertex for vertex in self.rings[0]}
+        for last, ring in pairwise(self.rings):
+            for vertex in ring:
+                # Behind a corner several meet: the nearest one leads.
+                found = [other for other in last if other in beside[vertex]] or last
+                away = ((ground.at[found] - ground.at[vertex]) ** 2).sum(axis=1)
+                leader[vertex] = leader[found[int(np.argmin(away))]]
+        known, front, lining = set(leader), list(self.rings[0]), []
+        for depth in range(1, DEEP + 1):
+            inwards: dict[int, list[int]] = {}
+            for vertex in front:
+                for other in beside[vertex] - known:
+                    inwards.setdefault(other, []).append(vertex)
+            lining += [(vertex, parents, depth) for vertex, parents in inwards.items()]
+            known |= set(inwards)
+            front = list(inwards)
+        return leader, lining
 
     @staticmethod
     def _halves(ring: list[int], inner: int, outer: int) -> tuple[list[int], list[int]]:
@@ -61,6 +95,15 @@ class Lid:
         return np.asarray(
             np.interp(x * self.side, self.x, np.maximum(self.high - self.low, 0), left=0, right=0)
         )
+
+    def gap_of(self, at: Float64, upper: bool) -> Float64:
+        """Metres from each vertex of the upper (lower) edge straight to the other edge."""
+        mine, other = (self.upper, self.lower) if upper else (self.lower, self.upper)
+        x, order = at[other, 0] * self.side, np.argsort(at[other, 0] * self.side, kind="stable")
+        there = np.interp(at[mine, 0] * self.side, x[order], at[other, 1][order])
+        out = np.maximum((at[mine, 1] - there) * (1 if upper else -1), 0)
+        out[[0, -1]] = 0
+        return np.asarray(out)
 
     def middle(self, x: Float64) -> Float64:
         """Height half-way between the lids at x."""
@@ -80,13 +123,22 @@ def lid_fields(ground: Ground) -> dict[int, Float64]:
         above = at[:, 1] > lid.middle(at[:, 0])
         edge_x = np.clip(at[:, 0] * side, lid.x[0], lid.x[-1]) * side
         gap = lid.gap(edge_x) / lid.aperture
+        ringed, lining = lid.followers(ground)
         # A ball that is pushed out takes the lids along; nothing else on the face does.
-        ball = ground.ellipsoid(centre + FORWARD * 0.002, (0.036, 0.026, 0.034), 0.55)
-        out[27 if side > 0 else 28] = ground.smoothed(ball, 1)[:, None] * FORWARD
+        ball = ground.ellipsoid(centre + FORWARD * 0.002, (0.027, 0.021, 0.034), 0.50)
+        out[27 if side > 0 else 28] = ground.smoothed(ball, 2)[:, None] * FORWARD
         # How much of the edge's way a vertex goes: by how far above (below) the edge it lies; the CC0 blink
         # says where the lid ends.
         for number, name, upper in ((numbers[0], names[0], True), (numbers[1], names[1], False)):
             row = lid.upper if upper else lid.lower
+            edge = np.zeros(len(at))
+            edge[row] = lid.gap_of(at, upper) / lid.aperture
+            # Near the corners the opening grows steeply: what lies beyond an edge's vertex goes with that
+            # vertex, not with whatever happens to lie at its own x.
+            led, mine = gap.copy(), above if upper else ~above
+            for vertex, leader in ringed.items():
+                led[vertex] = edge[leader]
+                mine[vertex] = leader in row
             edge_y = np.interp(at[:, 0] * side, at[row, 0] * side, at[row, 1])
             off = (at[:, 1] - edge_y) * (1 if upper else -1)
             reach = 0.0105 if upper else 0.013
@@ -97,19 +149,23 @@ def lid_fields(ground: Ground) -> dict[int, Float64]:
             # Beyond the corners the pull dies away.
             past = np.maximum(lid.x[0] - at[:, 0] * side, at[:, 0] * side - lid.x[-1])
             share = share * smooth(past, 0.006, -0.002)
-            side_of = above if upper else ~above
             deep = ground.ellipsoid(centre, (0.045, 0.045, 0.030), 0.6)
-            weight = np.where(here & side_of, share * gap, 0) * deep
-            soft = ground.smoothed(weight, 2)
-            fixed = np.zeros(len(at), bool)
-            for ring in lid.rings[:2]:
-                fixed[ring] = True
-            weight = np.where(fixed, weight, soft)
-            for ring in lid.rings[:2]:
-                for vertex in ring:
-                    belongs = above[vertex] if upper else not above[vertex]
-                    weight[vertex] = gap[vertex] if belongs else 0.0
+            weight = np.where(here & mine, share * led, 0) * deep
+            weight = _edged(ground.smoothed(weight, 2), edge, lid, ringed, lining)
             out[number] = scaled(
                 weight[:, None] * (-UP if upper else UP), ground.points[name], -UP if upper else UP
             )
+    return out
+
+
+def _edged(
+    weight: Float64, edge: Float64, lid: Lid, ringed: dict[int, int], lining: list[tuple[int, list[int], int]]
+) -> Float64:
+    """The weight with the lid's edge, its front and its lining moving as one: a lid has a thickness."""
+    out = weight.copy()
+    out[lid.rings[0]] = edge[lid.rings[0]]
+    for vertex in lid.rings[1]:
+        out[vertex] = edge[ringed[vertex]]
+    for vertex, parents, depth in lining:
+        out[vertex] = out[parents].mean() * LINING**depth
     return out

@@ -23,9 +23,6 @@ UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
 LIDS = {"3.1": "3.3", "3.3": "3.1", "3.2": "3.4", "3.4": "3.2"}
-# A lip has an inner and an outer contour, millimetres apart: nobody moves one far through the other.
-CONTOURS = {4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60}
-PARTNERS = CONTOURS | {outer: inner for inner, outer in CONTOURS.items()}
 INNER = 0.30  # baked occlusion under which the skin is behind the lips or in a socket
 
 
@@ -34,7 +31,6 @@ class Measure:
     face: Face
     skin: slice
     triangles: Any  # of the skin
-    open: Bool  # (triangles of the skin,) seen from outside
     seen: Bool  # (vertices of the skin,)
     average: Any  # (skin, skin) sparse: the mean of the neighbours
     twin: Any  # (skin,)
@@ -57,10 +53,9 @@ class Measure:
         near.data[:] = 1
         count = np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)
         seen: Bool = np.asarray(face.occlusion[first:last] >= INNER)
-        outside: Bool = np.asarray(seen[mine].any(axis=1))
         paired: Bool = np.asarray(off < 3e-4)
         return cls(
-            face, slice(first, last), mine, outside, seen,
+            face, slice(first, last), mine, seen,
             sp.diags_array(1 / count) @ near, twin, paired,
         )  # fmt: skip
 
@@ -175,19 +170,17 @@ def others_of(measure: Measure, row: Fap, asked: list[float], moves: list[Float6
     )
 
 
-def flips_of(measure: Measure, row: Fap, value: float) -> float:
+def flips_of(measure: Measure, row: Fap, values: dict[int, float]) -> float:
     """Share of the moved skin that turns over; turning parts turn theirs rightly."""
     if row.unit == "angle_unit":
         return 0.0
-    values = {row.fap: value} | ({PARTNERS[row.fap]: value} if row.fap in PARTNERS else {})
-    corners = measure.triangles[measure.open]
+    corners = measure.triangles
     rest, now = (
         _ups(at[measure.skin][corners]) for at in (measure.face.vertices.astype(float), measure.at(values))
     )
     area = np.linalg.norm(rest, axis=1)
     moved = np.abs(rest - now).max(axis=1) > 1e-3 * area
-    # What shrinks to a hair's breadth has no side: a turn has to be past a right angle.
-    turned = (rest * now).sum(axis=1) < -0.2 * area * np.linalg.norm(now, axis=1)
+    turned = (rest * now).sum(axis=1) < 0
     return float(area[turned].sum() / max(area[moved].sum(), 1e-12))
 
 

@@ -12,7 +12,8 @@ from importlib.resources import files
 
 from realizer.face.model import Face
 from realizer.face.mpeg4.measure import Measure, error_of, flips_of, mirror_of, others_of, rough_of
-from realizer.tables import Fap, au_to_fap, faps, read_csv
+from realizer.face.mpeg4.reach import company, usual
+from realizer.tables import Fap, faps, read_csv
 
 __all__ = ["PEERS", "Truth", "face_truth", "mean_score"]
 
@@ -20,12 +21,9 @@ __all__ = ["PEERS", "Truth", "face_truth", "mean_score"]
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 
 HALF, TURN = 512.0, 20000.0  # FAPU, angle units: half a face distance is what Paul looked at
-# Where no action unit asks for a FAP: what faces reach, in its own unit.
-REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "angle_unit": 20000.0}
-EYEBALLS_OUT = 30.0  # ES: 2 mm
-PUPIL = 150.0  # IRISD: 1.5 mm wider or narrower; half an iris would shut a pupil
-# For scores 3 and 2: error, mirror, others, share of triangles that flip, roughness; and for 1: error.
-RIGHT = (0.02, 0.01, 0.05, 0.0, 0.25)
+# For scores 3 and 2: error, mirror, others, share of area that flips, roughness; and for 1: error.
+# A hundredth of a percent of the moved skin is less than a pixel.
+RIGHT = (0.02, 0.01, 0.05, 1e-4, 0.25)
 ODD = (0.25, 0.15, 0.25, 0.02, 0.45)
 KNOWN = 0.75
 
@@ -39,8 +37,9 @@ class Truth:
         error: how far the feature point's move along its way (or the angle, or the pupil's width) is off.
         mirror: the largest difference from the twin's mirror image, of the largest move.
         others: the largest move of a point that must stay (the opposite lip or lid; FAP 3: all lips).
-        flips: the share (by area) of the moved open skin whose triangles turn over at the most that is
-            usual; both contours of a lip are moved there.
+        flips: the share (by area) of the moved skin, mouth and sockets too, whose triangles turn by more
+            than a right angle at the most that is usual, alone or with all that the action unit asks for
+            that asks most of it.
         rough: 95th percentile, over the open skin that moves by more than 5 % of the largest move, of how
             far a vertex's move is from the mean of its neighbours', of the largest move.
         usual: the most that is usual, in the FAP's own unit.
@@ -97,18 +96,6 @@ def _weights() -> dict[int, int]:
     return {row.fap: row.weight for row in read_csv(text, _Weight, "weights.csv")}
 
 
-@cache
-def usual(fap: int, sign: int) -> float:
-    """The most that is usual of a FAP in a direction (its own unit, positive): what an action unit asks."""
-    row = faps()[fap - 1]
-    asked = [sign * value for r in au_to_fap() if r.fap == fap for value in (r.fap_from, r.fap_to)]
-    most = max(asked, default=0.0)
-    if most <= 0:
-        most = EYEBALLS_OUT if row.name.endswith("eyeball") and row.unit == "ES" else REACH[row.unit]
-        most = PUPIL if row.direction == "growing" else most
-    return float(min(most, row.most if sign > 0 else -row.least))
-
-
 def _truth(measure: Measure, row: Fap, sign: int) -> Truth:
     top = usual(row.fap, sign)
     half = TURN if row.unit == "angle_unit" else min(HALF, row.most if sign > 0 else -row.least)
@@ -125,7 +112,9 @@ def _truth(measure: Measure, row: Fap, sign: int) -> Truth:
         error=max(error_of(measure, row, v, m) for v, m in zip(asked, moves, strict=True)),
         mirror=mirror_of(measure, row, moves[0], measure.moves({row.mirror: value * row.sign})),
         others=others_of(measure, row, asked, moves),
-        flips=flips_of(measure, row, sign * top),
+        flips=max(
+            flips_of(measure, row, values) for values in ({row.fap: sign * top}, company(row.fap, sign))
+        ),
         rough=rough_of(measure, row, moves[0][measure.skin]),
         usual=top,
     )

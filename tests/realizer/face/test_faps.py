@@ -56,13 +56,6 @@ def usual(row: Fap) -> float:
     return min(reach, row.most)
 
 
-def whole(row: Fap, value: float) -> dict[int, float]:
-    """The FAP, and for a lip corner its other contour: nobody moves one through the other."""
-    partners = {6: 53, 7: 54, 12: 59, 13: 60}
-    partners |= {b: a for a, b in partners.items()}
-    return {row.fap: value} | ({partners[row.fap]: value} if row.fap in partners else {})
-
-
 def both(row: Fap) -> list[float]:
     return [usual(row)] if row.least == 0 else [usual(row), -usual(row)]
 
@@ -228,7 +221,7 @@ def test_no_triangle_of_the_skin_flips_at_usual_values(face: Face, row: Fap) -> 
         # The head's turn turns triangles: compare what is left when it is taken away.
         if row.name.startswith("head"):
             continue
-        now = ups(deform(face, rows(whole(row, v)))[0].astype(float))
+        now = ups(deform(face, rows({row.fap: v}))[0].astype(float))
         flipped = (rest * now).sum(axis=1) < -0.2 * np.linalg.norm(rest, axis=1) * np.linalg.norm(now, axis=1)
         assert not (flipped & ~inside).any(), np.flatnonzero(flipped & ~inside)[:10]
     assert first == 0

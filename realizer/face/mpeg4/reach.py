@@ -1,0 +1,54 @@
+"""A FAP and a direction in, the most that is usual of it out: what action units ask, or what faces reach."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from realizer.tables import au_to_fap, faps
+
+__all__ = ["company", "usual"]
+
+# Where no action unit asks for a FAP: what faces reach, in its own unit.
+REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "angle_unit": 20000.0}
+EYEBALLS_OUT = 30.0  # ES: 2 mm
+PUPIL = 150.0  # IRISD: 1.5 mm wider or narrower; half an iris would shut a pupil
+OPEN_JAW = 3
+ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what goes down with it: the lower lip and the corners
+
+
+@cache
+def usual(fap: int, sign: int) -> float:
+    """The most that is usual of a FAP alone in a direction (its own unit, positive).
+
+    A lower lip hangs on its jaw: what an action unit asks for as far as it opens the jaw does not count.
+    """
+    row = faps()[fap - 1]
+    most = max((_asked(fap, sign, au) for au in _units()), default=0.0)
+    if most <= 0:
+        most = EYEBALLS_OUT if row.name.endswith("eyeball") and row.unit == "ES" else REACH[row.unit]
+        most = PUPIL if row.direction == "growing" else most
+    return float(min(most, row.most if sign > 0 else -row.least))
+
+
+@cache
+def company(fap: int, sign: int) -> dict[int, float]:
+    """What the action unit that asks most of a FAP in a direction asks of all FAPs; empty where none does."""
+    strongest = max(_units(), key=lambda au: sign * _units()[au].get(fap, 0.0))
+    whole = _units()[strongest]
+    return dict(whole) if sign * whole.get(fap, 0.0) > 0 else {}
+
+
+def _asked(fap: int, sign: int, au: str) -> float:
+    asked = sign * _units()[au].get(fap, 0.0)
+    return asked - _units()[au].get(OPEN_JAW, 0.0) if fap in ON_JAW and sign < 0 else asked
+
+
+@cache
+def _units() -> dict[str, dict[int, float]]:
+    """Action unit -> FAP -> what it asks for at intensity 1, both sides."""
+    out: dict[str, dict[int, float]] = {}
+    for row in au_to_fap():
+        mine = out.setdefault(str(row.au), {})
+        if abs(row.fap_to) > abs(mine.get(row.fap, 0.0)):
+            mine[row.fap] = float(row.fap_to)
+    return out
