@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from realizer.arrays import Float32, Int32
@@ -36,6 +38,24 @@ class Glints:
         caps = [cap + k * (ROUND + 1) for k in range(len(self._eyes))]
         self.triangles: Int32 = np.concatenate([np.zeros((0, 3), np.int64), *caps]).astype(np.int32)
 
+    def to_json(self) -> dict[str, Any]:
+        """The eyes as plain numbers, for whoever draws the face's vertices and its own glints.
+
+        A cap's middle is towards key + `Light.glint` x the camera, its edge `Light.glint_width` away; its
+        points lie `radius` from the centre, which is the sum of the weights times the vertices from `first`.
+        """
+        return {
+            "corners": ROUND,
+            "eyes": [
+                {
+                    "first": ball.first,
+                    "weights": [round(float(w), 6) for w in ball.weights],
+                    "radius": round(float(ball.radius) * LIFT, 7),
+                }
+                for ball in self._eyes
+            ],
+        }
+
     def __call__(self, vertices: Float32) -> Float32:
         """(n, 3) float32 metres, of the head's (n_vertices, 3)."""
         caps = [ball.centre(vertices) + self._directions * ball.radius * LIFT for ball in self._eyes]
@@ -54,11 +74,11 @@ class _Ball:
         found = np.linalg.lstsq(columns, (local**2).sum(axis=1), rcond=None)[0]
         centre = found[:3]
         mixture = np.vstack([local.T, np.ones(len(local))])
-        self._weights = np.linalg.lstsq(mixture, [*centre, 1.0], rcond=None)[0].astype(np.float32)
+        self.weights: Float32 = np.linalg.lstsq(mixture, [*centre, 1.0], rcond=None)[0].astype(np.float32)
         # Where eyes bulge over the iris, the bulge counts.
         self.radius = np.float32(np.linalg.norm(local - centre, axis=1).max())
-        self._range = slice(first, last)
+        self.first, self._range = first, slice(first, last)
 
     def centre(self, vertices: Float32) -> Float32:
-        centre: Float32 = self._weights @ vertices[self._range]
+        centre: Float32 = self.weights @ vertices[self._range]
         return centre

@@ -76,6 +76,25 @@ class Wrinkles:
         self.triangles: Int32 = _joined(triangles, (0, 3)).astype(np.int32)
         self.count = first
 
+    def to_json(self) -> dict[str, Any]:
+        """The furrows as plain numbers, for whoever draws the face's vertices; as `__call__` uses them.
+
+        `points` are three vertices and the weights of the first two, `drives` two vertices, their distance at
+        rest and the changes at which a furrow begins and is deepest, `tones` [drive, tone] pairs a point.
+        """
+        corners = np.hstack([self._corners, np.round(self._weights[:, :2, 0], 4)])
+        return {
+            "lift": float(self._lift),
+            "shade": SHADE.tolist(),
+            "drives": [[d.a, d.b, d.rest, d.start, d.full] for d in self._drives],
+            "points": corners.tolist(),
+            "tones": [
+                [[int(k), round(float(tone[k]), 4)] for k in np.flatnonzero(np.abs(tone) > 5e-5)]
+                for tone in self._tone
+            ],
+            "triangles": self.triangles.ravel().tolist(),
+        }
+
     def __call__(self, vertices: Float32, normals: Float32, colours: Float32) -> tuple[Float32, Float32]:
         """(count, 3) points in metres and (count, 3) sRGB 0..1, of the head's vertices, normals and colours.
 

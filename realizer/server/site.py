@@ -42,10 +42,17 @@ class Site:
 
     Args:
         health: what `/healthz` tells beside "ok".
+        light, background: how the page begins, as `realizer.render.Renderer` takes them.
     """
 
-    def __init__(self, health: Callable[[], dict[str, object]]) -> None:
+    def __init__(
+        self,
+        health: Callable[[], dict[str, object]],
+        light: str | None = None,
+        background: str | None = None,
+    ) -> None:
         self._health = health
+        self._light, self._background = light, background
         self._static = files("realizer.server").joinpath("static")
 
     def answer(self, target: str) -> Answer:
@@ -72,7 +79,7 @@ class Site:
 
     def _look(self, name: str) -> Answer:
         try:
-            return Answer(200, JSON, _look(name))
+            return Answer(200, JSON, _look(name, self._light, self._background))
         except FaceError as error:
             return Answer(404, TEXT, f"{error}\n".encode())
 
@@ -102,14 +109,25 @@ def _examples() -> bytes:
 
 
 @functools.lru_cache(8)
-def _look(name: str) -> bytes:
-    """How stills are lit and framed, for whoever draws the mesh stream."""
+def _look(name: str, light: str | None, background: str | None) -> bytes:
+    """How stills are lit and framed and what they add to a face, for whoever draws the mesh stream."""
     from realizer.face import load_face
     from realizer.render.cameras import camera_for
-    from realizer.render.light import preset
+    from realizer.render.glints import Glints
+    from realizer.render.light import preset, presets
+    from realizer.render.wrinkles import Wrinkles
 
-    camera = camera_for(load_face(name))
-    return json.dumps({"light": preset().to_json(), "camera": camera.to_json()}).encode()
+    face, chosen = load_face(name), preset(light)
+    camera = camera_for(face)
+    look = {
+        "light": chosen.to_json(),
+        "lights": {name: one.to_json() for name, one in presets().items()},
+        "background": background,
+        "camera": camera.to_json(),
+        "furrows": Wrinkles(face).to_json(),
+        "glints": Glints(face, chosen, camera.towards).to_json(),
+    }
+    return json.dumps(look, separators=(",", ":")).encode()
 
 
 @functools.lru_cache(8)

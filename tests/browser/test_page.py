@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -30,10 +31,9 @@ ARGUMENTS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    """A service on a free port of loopback; stopped by the signal its user would send."""
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0"]
+@contextmanager
+def serving(command: list[str]) -> Iterator[str]:
+    """The address of a service that this command starts; stopped by the signal its user would send."""
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     service = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert service.stdout is not None
@@ -46,6 +46,13 @@ def address() -> Iterator[str]:
     service.send_signal(signal.SIGINT)
     service.stdout.close()
     assert service.wait(15) == 0
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """A service on a free port of loopback."""
+    with serving([sys.executable, "-m", "realizer", "serve", "--port", "0"]) as address:
+        yield address
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +88,108 @@ def picture(page):  # type: ignore[no-untyped-def]
 
 def pixel(image, across: float, down: float) -> tuple[int, int, int]:  # type: ignore[no-untyped-def]
     return image.getpixel((int(across * image.width), int(down * image.height)))  # type: ignore[no-any-return]
+
+
+STILL = 480  # pixels: of the stage that is compared with a still
+FURROWS = {1: 1.0, 4: 1.0}
+
+
+def still(light: str, aus: dict[int, float]):  # type: ignore[no-untyped-def]
+    """What the drawing process makes of these action units, (h, w, 3) float."""
+    import numpy as np
+
+    from realizer.animation.frames import AUFrames
+    from realizer.animation.pose import poses
+    from realizer.animation.targets import au, axis
+    from realizer.face import takes
+    from realizer.render import Renderer
+
+    row = np.zeros((1, len(axis())), np.float32)
+    for number, amount in aus.items():
+        row[0, [target.column for target in au(number)]] = amount
+    with Renderer("default", (STILL, STILL), light=light) as renderer:
+        (picture,) = renderer.draw(poses(AUFrames(np.zeros(1), row), takes("default")))
+    return picture.astype(float)
+
+
+def stage_of(page):  # type: ignore[no-untyped-def]
+    """The stage as (h, w, 3) float, square, once the picture stands still."""
+    import numpy as np
+
+    last = None
+    for _ in range(40):
+        page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        image = np.asarray(picture(page), float)
+        if last is not None and np.array_equal(image, last):
+            break
+        last = image
+    side = (image.shape[1] - image.shape[0]) // 2
+    return image[:, side : side + image.shape[0]]
+
+
+@pytest.fixture
+def quiet_page(browser):  # type: ignore[no-untyped-def]
+    """The page of a service without idle motion, its stage as high as a still."""
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle"]
+    with serving(command) as address:
+        opened = browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
+        opened.goto(address)
+        style = f"#stage {{ width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
+        opened.add_style_tag(content=style + " #lights, #score { display: none !important }")
+        opened.wait_for_function("realizerPage.stage.shownFrames > 0")
+        yield opened
+        opened.close()
+
+
+def face_of(image):  # type: ignore[no-untyped-def]
+    """From the brows to the chin, the cheeks at the sides."""
+    return image[int(0.30 * STILL) : int(0.68 * STILL), int(0.36 * STILL) : int(0.64 * STILL)]
+
+
+def test_the_page_draws_what_the_stills_show_in_every_light(quiet_page) -> None:  # type: ignore[no-untyped-def]
+    import numpy as np
+
+    for light in ("portrait", "daylight", "evening"):
+        quiet_page.evaluate("name => realizerPage.stage.shine(name)", light)
+        here, there = stage_of(quiet_page), still(light, {})
+        assert np.abs(face_of(here) - face_of(there)).mean() < 9, light
+        assert np.abs(face_of(here).mean((0, 1)) - face_of(there).mean((0, 1))).max() < 6, light
+        # The backdrop beside the head.
+        assert np.abs(here[100:200, 5:40] - there[100:200, 5:40]).mean() < 12, light
+
+
+def test_a_frown_furrows_the_page_s_forehead_as_the_still_s(quiet_page) -> None:  # type: ignore[no-untyped-def]
+    import numpy as np
+
+    def furrows(image):  # type: ignore[no-untyped-def]
+        """How much darker a column between the brows is than the skin beside it, at most."""
+        brow = image[int(0.33 * STILL) : int(0.40 * STILL), int(0.46 * STILL) : int(0.54 * STILL)]
+        columns = brow.sum(axis=2).mean(axis=0)
+        return float((np.median(columns) - columns).max())
+
+    calm = stage_of(quiet_page)
+    parts = "".join(
+        f'<faceFacs id="f{au}" au="{au}" amount="{amount}" start="0" end="600"/>'
+        for au, amount in FURROWS.items()
+    )
+    quiet_page.fill("#document", f'<bml id="frown">{parts}</bml>')
+    quiet_page.click("#play")
+    quiet_page.wait_for_selector("#log li:has-text('f4 attackPeak')")
+    quiet_page.wait_for_function("realizerPage.stage.furrows.mesh.visible")
+    here, there = stage_of(quiet_page), still("portrait", FURROWS)
+    assert furrows(here) > furrows(calm) + 15
+    assert furrows(here) == pytest.approx(furrows(there), rel=0.5)
+
+
+def test_a_light_is_chosen_on_the_page(page) -> None:  # type: ignore[no-untyped-def]
+    page.wait_for_selector("#lights button")
+    pressed = "#lights button[aria-pressed='true']"
+    assert page.locator(pressed).all_text_contents() == ["Portrait"]
+    dark = pixel(picture(page), 0.03, 0.5)
+    page.click("#lights button:has-text('Daylight')")
+    page.wait_for_selector(f"{pressed}:has-text('Daylight')")
+    assert page.locator(pressed).count() == 1
+    assert sum(pixel(picture(page), 0.03, 0.5)) > sum(dark) + 200
 
 
 def test_the_face_is_there_and_alive(page) -> None:  # type: ignore[no-untyped-def]

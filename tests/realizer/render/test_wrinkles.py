@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -121,3 +122,24 @@ def test_a_mesh_too_coarse_to_move_like_skin_stays_smooth(face):
     """The same head seen as if its eyes stood close together: its triangles are long beside its furrows."""
     small = dataclasses.replace(face, fapu=dataclasses.replace(face.fapu, es0=face.fapu.es0 / 6))
     assert Wrinkles(small).count < Wrinkles(face).count / 4
+
+
+def test_furrows_as_numbers_make_the_same_points_and_tones(face, wrinkles):
+    """As a page does it."""
+    table = json.loads(json.dumps(wrinkles.to_json()))
+    vertices, ups = pose(face, {**RAISED, **FROWN})
+    grey = np.full((len(vertices), 3), 0.5, np.float32)
+    points, colours = wrinkles(vertices, ups, grey)
+    amounts = []
+    for a, b, rest, start, full in table["drives"]:
+        change = np.linalg.norm(vertices[int(a)] - vertices[int(b)]) / rest - 1
+        reached = np.clip((change - start) / (full - start), 0, 1)
+        amounts.append(reached * reached * (3 - 2 * reached))
+    rows = np.array(table["points"])
+    corners = rows[:, :3].astype(int)
+    weights = np.column_stack([rows[:, 3:], 1 - rows[:, 3:].sum(axis=1)])[..., None]
+    lifted = vertices + table["lift"] * ups
+    assert (lifted[corners] * weights).sum(axis=1) == pytest.approx(points, abs=2e-5)
+    tone = np.array([sum(amounts[k] * t for k, t in pairs) for pairs in table["tones"]])[:, None]
+    shown = 0.5 * (1 - np.maximum(tone, 0) * table["shade"] + np.maximum(-tone, 0))
+    assert shown == pytest.approx(colours, abs=1e-3)

@@ -36,6 +36,10 @@ def test_the_light_is_the_one_of_the_stills() -> None:
     look = json.loads(SITE.answer("/look.json?face=default").body)
     assert {"key", "fill", "rim"} <= set(look["light"])
     assert look["camera"]["fovy"] > 0
+    assert look["light"] == look["lights"]["portrait"] != look["lights"]["evening"]
+    assert len(look["furrows"]["points"]) == len(look["furrows"]["tones"]) > 100
+    assert len(look["glints"]["eyes"]) == 2
+    assert look["background"] is None
     assert SITE.answer("/look.json?face=nobody").status == 404
 
 

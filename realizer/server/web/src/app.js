@@ -69,10 +69,30 @@ async function showFace(message) {
   try {
     await stage.load(message.face, message.scale, message.offset);
     at("stage-note").textContent = "";
+    showLights();
   } catch (error) {
     face = null;
     at("stage-note").textContent = `The face could not be shown: ${error.message}`;
   }
+}
+
+// A button for each light there is; the one that is pressed is told by its table.
+function showLights() {
+  const { lights, light } = stage.look;
+  const own = Object.keys(lights).find((name) => JSON.stringify(lights[name]) === JSON.stringify(light));
+  const buttons = Object.keys(lights).map((name) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = name[0].toUpperCase() + name.slice(1);
+    button.setAttribute("aria-pressed", String(name === (stage.light ?? own)));
+    button.onclick = () => {
+      stage.shine(name);
+      for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
+    };
+    return button;
+  });
+  at("lights").replaceChildren(...buttons);
+  at("lights").hidden = false;
 }
 
 function status(state, text) {

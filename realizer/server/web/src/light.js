@@ -1,8 +1,8 @@
 // The light of the stills as a shader: the same terms as realizer/render/light.py, a fragment at a time.
 import { Vector3 } from "three";
 
-export function lightUniforms(look) {
-  const uniforms = {};
+export function lightUniforms(look, shade) {
+  const uniforms = { furrow_shade: { value: new Vector3(...shade) } };
   for (const lamp of ["key", "fill", "rim"]) {
     for (const part of ["direction", "colour", "wrap"]) uniforms[`${lamp}_${part}`] = { value: new Vector3(...look[lamp][part]) };
     uniforms[`${lamp}_direction`].value.normalize();
@@ -12,18 +12,30 @@ export function lightUniforms(look) {
   return uniforms;
 }
 
+// The backdrop of the stills, as realizer/render/backdrop.py draws it: its smooth step in five stops.
+export function backdrop({ backdrop_middle: middle, backdrop_edge: edge }) {
+  const stops = [0, 0.25, 0.5, 0.75, 1].map((t) => {
+    const mix = t * t * (3 - 2 * t);
+    const [r, g, b] = middle.map((m, k) => Math.round(255 * (m + (edge[k] - m) * mix)));
+    return `rgb(${r} ${g} ${b}) ${100 * t}%`;
+  });
+  return `radial-gradient(67.5% 75% at 50% 44.4%, ${stops.join(", ")})`;
+}
+
 export const vertex = `
 attribute vec4 albedo;
 attribute float occlusion;
 attribute float gloss;
+attribute float tone;
 varying vec3 v_normal, v_place, v_albedo;
-varying float v_occlusion, v_gloss;
+varying float v_occlusion, v_gloss, v_tone;
 void main() {
   v_normal = normal;
   v_place = position;
   v_albedo = albedo.rgb;
   v_occlusion = occlusion;
   v_gloss = gloss;
+  v_tone = tone;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
@@ -31,8 +43,9 @@ export const fragment = `
 uniform vec3 key_direction, key_colour, key_wrap, fill_direction, fill_colour, fill_wrap, rim_direction, rim_colour, rim_wrap;
 uniform vec3 sky, ground;
 uniform float rim_power, shadow, highlight, dull, sharp, exposure, knee;
+uniform vec3 furrow_shade;
 varying vec3 v_normal, v_place, v_albedo;
-varying float v_occlusion, v_gloss;
+varying float v_occlusion, v_gloss, v_tone;
 vec3 lamp(vec3 n, vec3 direction, vec3 colour, vec3 wrap) {
   return colour * max(vec3(0.0), (dot(n, direction) + wrap) / (1.0 + wrap));
 }
@@ -52,5 +65,7 @@ void main() {
   vec3 light = lamp(n, key_direction, key_colour, key_wrap) + lamp(n, fill_direction, fill_colour, fill_wrap) + edge;
   vec3 colour = exposure * (v_albedo * (light * reach + ambient) + shine * reach);
   vec3 shoulder = 1.0 - (1.0 - knee) * exp(-(colour - knee) / (1.0 - knee));
-  gl_FragColor = vec4(srgb(mix(colour, shoulder, step(knee, colour))), 1.0);
+  // A furrow takes away part of the picture's brightness, the ridge beside it (tone below 0) adds some.
+  vec3 furrow = 1.0 - max(v_tone, 0.0) * furrow_shade + max(-v_tone, 0.0);
+  gl_FragColor = vec4(min(srgb(mix(colour, shoulder, step(knee, colour))) * furrow, 1.0), 1.0);
 }`;

@@ -1,7 +1,8 @@
 // The face in WebGL: rest mesh from the GLB, vertices from the stream, the light of the stills.
 import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, Scene, ShaderMaterial, Spherical, Vector3, WebGLRenderer } from "three";
 import { readGlb } from "./glb.js";
-import { fragment, lightUniforms, vertex } from "./light.js";
+import { Furrows, Glints } from "./figure.js";
+import { backdrop, fragment, lightUniforms, vertex } from "./light.js";
 
 const KEPT = 60; // frames
 // The width of the head over the height of the front camera's picture: narrower pictures step back.
@@ -18,6 +19,7 @@ export class Stage {
     this.material = new ShaderMaterial({ vertexShader: vertex, fragmentShader: fragment, side: DoubleSide });
     this.frames = [];
     this.shownFrames = 0;
+    this.light = null; // a preset's name; null is the service's own
     this.want = { yaw: 0, pitch: 0, zoom: 1 };
     this.view = { yaw: 0, pitch: 0, zoom: 1 };
     this.turn();
@@ -39,13 +41,28 @@ export class Stage {
     put("gloss", attributes._GLOSS);
     geometry.setIndex(new BufferAttribute(indices, 1));
     geometry.computeVertexNormals();
-    this.material.uniforms = lightUniforms(look.light);
-    Object.assign(this, { preset: look.camera, scale, offset });
-    this.mesh?.geometry.dispose();
+    Object.assign(this, { look, preset: look.camera, scale, offset });
+    for (const part of [this.mesh, this.furrows?.mesh, this.glints?.mesh]) part?.geometry.dispose();
     this.scene.clear();
     this.mesh = new Mesh(geometry, this.material);
     this.mesh.frustumCulled = false;
-    this.scene.add(this.mesh);
+    this.furrows = new Furrows(look.furrows, geometry, this.material);
+    this.glints = new Glints(look.glints);
+    this.scene.add(this.mesh, this.furrows.mesh, this.glints.mesh);
+    this.shine(this.light);
+  }
+
+  // Light the face as a preset says, and put that one's backdrop behind it.
+  shine(name) {
+    this.light = name;
+    if (!this.look) return;
+    this.lit = this.look.lights[name] ?? this.look.light;
+    // In place: three.js keeps the objects that a program began with.
+    for (const [uniform, { value }] of Object.entries(lightUniforms(this.lit, this.look.furrows.shade))) {
+      this.material.uniforms[uniform] ??= {};
+      this.material.uniforms[uniform].value = value;
+    }
+    this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
   }
 
   reset() {
@@ -66,6 +83,7 @@ export class Stage {
     const ease = 0.18;
     for (const axis of ["yaw", "pitch", "zoom"]) this.view[axis] += (this.want[axis] - this.view[axis]) * ease;
     this.aim();
+    this.glints.pose(this.mesh.geometry, this.lit, this.camera);
     this.renderer.render(this.scene, this.camera);
   }
 
@@ -85,6 +103,7 @@ export class Stage {
     for (let i = 0; i < out.length; i++) out[i] = (a.values[i] + (b.values[i] - a.values[i]) * t) * scale + offset[i % 3];
     position.needsUpdate = true;
     this.mesh.geometry.computeVertexNormals();
+    this.furrows.pose(this.mesh.geometry);
     this.shownFrames += 1;
   }
 
@@ -111,6 +130,7 @@ export class Stage {
     camera.near = preset.near;
     camera.far = preset.far;
     camera.lookAt(target);
+    camera.updateMatrixWorld();
     camera.updateProjectionMatrix();
   }
 
