@@ -1,6 +1,6 @@
 """Fit the table of action units and FAPs to a face's own shapes, and say it as rows of the table.
 
-python tests/benchmarks/fit_au_to_fap.py [--face NAME] [--au 12 ...] [--write]
+python tests/benchmarks/fit_au_to_fap.py [--face NAME] [--data FOLDER] [--au 12 ...] [--write]
 
 For each action unit with a shape: the FAP values, within the bounds of `au_to_fap_bounds.csv` (what the
 published maps and FACS say it may move, and which way), that bring the MPEG-4 deformer nearest to it in
@@ -19,14 +19,12 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from au_to_fap import Skin, asked, cosine
+from au_to_fap import Skin, asked, cosine, shapes_of
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from realizer import tables
 from realizer.arrays import Float32, Float64
 from realizer.face import load_face
-from realizer.face.au import read_shapes
-from realizer.face.load import folder_of
 from realizer.tables import action_units, by_number, faps, read_csv
 
 # Upper and lower lip, one above the other: they part by -(upper + lower).
@@ -144,11 +142,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     options.add_argument("--face", default="default")
+    options.add_argument("--data", type=Path, help="unpacked CC0 data to measure the shapes in")
     options.add_argument("--au", type=int, nargs="*")
     options.add_argument("--write", action="store_true", help="put the rows into the table")
     chosen = options.parse_args()
     face = load_face(chosen.face)
-    shapes = read_shapes(folder_of(chosen.face) / "au_shapes.npz")
+    shapes = shapes_of(face, chosen.data)
     skin = Skin.of(face, next(iter(shapes.values())))
     path = Path(__file__).with_name("au_to_fap_bounds.csv")
     bounds: dict[int, list[Row]] = defaultdict(list)
@@ -158,7 +157,7 @@ def main() -> None:
     for number in bounds:
         if chosen.au and number not in chosen.au:
             continue
-        wanted = shapes[number].moves[shapes[number].seen]
+        wanted = shapes[number].moves[skin.marks]
         part = bounds[number][0].length
         found[number] = fit(skin, part * wanted, bounds[number], gaps_of(number, found))
         row = pair(np.array(list(found[number].values())), list(found[number]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from realizer.errors import FaceError
 from realizer.face import hm08
 from realizer.face.au.measure import Measured
 from realizer.face.au.mouth import fit_mouth, shares
-from realizer.face.au.units import units
+from realizer.face.au.units import Unit, units
 from realizer.face.ground import Ground
 from realizer.face.lips import Lips, close_lips
 from realizer.face.model import Face
@@ -24,13 +25,16 @@ COLLAR = -0.16  # m; below it no face moves
 EVEN = np.array([-1.0, 1.0, 1.0])
 
 
-def measure_shapes(face: Face, folder: Path, data: Path) -> dict[int, Measured]:
+def measure_shapes(
+    face: Face, folder: Path, data: Path, wanted: Iterable[Unit] | None = None
+) -> dict[int, Measured]:
     """Each displacement unit's shape on the left half (x >= 0) of a face's skin.
 
     Args:
         face: built from the data.
         folder: its folder; the recipe says how it was mixed.
         data: the unpacked CC0 data, as `face.build.build_face` takes it.
+        wanted: the units, each with its mixture of shapes; None: her 22 displacements.
 
     Raises:
         FaceError: no recipe or data, or a skin that is not made from them.
@@ -60,7 +64,7 @@ def measure_shapes(face: Face, folder: Path, data: Path) -> dict[int, Measured]:
     seen = (face.occlusion[first:last][half] > OPEN) | (lips.lips[index] > 0.5)
     upper = shares(face, fit_mouth(face))[first:last][half]
     out = {}
-    for unit in units().values():
+    for unit in units().values() if wanted is None else wanted:
         if unit.kind == "displacement":
             shape = np.zeros_like(at)
             for name, weight in unit.mixture.items():
