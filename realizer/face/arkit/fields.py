@@ -24,7 +24,6 @@ __all__ = ["Grown", "shape_fields"]
 
 FLOOR = 0.35  # of the most on its line: a point that a shape hardly moves does not blow its field up
 TRUE = 0.25  # of its largest move: what a shape has to move a point along a FAP's way to serve it
-BACKWARDS, FORWARDS = -0.05, 0.40  # metres for each metre that a lip rises
 BLOWN = 0.1  # the same for cheeks: they go forwards more than aside
 # FAP -> its point, its station along the lips (0 right corner .. 4 left), and 1 on the outer contour.
 UPPER = {
@@ -61,6 +60,9 @@ class Grown:
         self.vertex, self.zones = vertex, zones
         self.mean = averages(len(skin), triangles)
         self.eyes = float(self.place["3.5"][0] - self.place["3.6"][0])
+        # 1 on the lips, which FAP 3 leaves to their own FAPs, falling to 0 at the chin.
+        reach = 0.95 * float(np.linalg.norm(self.place["8.2"] - self.place["2.1"]))
+        self.held = np.asarray(smooth(mouth.away, reach, 0.0015))
 
     def move(self, *names: str) -> Float64 | None:
         """The sum of shapes; None where one is missing."""
@@ -100,22 +102,35 @@ def shape_fields(grown: Grown) -> dict[int, Float64]:
     """FAP -> (n, 3) field on the skin, of every FAP that the head's shapes serve."""
     found = _brows(grown) | _cheeks(grown) | _lids(grown) | _chin(grown) | _pushed(grown)
     found |= _corners(grown, found)
-    # Of the shapes that bare the teeth nose, cheeks and chin have their own FAPs.
-    found |= _lip(grown, UPPER, "mouthUpperUp", found, (41, 42, 61, 62, 63, 17), grown.mouth.upper)
-    found |= _lip(grown, LOWER, "mouthLowerDown", found, (18, 16), 1 - grown.mouth.upper)
+    found |= _upper_lip(grown, found) | _lower_lip(grown)
     return {fap: field for fap, field in found.items() if field is not None}
 
 
-def _lip(
-    grown: Grown, line: Mapping[int, tuple[str, int, int]], stem: str,
-    made: Mapping[int, Float64 | None], others: tuple[int, ...], mask: Float64,
-) -> dict[int, Float64 | None]:  # fmt: skip
-    """A lip's FAPs from the shape that bares the teeth."""
-    move = grown.move(f"{stem}Left", f"{stem}Right")
+def _upper_lip(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+    """The upper lip's FAPs from the shape that bares the upper teeth."""
+    move = grown.move("mouthUpperUpLeft", "mouthUpperUpRight")
     if move is None:
         return {}
-    move, way = grown.without(move, made, others), np.array(WAYS[faps()[min(line) - 1].direction])
+    # Nose and cheeks have FAPs of their own.
+    move = grown.without(move, made, (41, 42, 61, 62, 63, 17))
+    near = smooth(grown.mouth.away, 0.030, 0.0) * grown.mouth.upper
+    return _line(grown, UPPER, move, near)
+
+
+def _lower_lip(grown: Grown) -> dict[int, Float64 | None]:
+    """The lower lip's FAPs: what is the lip's of an opening mouth; the rest is FAP 3's."""
+    move = grown.move("jawOpen")
+    if move is None:
+        return {}
+    return _line(grown, LOWER, move, grown.held * (1 - grown.mouth.upper))
+
+
+def _line(
+    grown: Grown, line: Mapping[int, tuple[str, int, int]], move: Float64, near: Float64
+) -> dict[int, Float64 | None]:
+    """A shape parted among the points of a lip."""
     mouth, height = grown.mouth, np.zeros((2, 5))
+    way = np.array(WAYS[faps()[min(line) - 1].direction])
     for name, knot, outer in line.values():
         height[outer, knot] = -float(move[grown.vertex[name]] @ way)
     most = height.max()
@@ -124,12 +139,7 @@ def _lip(
     height[:, [0, 4]] = height[:, [1, 3]]  # at the corners the shape ends, and other shapes begin
     height = np.maximum(height, FLOOR * most)
     local = (1 - mouth.outer) * (height[0] @ mouth.knots) + mouth.outer * (height[1] @ mouth.knots)
-    profile = -move / local[:, None] * mask[:, None]
-    # The shape bares teeth by millimetres, an open mouth asks for centimetres: what goes aside of the way
-    # must not grow with it. A lip keeps near the jaw's arc, forwards as it rises.
-    rises = np.abs(profile[:, 1])
-    ahead = np.clip(profile[:, 2] * way[1], BACKWARDS * rises, FORWARDS * rises)
-    profile[:, 2] = ahead * way[1]
+    profile = -move / local[:, None] * near[:, None]
     return {
         fap: grown.exact(
             fap, profile * ((mouth.outer if outer else 1 - mouth.outer) * mouth.knots[knot])[:, None]

@@ -13,7 +13,7 @@ from realizer.arrays import Float64
 from realizer.errors import FaceError
 from realizer.face.arkit.fields import Grown, shape_fields
 from realizer.face.arkit.gltf import Gltf
-from realizer.face.arkit.jaw import drag_of, held, joint_of
+from realizer.face.arkit.jaw import drag_of, joint_of
 from realizer.face.arkit.mouth import mouth_of
 from realizer.face.arkit.names import canonical, nearest, shapes
 from realizer.face.arkit.points import points_of
@@ -39,7 +39,6 @@ GLOSS = {
     "lower_teeth": 0.75, "tongue": 0.35, "hair": 0.10, "beard": 0.08, "shirt": 0.0, "other": 0.1,
 }  # fmt: skip
 DIRECTIONS, CELL = 48, 0.003  # of the baked occlusion: enough for vertices millimetres apart
-NEAR_LIPS = 0.007  # m from the lips FAP 3 takes all of the jaw's shape along
 DRESSED = ("brows", "lashes", "beard")  # parts that go with the skin under them
 INSIDE = ("upper_teeth", "lower_teeth", "tongue")
 LINED = ("brows", "lashes", *INSIDE)  # cast no shadow: thin, or behind closed lips
@@ -289,13 +288,8 @@ def _jaw(
         words = (f"the jaw turns about {np.round(pivot, 3).tolist()}" + ("" if told else ", by proportions"),)
         stored["jaw_pivot"] = pivot
         # Without its part of the lips the shape is what FAP 3 asks for.
-        closes = grown.moves.get("mouthClose")
-        drag = drag_of(grown.skin, opening if closes is None else opening + closes, pivot, chin - first)
-        # Without that shape the skin between lip and chin hands over evenly.
-        whole_way = float(np.linalg.norm(grown.place["8.2"] - grown.place["2.1"]))
-        reach = 0.95 * whole_way if closes is None else NEAR_LIPS
         opens = np.zeros(len(surface.vertices))
-        opens[first:last] = drag * (1 - held(grown.mouth.away, reach))
+        opens[first:last] = drag_of(grown.skin, opening, pivot, chin - first) * (1 - grown.held)
         opens[first:last] /= max(float(opens[chin]), 1e-6)
         opens = np.clip(opens, 0, 1)
         for part in ("lower_teeth", "tongue"):

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from realizer.arrays import Float64
-from realizer.face.parts import smooth
 
 __all__: list[str] = []
 
@@ -60,8 +57,3 @@ def drag_of(at: Float64, move: Float64, pivot: Float64, chin: int) -> Float64:
     share = (move * turned).sum(axis=1) / np.maximum((turned**2).sum(axis=1), 1e-12)
     share = share / max(float(share[chin]), 1e-6)
     return np.asarray(np.clip(share, 0, 1))
-
-
-def held(away: Any, reach: float) -> Float64:
-    """(n,) 1 on the lips, which FAP 3 leaves alone, falling to 0 at `reach` metres from them."""
-    return np.asarray(smooth(away, reach, 0.0015))
