@@ -33,6 +33,7 @@ MAY: dict[str, set[str]] = {
         "bml_schema",
         "realizer.animation",
         "realizer.behaviours",
+        "realizer.emotion",
         "realizer.scheduling.timing",
         "realizer.speech.utterance",
         "realizer.tables",

@@ -7,24 +7,31 @@ from dataclasses import replace
 
 from bml_schema import Emotion, Mood
 from realizer.animation.channel import Channel
+from realizer.animation.targets import Target, fap
 from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
+from realizer.emotion import emotion as profile_of
+from realizer.emotion import known_words, place_of, shares, wheel
 from realizer.scheduling.timing import Timing
-from realizer.tables.emotions import archetypes, words
-from realizer.tables.lexemes import face_lexemes
+from realizer.tables.emotion_model import emotion_model
+from realizer.tables.emotions import emotion_faces
+from realizer.tables.feelings import ring
 
 __all__ = ["KINDS"]
 
-# The usual way of showing each emotion; there are no others yet.
-PROFILES = (None, "default")
+# Ours play as action units, so that speech and blinks find their place in them; the published ones as FAPs.
+OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
 PARAMETERS = {"intensity": "intensity", "amount": "intensity"}
 
 
 def timing(node: Emotion, world: World) -> Timing:
     """As its archetype's face lexeme; between two, as much of each as shows."""
-    parts = [(share, preferred("faceLexeme", name)) for name, (share, _) in _mix(node).items()]
+    parts = [
+        (share, preferred("faceLexeme", emotion_faces()[name].lexeme))
+        for name, share in _mix(node)[0].items()
+    ]
     if not parts:
         return preferred("faceLexeme")
     wanted = {
@@ -40,20 +47,21 @@ def timing_of_mood(node: Mood, world: World) -> Timing:
 
 def expand(node: Emotion, times: Float64, world: World) -> tuple[Channel, ...]:
     """There at attackPeak, held to relax, gone at end."""
-    return poses.shown(poses.columns(_aus(node), node.intensity), times, node.id)
+    return poses.shown(_values(node), times, node.id)
 
 
 def expand_mood(node: Mood, times: Float64, world: World) -> tuple[Channel, ...]:
     """From start to end the new base face rises, and stays; the neutral one has no channels."""
-    return poses.kept(poses.columns(_aus(node), node.intensity), times, node.id)
+    return poses.kept(_values(node), times, node.id)
 
 
 def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
-    """An unknown word is fatal, an unknown profile is not."""
-    if node.name is not None and node.name.upper() not in words():
-        return (poses.unknown("name", node.name, words()),)
-    if node.profile not in PROFILES:
-        text = f"profile: wanted default, got {node.profile!r}; shown as usual"
+    """An unknown word, and one without a face, are fatal, an unknown profile is not."""
+    if node.name is not None and node.name.lower() not in known_words():
+        return (poses.unknown("name", node.name, known_words()),)
+    if node.profile not in (*OWN, *PUBLISHED):
+        wanted = ", ".join(name for name in (*OWN, *PUBLISHED) if name)
+        text = f"profile: wanted one of {wanted}, got {node.profile!r}; shown as usual"
         return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
     return ()
 
@@ -63,51 +71,41 @@ def claims_of_mood(node: Mood, world: World) -> frozenset[str]:
     return frozenset({"base face"})
 
 
-def _aus(node: Emotion | Mood) -> dict[tuple[int, str], float]:
-    """(AU, side) -> intensity at intensity 1."""
+def _values(node: Emotion | Mood) -> dict[Target, float]:
+    """Column -> what it shows: AUs 0..1, or FAPs of a published profile."""
+    if node.profile in PUBLISHED:
+        found = (
+            wheel(node.angle, node.activation, node.profile)
+            if node.angle is not None
+            else profile_of(node.name or "", node.profile)
+        )
+        return {fap(number): node.intensity * value for number, value in found.midpoint().items()}
+    parts, strength = _mix(node)
     aus: dict[tuple[int, str], float] = {}
-    for name, (_, strength) in _mix(node).items():
-        for cell, intensity in face_lexemes()[name].aus.items():
-            aus[cell] = aus.get(cell, 0.0) + strength * intensity
-    return aus
+    for name, share in parts.items():
+        for cell, value in emotion_faces()[name].aus.items():
+            aus[cell] = aus.get(cell, 0.0) + share * strength * value
+    return poses.columns(aus, node.intensity)
 
 
-def _mix(node: Emotion | Mood) -> Mapping[str, tuple[float, float]]:
-    """Archetype -> (its share, how strongly it shows); {} for the neutral face."""
-    if node.angle is not None:
-        return wheel(node.angle, node.activation)
-    word = words()[(node.name or "").upper()]
-    if word.angle is not None:
-        return wheel(word.angle, word.activation)
-    own = next((archetype for archetype in archetypes() if archetype.name == word.like), None)
-    if own is None:
-        return {}
-    return {own.name: (1.0, (word.activation or own.activation) / own.activation)}
+def _mix(node: Emotion | Mood) -> tuple[Mapping[str, float], float]:
+    """{archetype: its share}, and how strongly they show: 1 as drawn; ({}, 0) for the neutral face.
 
-
-def wheel(angle: float, activation: float | None = None) -> dict[str, tuple[float, float]]:
-    """What shows at a place on the wheel: the two archetypes beside it, the nearer the more.
-
-    Each is as strong as its share, times the place's activation over its own (Raouzaiou et al. 2002, 4.2,
-    with the nearer one weighing more). It is continuous in angle and activation: where the published rule
-    halves what only one of the two shows, it counts by its share here.
-
-    Args:
-        angle: degrees, any turn.
-        activation: 1..7; None for that of the place, which lies between its neighbours' as the angle does.
-
-    Returns:
-        {archetype: (share, strength)}; the shares add up to 1.
+    A place is as strong as its activation beside the rim's. A word is a kind of face, and `intensity` how
+    much of it shows: what Whissell rated counts beside its neighbours on Plutchik's ring, so that terrified
+    is more than afraid, and afraid as much as fear.
     """
-    ring = archetypes()
-    angle %= 360.0
-    after = next((i for i, archetype in enumerate(ring) if archetype.angle > angle), 0)
-    low, high = ring[after - 1], ring[after]
-    share = ((angle - low.angle) % 360.0) / ((high.angle - low.angle) % 360.0)
-    if activation is None:
-        activation = (1.0 - share) * low.activation + share * high.activation
-    shares = {low.name: (1.0 - share, low), high.name: (share, high)}
-    return {name: (part, part * activation / own.activation) for name, (part, own) in shares.items() if part}
+    if node.angle is not None:
+        most = emotion_model().most
+        return shares(node.angle), (most if node.activation is None else node.activation) / most
+    place = place_of(node.name or "")
+    if place is None:
+        return {}, 0.0
+    parts = shares(place.angle, "own", place.ring)
+    if place.activation is None:
+        return parts, 1.0
+    usual = sum(share * (ring(place.ring)[name].activation or 0.0) for name, share in parts.items())
+    return parts, place.activation / usual
 
 
 KINDS = (

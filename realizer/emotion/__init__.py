@@ -13,7 +13,7 @@ from realizer.emotion.profile_file import read_profiles, write_profiles
 from realizer.emotion.recognise import Recogniser, Recognition, recogniser
 from realizer.emotion.statistics import from_faces, from_statistics, published_statistics
 from realizer.emotion.wheel import affect, shares, wheel
-from realizer.emotion.words import UnknownWordError, emotion, known_words
+from realizer.emotion.words import UnknownWordError, WordPlace, emotion, known_words, place_of
 
 __all__ = [
     "Anchor",
@@ -21,6 +21,7 @@ __all__ = [
     "Recogniser",
     "Recognition",
     "UnknownWordError",
+    "WordPlace",
     "affect",
     "archetypes",
     "between",
@@ -32,6 +33,7 @@ __all__ = [
     "from_faces",
     "from_statistics",
     "known_words",
+    "place_of",
     "published_statistics",
     "read_profiles",
     "recogniser",

@@ -93,11 +93,6 @@ def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, fl
     return (low, 1.0 - share), (high, share)
 
 
-def anchor_of(emotion: str, profiles: str) -> Anchor:
-    """An archetype with the activation that its profile is drawn for, and its angle on Plutchik's ring."""
-    return next(a for a in _anchors(profiles, "plutchik")[0] if _plain(a.profile.name) == emotion)
-
-
 def _plain(name: str) -> str:
     """The name of a profile without its number."""
     return name.rpartition(" ")[0] or name

@@ -7,14 +7,28 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
+from typing import NamedTuple
 
 from realizer.emotion.archetypes import archetypes
-from realizer.emotion.intermediate import between, same_category
+from realizer.emotion.intermediate import between
 from realizer.emotion.profile import Profile
-from realizer.emotion.wheel import NEUTRAL, anchor_of, neighbours, wheel
-from realizer.tables.feelings import WhissellWord, own_words, ring, whissell_words
+from realizer.emotion.wheel import NEUTRAL, neighbours, wheel
+from realizer.tables.feelings import own_words, ring, whissell_words
 
-__all__ = ["UnknownWordError", "emotion", "known_words"]
+__all__ = ["UnknownWordError", "WordPlace", "emotion", "known_words", "place_of"]
+
+
+class WordPlace(NamedTuple):
+    """A place on a ring of the wheel.
+
+    `activation` is None for an emotion of the wheel itself: as much as its archetypes. `between`: no
+    archetype is of its kind, and the published rules for what lies between two hold.
+    """
+
+    ring: str
+    angle: float
+    activation: float | None = None
+    between: bool = False
 
 
 class UnknownWordError(ValueError):
@@ -44,14 +58,35 @@ def emotion(word: str, profiles: str = "own") -> Profile:
     name, _, number = asked.rpartition(" ")
     if name in known and number.isdecimal() and int(number) in known[name]:
         return known[name][int(number)]
+    place = place_of(asked)
+    if place is None:
+        return Profile(asked, profiles, {})
+    if place.between and profiles != "own" and place.activation is not None:
+        (one, _), (two, _) = neighbours(place.angle, profiles, place.ring)
+        return between(one, two, place.angle, place.activation, asked)
+    return replace(wheel(place.angle, place.activation, profiles, place.ring), name=asked)
+
+
+def place_of(word: str) -> WordPlace | None:
+    """Where on the wheel a word is; None for the neutral face, which is nowhere on it.
+
+    Raises:
+        UnknownWordError, ValueError: as `emotion`.
+    """
+    asked = " ".join(word.split()).lower()
     meant = own_words()[asked].like if asked in own_words() else asked
     if meant == NEUTRAL:
-        return Profile(asked, profiles, {})
+        return None
     if meant in ring("paul"):
-        return replace(wheel(ring("paul")[meant].angle, None, profiles), name=asked)
-    if meant not in whissell_words():
+        return WordPlace("paul", ring("paul")[meant].angle)
+    row = whissell_words().get(meant)
+    if row is None:
         raise UnknownWordError(_unknown(asked))
-    return replace(_rated(whissell_words()[meant], profiles), name=asked)
+    if row.activation is None:
+        raise ValueError(f"{row.word}: nobody rated how activated it is, so it has no face of its own")
+    if row.category:
+        return WordPlace("plutchik", ring("plutchik")[row.category].angle, row.activation)
+    return WordPlace("plutchik", row.angle, row.activation, between=True)
 
 
 @cache
@@ -61,18 +96,6 @@ def known_words() -> Mapping[str, str]:
     found |= {row.word: "whissell" for row in whissell_words().values() if row.activation is not None}
     found |= dict.fromkeys(own_words(), "own")
     return MappingProxyType(found)
-
-
-def _rated(row: WhissellWord, profiles: str) -> Profile:
-    if row.activation is None:
-        raise ValueError(f"{row.word}: nobody rated how activated it is, so it has no face of its own")
-    if row.category:
-        anchor = anchor_of(row.category, profiles)
-        return same_category(anchor.profile, anchor.activation, row.activation)
-    if profiles == "own":
-        return wheel(row.angle, row.activation, profiles, "plutchik")
-    (one, _), (two, _) = neighbours(row.angle, profiles, "plutchik")
-    return between(one, two, row.angle, row.activation)
 
 
 def _unknown(word: str) -> str:

@@ -1,10 +1,13 @@
-"""The wheel's table."""
+"""What archetypes show in action units."""
 
 from __future__ import annotations
 
 import pytest
 
-from realizer.tables.emotions import archetypes, words
+from realizer.tables.emotions import archetypes, emotion_faces
+from realizer.tables.feelings import ring
+from realizer.tables.lexemes import face_lexemes
+from realizer.tables.profiles import own_ranges
 
 
 def test_the_archetypes_stand_on_the_wheel_in_plutchiks_order() -> None:
@@ -14,8 +17,13 @@ def test_the_archetypes_stand_on_the_wheel_in_plutchiks_order() -> None:
     assert angles == sorted(set(angles))
 
 
-@pytest.mark.parametrize("word", words().values(), ids=lambda word: word.name)
-def test_every_word_is_upper_case_and_leads_to_a_face(word) -> None:
-    assert word.name == word.name.upper()
-    assert (word.like is None) != (word.angle is None)
-    assert word.activation is None or 1 <= word.activation <= 7
+def test_every_basic_emotion_of_the_wheel_has_a_face_and_a_profile() -> None:
+    basic = {place.name for place in ring("paul").values() if place.kind == "basic"}
+    assert set(emotion_faces()) == basic == {row.emotion for row in own_ranges()}
+
+
+@pytest.mark.parametrize("face", emotion_faces().values(), ids=lambda face: face.emotion)
+def test_a_face_is_its_lexeme_or_has_units_of_its_own(face) -> None:
+    assert face.aus
+    if face.lexeme:
+        assert face.aus == face_lexemes()[face.lexeme].aus
