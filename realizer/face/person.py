@@ -25,6 +25,8 @@ FLOOR = 0.61  # the bust ends that far below the collarbones
 NECK_TOP, NECK_LENGTH = 0.092, 0.433  # below the chin the head's turn fades out, over that length,
 NECK_TILT = 0.30  # along a plane that falls with the jaw by that much
 NOD = np.array([0.0, -0.082, -0.012])  # the head nods about a point below and behind the head's joint
+CORNER = (0.007, 0.006, 0.009)  # m; half axes of what is smoothed at a corner of the mouth,
+RELAXED = 5  # and how many times
 ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of the data's arches
 
 
@@ -70,6 +72,7 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
         sides = [hm08.read_target(data, name, len(at)) for name in (unit, _other_side(unit))]
         return np.asarray((sides[0] + sides[1][twin] * MIRROR) / 2 * hm08.DECIMETRE)
 
+    at = _relaxed(Ground(mesh, at, points, shape))
     ground = Ground(mesh, close_lips(Ground(mesh, at, points, shape)), points, shape)
     face = float(ground.point("11.1")[1] - ground.point("2.1")[1])
     arch = np.ptp(at[np.unique(mesh.quads["helper-upper-teeth"])], axis=0)
@@ -93,6 +96,15 @@ def identity(mesh: hm08.BaseMesh, data: Path, targets: Mapping[str, float]) -> F
     at = (at + at[mesh.mirror()] * MIRROR) / 2
     eyes = [at[np.unique(mesh.quads[f"helper-{side}-eye"])].mean(axis=0) for side in "lr"]
     return np.asarray((at - (eyes[0] + eyes[1]) / 2) * hm08.DECIMETRE)
+
+
+def _relaxed(ground: Ground) -> Float64:
+    """The base mesh with smooth corners of the mouth, (n, 3): shape targets bunch vertices there."""
+    at = ground.at
+    near = np.maximum(*(ground.ellipsoid(ground.point(name), CORNER) for name in ("2.4", "2.5")))[:, None]
+    for _ in range(RELAXED):
+        at = at + near * (ground.smoothed(at) - at)
+    return at
 
 
 def _other_side(unit: str) -> str:

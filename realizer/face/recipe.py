@@ -12,6 +12,7 @@ from typing import Any
 
 from realizer.errors import FaceError
 from realizer.face import hm08
+from realizer.face.hair import style_of
 
 __all__: list[str] = []
 
@@ -68,6 +69,10 @@ def read_recipe(path: Path, data: Path) -> Recipe:
             tables[name] = {}
     faults += _target_faults(tables["targets"], data)
     faults += _colour_faults(tables["colours"])
+    try:
+        style_of(tables["hair"])
+    except FaceError as error:
+        faults.append(str(error))
     if faults:
         raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
     return Recipe(raw["says"], tables["targets"], tables["colours"], tables["hair"], tables["look"])

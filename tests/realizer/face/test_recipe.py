@@ -66,6 +66,8 @@ def test_a_recipe_is_read_as_it_is_written(data: Path) -> None:
         ("skin = [1, 2.5, 255]", "skin = 'pink'", "colours: skin: wanted three numbers 0..255, got 'pink'"),
         ("[colours]", "[colours]\nnose = [1, 2, 3]", "colours: nose: wanted one of skin, "),
         ("says = 'Eve'", "says = 'Eve'\nhair = 3", "hair: wanted a table, got 3"),
+        ("says = 'Eve'", "says = 'Eve'\nhair = {style = 'mohawk'}", "hair: style: wanted one of bun, "),
+        ("says = 'Eve'", "says = 'Eve'\nhair = {colour = 3}", "got 'colour'"),
     ],
 )  # fmt: skip
 def test_a_fault_is_said_with_its_key_and_what_was_wanted(old: str, new: str, fault: str, data: Path) -> None:
