@@ -6,9 +6,11 @@ import numpy as np
 
 from realizer.arrays import Bool, Float64
 from realizer.face import head, paint, parts
+from realizer.face.brows import brow, lashes
 from realizer.face.hair import hair, scalp_of, shadow, style_of
 from realizer.face.lids import Lid
 from realizer.face.lips import Lips
+from realizer.face.look import look_of
 from realizer.face.parts import Part, smooth
 from realizer.face.patch import Patch, vertex_normals
 from realizer.face.person import Person
@@ -26,6 +28,7 @@ SHADOWLESS = ("upper_teeth", "lower_teeth", "tongue", "brows", "lashes")
 MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
 # Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
 BITE = {"upper_teeth": (0.0068, -0.0012), "lower_teeth": (0.0098, 0.0014)}
+RED_RINGS = 9  # of the lips' rings, from inside to just beyond the border of the red
 LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
 TONGUE = np.array([0, -0.0085, -0.0055])  # m that the tongue rests lower and further back than in the data
 
@@ -38,26 +41,39 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     body = Patch.of_quads(ground.mesh.quads["body"], n)
     body = body.kept((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
     body = body.clipped(body.positions(at)[:, 1] - person.floor)[0]
-    dressed = head.under_collar(body.positions(at), points["2.1"], person.face)
+    own = look_of(recipe.look)
+    dressed = head.under_collar(
+        body.positions(at), points["2.1"], person.face, own.collar_low, own.collar_point
+    )
     skin = body.clipped(0.012 - dressed)[0]
-    colours, gloss = paint.paint_skin(ground, lips, [lid.rings for lid in lids], look)
+    # A vertex more between any two along the lips: they bend most.
+    single = np.diff(skin.mix.indptr) == 1
+    place = np.full(n, -1)
+    place[skin.mix.indices[skin.mix.indptr[:-1][single]]] = np.flatnonzero(single)
+    skin = skin.threaded([place[ring].tolist() for ring in lips.rings[:RED_RINGS]])
     style = style_of(recipe.hair)
     scalp = scalp_of(skin, at, points, style)
+    colours, gloss = paint.paint_skin(ground, lips, [lid.rings for lid in lids], look, own)
     roots = shadow(scalp, style, at)[:, None]
     colours = colours * (1 - roots) + np.array(look["hair"], float) * roots
-    made = [
-        Part(
-            "skin",
-            skin,
-            skin.positions(at),
-            skin.triangles,
-            np.asarray(skin.mix @ colours),
-            np.asarray(skin.mix @ gloss),
-        )
-    ]
-    made += [parts.brow(skin, at, points, side, look["brows"]) for side in (1, -1)]
+    tints, shine = np.asarray(skin.mix @ colours), np.asarray(skin.mix @ gloss)
+    ring = np.where(lips.inside, 0, len(lips.rings) + 2.0)
+    for k, loop in enumerate(lips.rings):
+        ring[loop] = k
+    strength = own.lips * (1 - 0.25 * own.age)
+    paint.paint_lips(
+        tints,
+        shine,
+        skin.mix @ ring,
+        skin.mix @ lips.u,
+        skin.mix @ (lips.is_upper * 1.0),
+        look["lips"],
+        strength,
+    )
+    made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, shine)]
+    made += [brow(skin, at, tints, points, side, look["brows"], own) for side in (1, -1)]
     for lid, (centre, _) in zip(lids, person.balls, strict=True):
-        made.append(parts.lashes(at, lid.upper, centre, look["lashes"]))
+        made.append(lashes(at, lid, centre, look["skin"], look["lashes"], own))
     for name, side, (centre, radius) in zip(("left_eye", "right_eye"), (1, -1), person.balls, strict=True):
         made.append(parts.eyeball(name, centre, radius, look, -side))
     made += _teeth(person, recipe)

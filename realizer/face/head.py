@@ -17,13 +17,18 @@ COLLAR = 0.486  # of the face's height, hairline to chin: how far the collar lie
 TILT = 0.42  # of the plane of the collar, which rises backwards
 
 
-def under_collar(at: Float64, chin: Float64, face: float) -> Float64:
+POINT = 0.045  # m from the middle that a pointed collar reaches its full height
+
+
+def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, point: float = 0.0) -> Float64:
     """Metres of points below the neckline.
 
     Args:
         chin: (3,) metres; face: metres from hairline to chin.
+        low, point: metres, how much lower the collar lies, and how far its middle in front runs down.
     """
-    collar = chin[1] - COLLAR * face
+    front = np.maximum(1 - np.abs(at[:, 0]) / POINT, 0) * smooth(at[:, 2] - chin[2], -0.09, -0.05)
+    collar = chin[1] - COLLAR * face - low - point * front
     return np.asarray(collar - (at[:, 1] + TILT * (at[:, 2] + 0.01)))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,69 +10,51 @@ import numpy as np
 from realizer.arrays import Float64, Int32
 from realizer.face.ground import Ground
 from realizer.face.lips import Lips
+from realizer.face.look import Look
 from realizer.face.parts import smooth
 
 __all__: list[str] = []
 
 
-def texture(data: Path, name: str, uv: Float64) -> Float64:
-    """A texture's brightness 0..1 at texture coordinates (n, 2)."""
-    from PIL import Image
-
-    with Image.open(data / "mpfb2/textures" / name) as image:
-        pixels = np.asarray(image.convert("L"), float) / 255
-    height, width = pixels.shape
-    rows = np.clip(((1 - uv[:, 1]) * (height - 1)).round().astype(int), 0, height - 1)
-    columns = np.clip((uv[:, 0] * (width - 1)).round().astype(int), 0, width - 1)
-    return np.asarray(pixels[rows, columns])
-
-
 def paint_skin(
-    ground: Ground, lips: Lips, rings: list[list[list[int]]], look: dict[str, Any]
+    ground: Ground, lips: Lips, rings: list[list[list[int]]], colours: Mapping[str, Any], look: Look
 ) -> tuple[Float64, Float64]:
-    """Colours (n, 3) sRGB 0..255 and gloss (n,) of the base mesh's body.
+    """Colours (n, 3) sRGB 0..255 and gloss (n,) of the base mesh's body, but for the red of the lips.
 
     Args:
         rings: left and right eye's rings around the opening, from the edge outwards.
-        look: sRGB colours skin, lips, blush, mouth.
+        colours: sRGB colours skin, blush, mouth, hair.
     """
     at, n = ground.at, len(ground.at)
-    skin, red, blush, mouth = (np.array(look[k], float) for k in ("skin", "lips", "blush", "mouth"))
+    skin, blush, mouth = (np.array(colours[k], float) for k in ("skin", "blush", "mouth"))
     out = np.repeat(skin[None], n, 0)
     gloss = np.full(n, 0.16)
 
-    def glow(name: str, radii: Any, amount: float) -> None:
+    def glow(name: str, radii: Any, amount: float, colour: Any = blush, off: Any = 0.0) -> None:
         nonlocal out
-        share = (ground.ellipsoid(ground.point(name), radii) * amount)[:, None]
-        out = out * (1 - share) + blush * share
+        share = (ground.ellipsoid(ground.point(name) + np.asarray(off), radii) * min(amount, 1))[:, None]
+        out = out * (1 - share) + colour * share
 
-    for name in ("5.1", "5.2"):
-        glow(name, (0.032, 0.030, 0.05), 0.30)
-    for name in ("5.3", "5.4"):
-        glow(name, (0.030, 0.022, 0.05), 0.30)
-    glow("9.3", (0.020, 0.018, 0.03), 0.42)
-    glow("2.10", (0.020, 0.016, 0.03), 0.22)
-    for name in ("10.1", "10.2", "10.5", "10.6", "10.3", "10.4"):
-        glow(name, (0.02, 0.025, 0.03), 0.35)
-    # A greyer, darker half-moon under the eyes and a brow bone that is a little lighter.
+    flush, dark = look.flush, 1 + look.age
+    for left, right, radii, amount in (
+        ("5.1", "5.2", (0.032, 0.030, 0.05), 0.30), ("5.3", "5.4", (0.030, 0.022, 0.05), 0.34),
+        ("9.3", "9.3", (0.020, 0.018, 0.03), 0.26), ("2.10", "2.10", (0.020, 0.016, 0.03), 0.12),
+        ("9.1", "9.2", (0.014, 0.014, 0.02), 0.34),
+        ("10.1", "10.2", (0.02, 0.025, 0.03), 0.45), ("10.3", "10.4", (0.02, 0.025, 0.03), 0.45),
+        ("10.5", "10.6", (0.02, 0.025, 0.03), 0.45),
+    ):  # fmt: skip
+        for name in (left, right):
+            glow(name, radii, amount * flush)
+    # A greyer, darker half-moon under the eyes, dark sockets towards the nose, lighter brow bone and bridge.
     for name in ("3.9", "3.10"):
-        share = ground.ellipsoid(ground.point(name), (0.018, 0.010, 0.03))[:, None] * 0.20
-        out = out * (1 - share) + (skin * [0.86, 0.80, 0.82]) * share
+        glow(name, (0.018, 0.010, 0.03), 0.20 * dark, skin * [0.86, 0.80, 0.82])
     for name in ("3.13", "3.14"):
-        share = (
-            ground.ellipsoid(ground.point(name) + np.array([0, -0.001, 0]), (0.019, 0.008, 0.03))[:, None]
-            * 0.30
-        )
-        out = out * (1 - share) + (skin * [0.84, 0.74, 0.70]) * share
-    # Red of the lips: whole from ring 1 to ring 6, half at its border, darker where they meet.
-    amount = np.zeros(n)
-    for k, part in enumerate((1, 1, 1, 1, 1, 1, 0.95, 0.45, 0.06)):
-        amount[lips.rings[k]] = part
-    amount *= 1 - 0.45 * smooth(np.abs(lips.u), 0.86, 1.0)
-    out = out * (1 - amount[:, None]) + red * amount[:, None]
-    gloss += amount * 0.30
-    for k, dark in ((0, 0.55), (1, 0.70), (2, 0.90)):
-        out[lips.rings[k]] *= dark
+        glow(name, (0.019, 0.008, 0.03), 0.32 * dark, skin * [0.84, 0.74, 0.70], [0, -0.001, 0])
+    for name in ("3.11", "3.8"):
+        glow(name, (0.010, 0.012, 0.03), 0.30 * dark, skin * [0.80, 0.70, 0.68], [0, 0.004, 0])
+    shade = _beard(ground, lips)[:, None] * look.stubble * 0.42
+    out = out * (1 - shade) + (np.array(colours["hair"], float) * 0.6 + [30, 36, 40]) * shade
+    out *= 1 + _mottle(ground, look)[:, None] * [0.5, 0.9, 1.0]
     inside = lips.inside
     # Wet near the lips, dark and dull behind: a shine deep in the mouth looks like metal.
     out[inside] = mouth * np.clip(lips.fade[inside], 0.55, 1)[:, None]
@@ -80,7 +62,7 @@ def paint_skin(
     for ring in rings:
         # The wet edge of the lids is pink, the upper one darkened by the lashes' roots.
         top = at[ring[0]][:, 1] > np.median(at[ring[0]][:, 1])
-        for k, (upper, lower) in enumerate(((0.55, 0.25), (0.62, 0.18), (0.22, 0.06))):
+        for k, (upper, lower) in enumerate(((0.62, 0.30), (0.60, 0.20), (0.16, 0.06))):
             share = np.where(top, upper, lower)[:, None]
             out[ring[k]] = (
                 out[ring[k]] * (1 - share) + np.where(top[:, None], [92, 58, 48.0], [205, 120, 110.0]) * share
@@ -89,6 +71,54 @@ def paint_skin(
     nose = ground.ellipsoid(ground.point("9.3"), (0.014, 0.016, 0.02))
     gloss += 0.16 * nose
     return np.clip(out, 0, 255), np.clip(gloss, 0, 1)
+
+
+def _beard(ground: Ground, lips: Lips) -> Float64:
+    """(n,) where a beard grows: upper lip, chin and jaw, up to the ears."""
+    at = ground.at
+    under_nose, corner, lobe, chin = (ground.point(k) for k in ("9.15", "8.3", "10.7", "2.1"))
+    aside = np.abs(at[:, 0])
+    line = np.interp(
+        aside,
+        [0, 0.016, corner[0] + 0.006, 0.75 * lobe[0], lobe[0]],
+        [under_nose[1] + 0.004, under_nose[1] + 0.002, corner[1] + 0.006, corner[1] + 0.018, lobe[1] + 0.03],
+    )
+    face = smooth(at[:, 1] - line, 0.004, -0.008) * smooth(at[:, 1] - chin[1], -0.045, -0.010)
+    before = smooth(at[:, 2] - lobe[2], 0.0, 0.012)
+    return np.asarray(face * before * (1 - lips.lips) * ground.body)
+
+
+def _mottle(ground: Ground, look: Look) -> Float64:
+    """(n,) how much lighter or darker than its surroundings the skin is: freckles and age."""
+    rng = np.random.default_rng(5)
+    fine = rng.uniform(-1, 1, len(ground.at))
+    cheeks = sum(ground.ellipsoid(ground.point(k), (0.034, 0.024, 0.04)) for k in ("5.3", "5.4", "9.3"))
+    spots = np.where(fine < -0.55, -0.16, 0.02) * np.clip(cheeks, 0, 1)
+    return np.asarray(
+        spots * look.freckles + ground.smoothed(fine, 2) * 0.10 * look.age + 0.012 * fine * ground.body
+    )
+
+
+def paint_lips(
+    out: Float64, gloss: Float64, ring: Float64, u: Float64, upper: Float64, red: Any, strength: float
+) -> None:
+    """Paint the red of the lips over a skin, in place.
+
+    Args:
+        out: (n, 3) sRGB; gloss: (n,).
+        ring: (n,) place across the lip: 0 inside, 1 where the lips meet, 7 the border, 9 beyond.
+        u: (n,) -1..1 along the lip; upper: (n,) 1 on the upper lip.
+        strength: 0..1, how much red.
+    """
+    amount = smooth(ring, 8.2, 5.0) * (1 - 0.55 * smooth(np.abs(u), 0.80, 1.0))
+    # Fine furrows across the red.
+    furrow = 0.03 * np.sin(u * 61 + 0.7) + 0.02 * np.sin(u * 97)
+    # The upper lip faces down and looks darker still; the red is fullest where the lips meet.
+    tone = np.array(red, float) * ((1 - 0.06 * upper + furrow) * (1 - 0.05 * smooth(ring, 5, 1)))[:, None]
+    share = (amount * (strength + (1 - strength) * 0.75 * smooth(ring, 4.0, 1.0)))[:, None]
+    out[:] = out * (1 - share) + tone * share
+    gloss += 0.24 * smooth(ring, 7, 4.5) * amount
+    out *= (1 - 0.42 * smooth(ring, 2.3, 0.6) * (ring < 3))[:, None]
 
 
 DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth cell; metres a ray starts off

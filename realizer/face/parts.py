@@ -1,4 +1,4 @@
-"""The parts that the base mesh lacks: eyeballs, teeth, brows, lashes. Numbers in, triangles out."""
+"""The parts that the base mesh lacks: eyeballs and teeth. Numbers in, triangles out."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.arrays import Float64, Int32
-from realizer.face.patch import Patch, vertex_normals
+from realizer.face.patch import Patch
 
 __all__: list[str] = []
 
@@ -205,80 +205,3 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
     occlusion = 0.86 * smooth(depth_in, 0.75, 0.02) + 0.12
     occlusion *= np.tile([0.6, 1, 1, 0.8, 0.55, 0.4], len(side))
     return Part(name, None, vertices, triangles, np.array(tints), gloss, occlusion)
-
-
-def brow_curve(points: dict[str, Float64], side: float) -> tuple[Any, Any]:
-    """x stations and heights of a brow's middle line from the inner end to the outer, |x|."""
-    a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
-    x = np.abs([a[0] - np.sign(a[0]) * 0.001, (a[0] + b[0]) / 2, b[0], c[0] + np.sign(c[0]) * 0.0015])
-    # The points lie on the bone; a calm brow begins a little higher and arches a little less.
-    y = np.array([a[1] + 0.0022, (a[1] + b[1]) / 2 + 0.0014, b[1] - 0.0010, c[1] - 0.0004])
-    return x, y
-
-
-def brow(patch: Patch, base: Float64, points: dict[str, Float64], side: float, colour: list[float]) -> Part:
-    """A brow: the skin along the feature points, cut to a tapered shape and lifted off a little."""
-    from scipy.interpolate import PchipInterpolator
-
-    vertices = patch.positions(base)
-    x, y = brow_curve(points, side)
-    curve = PchipInterpolator(x, y)
-    near = (
-        (vertices[:, 0] * side > 0.004)
-        & (vertices[:, 1] > 0.004)
-        & (vertices[:, 1] < 0.04)
-        & (vertices[:, 2] > -0.02)
-    )
-    piece = patch.kept(near[patch.triangles].all(axis=1))
-    piece = piece.subdivided(flat=True)[0].subdivided(flat=True)[0]
-
-    def height(at: Float64) -> Float64:
-        across = at[:, 0] * side
-        t = (across - x[0]) / (x[-1] - x[0])
-        middle = curve(np.clip(across, x[0], x[-1]))
-        half = 0.0036 * smooth(t, -0.06, 0.24) ** 0.7 * (1 - 0.78 * smooth(t, 0.40, 1.02))
-        outside = np.maximum(np.maximum(-t, t - 1), 0) * 0.05
-        return np.asarray(half - np.abs(at[:, 1] - middle) - outside)
-
-    piece = piece.clipped(height(piece.positions(base)))[0]
-    at = piece.positions(base)
-    ups = vertex_normals(at, piece.triangles)
-    inner = np.clip(height(at), 0, 0.003)
-    piece = piece.moved(ups * (0.0006 + 0.20 * inner)[:, None])
-    hair = 1 + 0.16 * np.sin(np.abs(at[:, 0]) * 2600 + at[:, 1] * 1500)
-    t = np.clip((at[:, 0] * side - x[0]) / (x[-1] - x[0]), 0, 1)
-    # Thinner, hence lighter, at the inner end and along the edge.
-    thin = (1 - smooth(inner, 0.0, 0.0016)) * 0.42 + 0.30 * (1 - smooth(t, 0.0, 0.22))
-    tint = np.array(colour, float) * hair[:, None]
-    tint = tint * (1 - thin[:, None]) + np.array([178, 134, 112.0]) * thin[:, None]
-    return Part("brows", piece, piece.positions(base), piece.triangles, tint, np.full(len(piece), 0.05))
-
-
-def lashes(base: Float64, margin: list[int], centre: Float64, colour: list[float]) -> Part:
-    """A thin dark strip along the upper lid, from the inner corner to the outer; longer outwards.
-
-    Args:
-        margin: base vertices of the lid's edge, from inner to outer corner.
-    """
-    import scipy.sparse as sp
-
-    at = base[margin]
-    t = np.linspace(0, 1, len(margin))
-    out = at - centre
-    out /= np.linalg.norm(out, axis=1, keepdims=True)
-    side = np.sign(centre[0])
-    length = 0.0008 + 0.0026 * smooth(t, 0.05, 0.70) * (1 - 0.80 * smooth(t, 0.78, 1.0))
-    way = out * 0.8 + np.array([0.12 * side, 0.30, 0.35]) * smooth(t, 0, 0.8)[:, None] + np.array([0, 0, 0.3])
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    root = out * 0.00025
-    rows = np.concatenate([margin, margin])
-    offset = np.concatenate([root, root + way * length[:, None]])
-    mix = sp.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), rows)), (len(rows), len(base)))
-    triangles = grid(2, len(margin))
-    if side < 0:
-        triangles = triangles[:, [0, 2, 1]]
-    patch = Patch(mix, offset, triangles)
-    tint = np.repeat(np.array([colour], float), len(rows), 0)
-    return Part(
-        "lashes", patch, patch.positions(base), triangles, tint, np.zeros(len(rows)), np.full(len(rows), 0.9)
-    )

@@ -98,6 +98,39 @@ class Patch:
         mix = mix[used]
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
+    def threaded(self, loops: list[list[int]]) -> Patch:
+        """A vertex more on every edge of closed loops of vertices, on a smooth curve through them.
+
+        Four points make each (Dyn, Levin and Gregory 1987); loops that share a vertex or an edge do not go.
+        """
+        middle: dict[tuple[int, int], int] = {}
+        rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
+        for loop in loops:
+            for k in range(len(loop)):
+                a, b, c, d = (loop[(k + step) % len(loop)] for step in (-1, 0, 1, 2))
+                middle[(b, c) if b < c else (c, b)] = len(rows)
+                rows.append({a: -1 / 16, b: 9 / 16, c: 9 / 16, d: -1 / 16})
+        triangles: list[tuple[int, int, int]] = []
+        for a, b, c in self.triangles.tolist():
+            cut = [(p, q) for p, q in ((a, b), (b, c), (c, a)) if ((p, q) if p < q else (q, p)) in middle]
+            if not cut:
+                triangles.append((a, b, c))
+                continue
+            if len(cut) > 1:
+                raise ValueError(f"triangle {a}, {b}, {c} has two edges on the loops; wanted one at most")
+            p, q = cut[0]
+            tip = ({a, b, c} - {p, q}).pop()
+            new = middle[(p, q) if p < q else (q, p)]
+            triangles += [(p, new, tip), (new, q, tip)]
+        mix = sp.csr_matrix(
+            (
+                [w for row in rows for w in row.values()],
+                ([i for i, row in enumerate(rows) for _ in row], [j for row in rows for j in row]),
+            ),
+            (len(rows), len(self)),
+        )
+        return self.mixed(mix, np.array(triangles))
+
     def subdivided(self, flat: bool = False) -> tuple[Patch, sp.csr_matrix]:
         """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed.
 

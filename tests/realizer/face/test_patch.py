@@ -48,3 +48,17 @@ def test_the_lips_splines_sum_to_one_and_hold_their_knots() -> None:
     u = np.linspace(-1, 1, 201)
     assert np.allclose(hats(u).sum(axis=0), 1)
     assert np.allclose(hats(np.array([-1, -0.5, 0, 0.5, 1])), np.eye(5), atol=1e-6)
+
+
+def test_a_threaded_loop_has_twice_its_vertices_and_stays_round() -> None:
+    turn = np.arange(8) * np.pi / 4
+    rings = [np.stack([r * np.cos(turn), r * np.sin(turn), 0 * turn], 1) for r in (1.0, 2.0)]
+    base = np.concatenate(rings)
+    k = np.arange(8)
+    quads = np.stack([k, 8 + k, 8 + (k + 1) % 8, (k + 1) % 8], 1)
+    patch = Patch.of_quads(quads, 16)
+    fine = patch.threaded([list(range(8)), list(range(8, 16))])
+    assert len(fine) == 32
+    away = np.linalg.norm(fine.positions(base), axis=1)
+    assert np.all((np.abs(away - 1) < 0.01) | (np.abs(away - 2) < 0.02))
+    assert np.allclose(vertex_normals(fine.positions(base), fine.triangles), [0, 0, 1])
