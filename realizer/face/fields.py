@@ -21,6 +21,9 @@ from realizer.tables import faps
 __all__: list[str] = []
 
 PASSES = 2  # neighbours that were mended change what a field has to fit
+BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
+PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
+CLIMB = 0.4  # metres that the tongue's tip rises for each metre forwards
 LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
 
 
@@ -99,8 +102,10 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     turn_sin[:, 1], turn_sin[:, 2] = -arm[:, 2], arm[:, 1]
     # Thrust and shift take the lower lip along; the upper one stays.
     # The corners, shared by both, go 0.4 of the way.
-    cornered = lips.corners / np.maximum(lips.lips, 1e-9)
-    lip = np.where(lips.is_upper, 0.4 * cornered, 1 - 0.6 * cornered)
+    # The lips are stretched between: a shelf at the corner would show.
+    lip = np.where(
+        lips.is_upper, 0.4 * smooth(np.abs(lips.u), 0.4, 1.0), 1 - 0.6 * smooth(np.abs(lips.u), 0.2, 1.0)
+    )
     slides = drag * (1 - lips.lips + lips.lips * lip) + tongue
     slides /= slides[chin]
     return {
@@ -139,31 +144,47 @@ def _brows(ground: Ground) -> dict[int, Float64]:
         1: (("4.1", "4.3", "4.5"), (31, 33, 35)),
         -1: (("4.2", "4.4", "4.6"), (32, 34, 36)),
     }.items():
-        x = at[:, 0] * side
-        half = smooth(x, -0.012, 0.012)  # the two sides share the middle: together they lift it once
-        a, b, c = across
-        inner = half * smooth(x, b, a)
-        outer = smooth(x, b, c)
-        middle = half * (1 - smooth(x, b, a)) * (1 - outer)
+        inner, middle, outer = _stations(at[:, 0] * side, across)
         for number, name, share in zip(numbers, names, (inner, middle, outer), strict=True):
             out[number] = scaled(profile * share[:, None], points[name], UP)
-    _soften(ground, out, [points[f"4.{k}"] for k in range(1, 7)])
+    _soften(ground, out, [points[f"4.{k}"] for k in range(1, 7)], [31, 32, 33, 34, 35, 36])
     for number, name, side in ((37, "4.1", 1), (38, "4.2", -1)):
         x = at[:, 0] * side
-        reach = ground.ellipsoid(ground.point(name), (0.030, 0.022, 0.03)) * smooth(x, 0.0, across[0])
+        reach = ground.ellipsoid(ground.point(name), (0.036, 0.024, 0.03)) * smooth(x, 0.0, across[0])
         field = reach[:, None] * (-side * LEFT + 0.15 * FORWARD) * calm[:, None]
         out[number] = scaled(ground.smoothed(field, 1), points[name], -side * LEFT)
     return out
 
 
-def _soften(ground: Ground, fields: dict[int, Float64], points: list[int]) -> None:
-    """Take the kinks off fields; the vertices of feature points keep their moves, so each goes as asked."""
-    for number, field in fields.items():
-        soft = field
-        for _ in range(2):
-            soft = (soft + ground.smoothed(soft)) / 2
-            soft[points] = field[points]
-        fields[number] = soft
+def _stations(x: Float64, across: Float64) -> tuple[Float64, Float64, Float64]:
+    """(n,) each: how much of a side's inner, middle and outer brow a place at x has; 1 at its own station.
+
+    A bent strip, not a chain of straight ones: the curve through the stations has no corner anywhere, and at
+    the other side's inner end it is still.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    a, b, c = across
+    knots = np.array([-a, a, b, c])
+    out = []
+    for station in range(3):
+        value = np.zeros(4)
+        value[1 + station] = 1
+        slope = np.zeros(4)
+        slope[1:3] = (value[2:] - value[:2]) / (knots[2:] - knots[:2])
+        spline = CubicHermiteSpline(knots, value, slope * BEND)
+        out.append(np.asarray(spline(np.clip(x, -a, c)), np.float64))
+    return out[0], out[1], out[2]
+
+
+def _soften(
+    ground: Ground, fields: dict[int, Float64], points: list[int], numbers: list[int], times: int = 2
+) -> None:
+    """Take the kinks off fields of the same way, and mix them so that each leaves the others' points alone."""
+    soft = np.stack([ground.smoothed(fields[number], times) for number in numbers])
+    mixed = np.linalg.solve(soft[:, points, 1].T, np.eye(len(points)))
+    for k, number in enumerate(numbers):
+        fields[number] = np.tensordot(mixed[:, k], soft, 1)
 
 
 def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:
@@ -177,9 +198,11 @@ def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
     far = smooth(lips.away, 0.0, 0.032)[:, None]
     for side, half in _halves(ground, ground.shape("cheekPuff") * far).items():
         number, name = (39, "5.1") if side > 0 else (40, "5.2")
-        puffed = np.where(ground.body[:, None], half, 0)
-        # The whole puff goes along, forwards too; only what points inwards is kept out.
-        out[number] = scaled(ground.smoothed(puffed, 1), points[name], side * LEFT)
+        size = ground.smoothed(np.where(ground.body, np.linalg.norm(half, axis=1), 0), 2)
+        # A cheek is blown up from inside the mouth: away from there, not along one line.
+        away = ground.at - (ground.point(name) - PUFFED_FROM * np.array([side, 1, 1]))
+        away /= np.maximum(np.linalg.norm(away, axis=1), 0.010)[:, None]
+        out[number] = scaled(size[:, None] * away, points[name], side * LEFT)
     for side, (number, name, shape) in {
         1: (41, "5.3", "cheekSquintLeft"),
         -1: (42, "5.4", "cheekSquintRight"),
@@ -187,25 +210,32 @@ def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
         lifted = np.where(ground.body[:, None], ground.shape(shape), 0) * free
         eye = ground.point("3.3" if side > 0 else "3.4")
         lifted = (
-            lifted * (1 - ground.ellipsoid(eye + np.array([0, 0.004, 0]), (0.024, 0.012, 0.03), 0.5))[:, None]
+            lifted * (1 - ground.ellipsoid(eye + np.array([0, 0.004, 0]), (0.026, 0.018, 0.03), 0.2))[:, None]
         )
-        mound = ground.ellipsoid(ground.point(name), (0.030, 0.024, 0.035))[:, None] * (UP + 0.35 * FORWARD)
+        mound = ground.ellipsoid(ground.point(name), (0.034, 0.026, 0.036))[:, None] * (UP + 0.35 * FORWARD)
         here = lifted[points[name], 1]
-        mixed = mound + (lifted / here if here > 1e-4 else 0)
-        out[number] = scaled(ground.smoothed(mixed * free, 1), points[name], UP)
+        mixed = mound + 0.5 * (lifted / here if here > 1e-4 else 0)
+        # The lid's edge belongs to other FAPs.
+        rest = 1 - ground.ellipsoid(eye + np.array([0, 0.002, 0]), (0.030, 0.014, 0.03), 0.30)
+        out[number] = scaled(ground.smoothed(mixed * free * rest[:, None], 3), points[name], UP)
     return out
 
 
 def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
     points, free = ground.points, (1 - lips.lips)[:, None]
     out = {}
-    for number, name, side in ((61, "9.1", 1), (62, "9.2", -1)):
-        reach = ground.ellipsoid(ground.point(name), (0.011, 0.012, 0.014)) * smooth(
-            ground.at[:, 0] * side, 0.001, 0.008
+    for number, name, side, base in ((61, "9.1", 1, "9.5"), (62, "9.2", -1, "9.4")):
+        # A nostril widens away from its middle, not along one line (Paul 2010, 4.4.3).
+        wing = ground.point(name)
+        nostril = (wing + ground.point(base)) / 2
+        reach = ground.ellipsoid(wing - 0.002 * side * LEFT, (0.015, 0.014, 0.018), 0.1) * smooth(
+            ground.at[:, 0] * side, 0.000, 0.009
         )
-        out[number] = scaled(ground.smoothed(reach[:, None] * (side * LEFT), 1), points[name], side * LEFT)
+        spread = (ground.at - nostril) / np.linalg.norm(wing - nostril)
+        way = 0.5 * side * LEFT + 0.5 * np.clip(spread, -1.2, 1.2)
+        out[number] = scaled(ground.smoothed(reach[:, None] * way, 2), points[name], side * LEFT)
     tip = ground.point("9.3")
-    reach = ground.ellipsoid(tip - [0, 0.001, 0.006], (0.022, 0.020, 0.030), 0.15)[:, None]
+    reach = ground.ellipsoid(tip - [0, 0.001, 0.008], (0.025, 0.024, 0.032), 0.35)[:, None]
     out[63] = scaled(ground.smoothed(reach * (UP + 0.1 * FORWARD) * free, 1), points["9.3"], UP)
     reach = ground.ellipsoid(tip - [0, -0.004, 0.008], (0.026, 0.030, 0.032), 0.2)[:, None]
     out[64] = scaled(ground.smoothed(reach * -LEFT * free, 1), points["9.3"], -LEFT)
@@ -217,7 +247,7 @@ def _ears(ground: Ground) -> dict[int, Float64]:
     for side, names in {1: ("10.1", "10.3", 65, 67), -1: ("10.2", "10.4", 66, 68)}.items():
         top, back, up, pull = names
         centre = (ground.point(top) + ground.point("10.5" if side > 0 else "10.6")) / 2
-        reach = ground.ellipsoid(centre + np.array([0.006 * side, 0, -0.004]), (0.022, 0.046, 0.030), 0.45)
+        reach = ground.ellipsoid(centre + np.array([0.006 * side, 0, -0.004]), (0.024, 0.048, 0.032), 0.60)
         reach = ground.smoothed(reach, 1)[:, None]
         out[up] = scaled(reach * UP, points[top], UP)
         # Pulled out, the ear swings about its front edge.
@@ -243,7 +273,8 @@ def _tongue(ground: Ground) -> dict[int, Float64]:
     return {
         43: scaled(bend[:, None] * -LEFT, tip, -LEFT),
         44: scaled(bend[:, None] * UP, tip, UP),
-        45: scaled((along**1.5)[:, None] * FORWARD, tip, FORWARD),
+        # On its way out it climbs over the lower teeth.
+        45: scaled((along**1.5)[:, None] * (FORWARD + CLIMB * UP), tip, FORWARD),
         46: scaled(arch[:, None] * UP, body, UP),
         TONGUE_COS + 1: turn_cos,
         TONGUE_SIN + 1: turn_sin,

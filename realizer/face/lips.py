@@ -180,8 +180,10 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     at, points = ground.at, ground.points
     knots = hats(lips.u)
     in_front = ground.body & (at[:, 2] > -0.03)
-    soft = np.where(lips.is_upper, 0.014, 0.022)
-    fall = np.where(in_front, smooth(lips.away / soft, 1.0, 0.0), 0) * np.where(lips.fade > 0, lips.fade, 1.0)
+    soft = np.where(lips.is_upper, 0.015, 0.026)
+    # Between a straight line and a curve without corners: gentle where the chin folds.
+    near = 0.5 * np.clip(1 - lips.away / soft, 0, 1) + 0.5 * smooth(lips.away / soft, 1.0, 0.0)
+    fall = np.where(in_front, near, 0) * np.where(lips.fade > 0, lips.fade, 1.0)
     upper, lower = lips.is_upper * fall, ~lips.is_upper * fall
     inner, outer = 1 - lips.w, lips.w
     right, half_right, middle, half_left, left = knots

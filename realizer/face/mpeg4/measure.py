@@ -170,8 +170,8 @@ def others_of(measure: Measure, row: Fap, asked: list[float], moves: list[Float6
     )
 
 
-def flips_of(measure: Measure, row: Fap, values: dict[int, float]) -> float:
-    """Share of the moved skin that turns over; turning parts turn theirs rightly."""
+def flips_of(measure: Measure, row: Fap, values: dict[int, float], cosine: float = 0.0) -> float:
+    """Share of the moved skin that turns by more than the angle; turning parts turn theirs rightly."""
     if row.unit == "angle_unit":
         return 0.0
     corners = measure.triangles
@@ -180,7 +180,7 @@ def flips_of(measure: Measure, row: Fap, values: dict[int, float]) -> float:
     )
     area = np.linalg.norm(rest, axis=1)
     moved = np.abs(rest - now).max(axis=1) > 1e-3 * area
-    turned = (rest * now).sum(axis=1) < 0
+    turned = (rest * now).sum(axis=1) < cosine * area * np.linalg.norm(now, axis=1)
     return float(area[turned].sum() / max(area[moved].sum(), 1e-12))
 
 

@@ -21,6 +21,7 @@ __all__ = ["PEERS", "Truth", "face_truth", "mean_score"]
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 
 HALF, TURN = 512.0, 20000.0  # FAPU, angle units: half a face distance is what Paul looked at
+ROLLED = -0.5  # cosine of a third of a turn
 # For scores 3 and 2: error, mirror, others, share of area that flips, roughness; and for 1: error.
 # A hundredth of a percent of the moved skin is less than a pixel.
 RIGHT = (0.02, 0.01, 0.05, 1e-4, 0.25)
@@ -38,8 +39,8 @@ class Truth:
         mirror: the largest difference from the twin's mirror image, of the largest move.
         others: the largest move of a point that must stay (the opposite lip or lid; FAP 3: all lips).
         flips: the share (by area) of the moved skin, mouth and sockets too, whose triangles turn by more
-            than a right angle at the most that is usual, alone or with all that the action unit asks for
-            that asks most of it.
+            than a right angle at the most that is usual; with all that the action unit asks for that asks
+            most of it lips may roll, and a third of a turn counts.
         rough: 95th percentile, over the open skin that moves by more than 5 % of the largest move, of how
             far a vertex's move is from the mean of its neighbours', of the largest move.
         usual: the most that is usual, in the FAP's own unit.
@@ -113,7 +114,8 @@ def _truth(measure: Measure, row: Fap, sign: int) -> Truth:
         mirror=mirror_of(measure, row, moves[0], measure.moves({row.mirror: value * row.sign})),
         others=others_of(measure, row, asked, moves),
         flips=max(
-            flips_of(measure, row, values) for values in ({row.fap: sign * top}, company(row.fap, sign))
+            flips_of(measure, row, {row.fap: sign * top}),
+            flips_of(measure, row, company(row.fap, sign), ROLLED),
         ),
         rough=rough_of(measure, row, moves[0][measure.skin]),
         usual=top,
