@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
@@ -75,6 +76,12 @@ def _address(value: Any) -> str:
     return f"{host}:{int(port)}"
 
 
+def _colour(value: Any) -> str:
+    if not isinstance(value, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}|transparent", value):
+        raise ValueError("transparent or a colour such as #d8dde2")
+    return value
+
+
 def _folder(value: Any) -> Path:
     path = Path(value)
     if not path.is_dir():
@@ -138,6 +145,11 @@ class Settings:
     )
     voice: str | None = _setting(None, _optional(_text), "none: espeak-ng where installed, else silent")
     language: str = _setting("en-US", _text, "BCP-47, of speech that names none")
+    camera: str = _setting("front", _text, "of pictures that name none")
+    light: str | None = _setting(None, _optional(_text), "of pictures that name none; none: portrait")
+    background: str | None = _setting(
+        None, _optional(_colour), "of pictures that name none; none: the light's own"
+    )
     fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
     scene: Path | None = _setting(None, _optional(Path), "a file of targets every session starts with")
     media: Path | None = _setting(None, _optional(_folder), "the folder of the files that documents may name")

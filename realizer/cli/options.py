@@ -145,9 +145,16 @@ def light(command: Command) -> Command:
 
 
 def _light(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    check_light(value)
+    return value
+
+
+def check_light(name: str | None) -> None:
+    """Nothing, where there is such a light; click.BadParameter, which lists them, where there is none."""
     from realizer.render.light import preset
 
-    return None if value is None else _asked(preset, value)
+    if name is not None:
+        _asked(preset, name)
 
 
 def background(command: Command) -> Command:

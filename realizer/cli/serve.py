@@ -25,6 +25,9 @@ __all__: list[str] = []
 @click.option("--stomp", metavar="HOST:PORT", help="Serve clients of this STOMP broker: ASAP JSON, VHMSG.")
 @click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
 @options.deformer
+@click.option("--camera", metavar="NAME", help=f"Of pictures that name none: {options.CAMERAS}")
+@options.light
+@options.colour
 @click.option("--voice", metavar="NAME", help="Voice of characters that name none.")
 @click.option("--fps", type=float, help="Frames a second of streams that name no rate.  [default: 25]")
 @click.option(
@@ -52,6 +55,8 @@ def serve(config: Path | None, **flags: Any) -> None:
         settings = Settings.read(flags, file=config)
     except SettingsError as error:
         raise click.UsageError(str(error)) from None
+    options.check_camera(settings.face, settings.camera)
+    options.check_light(settings.light)
     find_voice(settings.voice).close()  # a voice that is not installed is said before a door opens
     options.tell_silence(settings.voice)
     run(settings)

@@ -16,7 +16,7 @@ from realizer.server.connection import (
     SoundSubscription,
     View,
 )
-from realizer.server.effects import Draw, Effect, Send
+from realizer.server.effects import Draw, Effect, Look, Send
 from realizer.server.plans import Plans, message
 from realizer.server.streams import AHEAD, EPSILON, PACKET, Sound, Timeline, encode, first_at, last_at
 from realizer.server.wire import FrameKind, pack
@@ -81,13 +81,11 @@ class Broadcast:
         sound = self._sounds.setdefault((index, rate), Sound(self.player, rate, index))
         return SoundSubscription(sound, index or 0, math.ceil((now - EPSILON) / PACKET), self.player.revision)
 
-    def pictures(
-        self, index: int, fps: float, size: tuple[int, int], camera: str, quality: int, now: float
-    ) -> PictureSubscription:
+    def pictures(self, index: int, fps: float, look: Look, now: float) -> PictureSubscription:
         """A subscription to pictures, from `now` on."""
         timeline = self.timeline(index, fps)
         face = self._face_name(index)
-        view = View(timeline, index, face, size, camera, quality, first_at(now, fps))
+        view = View(timeline, index, face, look, first_at(now, fps))
         view = self._views.setdefault(view.key, view)
         return PictureSubscription(view, first_at(now, fps))
 
@@ -284,4 +282,4 @@ class Broadcast:
             self._draws += 1
             view.busy, view.drawing, view.begun, view.next = self._draws, newest, now, newest + 1
             pose = window.poses[newest - window.first]
-            effects.append(Draw(self._draws, view.face, pose, view.size, view.camera, view.quality))
+            effects.append(Draw(self._draws, view.face, pose, view.look))

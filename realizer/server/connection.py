@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from bml_schema import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress, WarningFeedback
+from realizer.server.effects import Look
 from realizer.server.streams import Sound, Timeline
 
 __all__: list[str] = []
@@ -53,9 +54,7 @@ class View:
     timeline: Timeline
     index: int
     face: str
-    size: tuple[int, int]
-    camera: str
-    quality: int
+    look: Look
     next: int
     busy: int | None = None
     drawing: int = 0  # the frame that is being drawn
@@ -64,7 +63,7 @@ class View:
     @property
     def key(self) -> tuple[object, ...]:
         """What two subscriptions must share to see the same picture."""
-        return (self.index, self.timeline.fps, self.face, self.size, self.camera, self.quality)
+        return (self.index, self.timeline.fps, self.face, self.look)
 
 
 @dataclass(eq=False)

@@ -15,6 +15,7 @@ from realizer.server.connection import (
     SoundSubscription,
     Subscription,
 )
+from realizer.server.effects import Look
 from realizer.server.messages import (
     PROTOCOL,
     STREAMS,
@@ -137,10 +138,7 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
             subscription = old  # what was sent ahead is not sent again
         told |= {"rate": message.rate, "frame": subscription.next, "fps": 50.0}
     elif stream == "video":
-        _check_picture(session, message)
-        subscription = session.broadcast.pictures(
-            index, fps, message.size, message.camera, message.quality, t
-        )
+        subscription = session.broadcast.pictures(index, fps, _look(session, message), t)
         told |= {"fps": fps, "frame": subscription.next, "size": message.size}
         told |= {"face": session.face_name(index), "media_type": "image/jpeg"}
     else:
@@ -159,10 +157,24 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
     session.reply(connection.id, Subscribed(character=message.character, **told))
 
 
-def _check_picture(session: Session, message: Subscribe) -> None:
-    largest = session.settings.max_size
+def _look(session: Session, message: Subscribe) -> Look:
+    from realizer.render.light import presets
+
+    settings = session.settings
+    largest = settings.max_size
     if not all(16 <= side <= largest for side in message.size):
         raise Wrong("size", f"wanted sides of 16..{largest} pixels, got {list(message.size)}")
+    if message.light is not None and message.light not in presets():
+        raise Wrong("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
+    # A JPEG is opaque: the service's own "transparent" means the light's backdrop.
+    behind = message.background or (settings.background if settings.background != "transparent" else None)
+    return Look(
+        size=message.size,
+        camera=message.camera or settings.camera,
+        light=message.light or settings.light,
+        background=behind,
+        quality=message.quality,
+    )
 
 
 def _mesh_of(session: Session, index: int) -> dict[str, Any]:

@@ -26,19 +26,28 @@ class Speak:
     say: Say
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How pictures are drawn: `size` is width, height; the rest as `realizer.render.Renderer` takes it."""
+
+    size: tuple[int, int]
+    camera: str
+    light: str | None
+    background: str | None
+    quality: int  # of the JPEG
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Draw:
     """Draw one picture and answer `session.drawn(id, jpeg or error, now)`.
 
-    `pose` is (k,) float32, a column for each thing the face takes; `size` is width, height.
+    `pose` is (k,) float32, a column for each thing the face takes.
     """
 
     id: int
     face: str
     pose: Float32
-    size: tuple[int, int]
-    camera: str
-    quality: int
+    look: Look
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,11 @@ class Subscribe(Message):
     fps: float | None = Field(None, gt=0, le=240, description="None: the service's own rate")
     character: str | None = Field(None, max_length=256)
     size: tuple[int, int] = Field((512, 512), description="video: width, height in pixels")
-    camera: str = Field("front", max_length=64, description="video")
+    camera: str | None = Field(None, max_length=64, description="video; None: the service's own")
+    light: str | None = Field(None, max_length=64, description="video; None: the service's own")
+    background: str | None = Field(
+        None, pattern="^#[0-9a-fA-F]{6}$", description="video: a colour; None: the service's, or the light's"
+    )
     quality: int = Field(85, ge=1, le=100, description="video: of the JPEG")
     elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
     rate: int = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")

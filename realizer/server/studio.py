@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from realizer.errors import RealizerError, RenderError, VoiceError
-from realizer.server.effects import Draw, Speak
+from realizer.server.effects import Draw, Look, Speak
 from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Utterance, Voice
 
@@ -34,7 +35,7 @@ class Studio:
         self.speakers = ThreadPoolExecutor(2, "voice")
         self.drawers = ThreadPoolExecutor(1, "renderer")
         self._voices: dict[str | None, Voice] = {}
-        self._renderers: dict[tuple[str, tuple[int, int], str], Renderer] = {}
+        self._renderers: dict[tuple[str, Look], Renderer] = {}
         self._lock = threading.Lock()
         self._said: set[str] = set()
 
@@ -53,10 +54,10 @@ class Studio:
         """A JPEG; or why there is none."""
         try:
             try:
-                return self._renderer(order).jpeg(order.pose, order.quality)
+                return self._renderer(order).jpeg(order.pose, order.look.quality)
             except RenderError:
                 # A drawing process that died is started anew by the next call; one that cannot fails again.
-                return self._renderer(order).jpeg(order.pose, order.quality)
+                return self._renderer(order).jpeg(order.pose, order.look.quality)
         except RealizerError as error:
             return error
         except Exception as error:
@@ -82,11 +83,19 @@ class Studio:
     def _renderer(self, order: Draw) -> Renderer:
         from realizer.render import Renderer
 
-        key = (order.face, order.size, order.camera)
+        look = replace(order.look, quality=0)  # which needs no other process
+        key = (order.face, look)
         if key not in self._renderers:
             if len(self._renderers) >= RENDERERS:
                 self._renderers.pop(next(iter(self._renderers))).close()
-            self._renderers[key] = Renderer(order.face, order.size, order.camera, deformer=self._deformer)
+            self._renderers[key] = Renderer(
+                order.face,
+                look.size,
+                look.camera,
+                light=look.light,
+                background=look.background,
+                deformer=self._deformer,
+            )
         return self._renderers[key]
 
     def _tell(self, fault: str) -> None:

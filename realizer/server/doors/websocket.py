@@ -30,7 +30,7 @@ class WebSocketDoor:
         self.port = settings.port
         self._shell = shell
         self._settings = settings
-        self._site = Site(shell.health)
+        self._site = Site(shell.health, shell.settings.light, shell.settings.background)
         self._socket: SocketServer | None = None
         self._closing: set[asyncio.Task[None]] = set()
 

@@ -55,6 +55,20 @@ def test_a_wrong_look_is_wrong_usage(args: list[str], words: str) -> None:
     assert words in " ".join(done.stderr.split())
 
 
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["--camera", "top"], "wanted one of front, three-quarter, profile, close, got 'top'"),
+        (["--light", "noon"], "wanted one of portrait, daylight, evening, got 'noon'"),
+        (["--background", "transparent"], "these pictures are opaque"),
+    ],
+)
+def test_serve_refuses_a_wrong_look_before_a_door_opens(args: list[str], words: str) -> None:
+    done = run("serve", "--port", "0", *args)
+    assert done.exit_code == 2
+    assert words in " ".join(done.stderr.split())
+
+
 @pytest.mark.gl
 def test_light_and_background_are_seen_in_the_picture(tmp_path: Path) -> None:
     from PIL import Image

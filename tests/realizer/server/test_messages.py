@@ -72,7 +72,9 @@ def test_any_text_gives_a_message_or_an_error(text) -> None:
 def test_a_subscription_has_the_defaults_of_the_protocol() -> None:
     message = parse_control('{"type":"subscribe","stream":"video"}')
     assert isinstance(message, Subscribe)
-    assert (message.size, message.camera, message.quality, message.fps) == ((512, 512), "front", 85, None)
+    assert (message.size, message.quality) == ((512, 512), 85)
+    # The service's own.
+    assert (message.camera, message.light, message.background, message.fps) == (None,) * 4
     assert {stream: encodings[0] for stream, encodings in STREAMS.items()}["fap"] == "binary"
 
 

@@ -377,7 +377,7 @@ def test_the_newest_frame_is_drawn_and_late_ones_are_skipped(driver) -> None:
     client = driver.send({"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 10})
     driver.run(1.0)
     (first,) = driver.draws
-    assert first.size == (64, 64)
+    assert first.look.size == (64, 64)
     assert first.pose.shape == (68,)
     driver.session.drawn(first.id, b"jpeg", driver.opened + 1.0)
     driver.collect()
@@ -414,6 +414,24 @@ def test_pictures_that_cannot_be_drawn_end_with_one_error(driver) -> None:
 def test_a_picture_of_absurd_size_is_refused(driver) -> None:
     client = driver.send({"type": "subscribe", "stream": "video", "size": [100000, 100000]})
     assert client.of("error")[0]["where"] == "subscribe.size"
+
+
+def test_who_asks_for_another_light_gets_pictures_of_its_own(driver) -> None:
+    driver.join(2)
+    driver.send({"type": "subscribe", "stream": "video"}, 1)
+    look = {"camera": "profile", "light": "evening", "background": "#102030"}
+    driver.send({"type": "subscribe", "stream": "video", **look}, 2)
+    driver.run(0.05)
+    plain, own = (draw.look for draw in driver.draws)
+    assert (plain.camera, plain.light, plain.background) == ("front", None, None)
+    assert (own.camera, own.light, own.background) == ("profile", "evening", "#102030")
+
+
+def test_a_light_that_is_not_there_is_refused_with_those_that_are(driver) -> None:
+    client = driver.send({"type": "subscribe", "stream": "video", "light": "noon"})
+    (error,) = client.of("error")
+    assert error["where"] == "subscribe.light"
+    assert "portrait, daylight, evening" in error["message"]
 
 
 # sessions ---------------------------------------------------------------------------------------
