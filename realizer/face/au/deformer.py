@@ -11,6 +11,7 @@ from realizer.arrays import Bool, Float32, Float64
 from realizer.face.au.mixers import OPENING, opened
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
+from realizer.face.au.roots import roots
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
@@ -134,8 +135,6 @@ def moves_of(face: Face) -> Moves | None:
 
 def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Float64:
     """(units, n_vertices, 3) metres with full intensity."""
-    from scipy.spatial import cKDTree
-
     at = face.vertices.astype(np.float64)
     mine = np.zeros(len(at), bool)
     for part in FACE:
@@ -146,12 +145,11 @@ def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Fl
     for row, (au, side) in zip(moves, names, strict=True):
         row[mine] = model.displacement(au, at[mine], side, upper[mine])
     # Brows and lashes go with the skin that they grow on: off it, functions of the place differ.
-    first, last = face.parts["skin"]
-    tree = cKDTree(at[first:last])
     for part in GROWN:
         if part in face.parts:
-            grown = slice(*face.parts[part])
-            moves[:, grown] = moves[:, first + np.asarray(tree.query(at[grown])[1])]
+            first, last = face.parts[part]
+            corners, share = roots(face, part)
+            moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
     moves[np.abs(moves).max(axis=2) < LEAST] = 0
     return moves
 
