@@ -1,4 +1,4 @@
-"""`faces import`: a GLB head with ARKit's shapes becomes a face folder."""
+"""`faces import` and `faces check`: a head of another make becomes a face; what is wrong with either."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 __all__: list[str] = []
+
+HEADS = (".glb", ".gltf")
 
 
 @click.command("import")
@@ -28,3 +30,34 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
     click.echo(
         f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png", err=True
     )
+
+
+@click.command()
+@click.argument("names", nargs=-1, metavar="[NAME | HEAD.glb]...")
+def check(names: tuple[str, ...]) -> int:
+    """Say every fault of face folders, of all without a name; of a GLB head, what an import would find."""
+    from realizer.face import check_face, list_faces
+
+    status = 0
+    for name in names or [face.name for face in list_faces()]:
+        head = Path(name)
+        faults = _head_faults(head) if head.suffix.lower() in HEADS else check_face(name)
+        for fault in faults:
+            click.echo(fault)
+        if not faults:
+            click.echo(f"{name}: sound", err=True)
+        status = 1 if faults else status
+    return status
+
+
+def _head_faults(head: Path) -> tuple[str, ...]:
+    """Why a head cannot be imported; else says what an import finds."""
+    from realizer.errors import FaceError
+    from realizer.face.arkit import look_at
+
+    try:
+        for line in look_at(head).lines:
+            click.echo(line)
+    except FaceError as error:
+        return (str(error),)
+    return ()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from realizer.cli.bring import import_
+from realizer.cli.bring import check, import_
 from realizer.cli.fit import fit
 from realizer.cli.mapping import mapping
 from realizer.cli.sheet import sheet
@@ -19,6 +19,7 @@ def faces() -> None:
     """List, check and build faces."""
 
 
+faces.add_command(check)
 faces.add_command(fit)
 faces.add_command(import_)
 faces.add_command(mapping)
@@ -32,20 +33,6 @@ def list_() -> None:
 
     for face in list_faces():
         click.echo(f"{face.name:<12} {face.says}  [{face.licence}]")
-
-
-@faces.command()
-@click.argument("name")
-def check(name: str) -> int:
-    """Say every fault of a face folder."""
-    from realizer.face import check_face
-
-    faults = check_face(name)
-    for fault in faults:
-        click.echo(fault)
-    if not faults:
-        click.echo(f"{name}: sound", err=True)
-    return 1 if faults else 0
 
 
 @faces.command()

@@ -1,25 +1,35 @@
-"""A face folder in, its faults out: which file, and what to change."""
+"""A face folder in, its faults out: which file, and what to change. One fault does not hide another."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from realizer.errors import FaceError, TableError
 from realizer.face.archive import read_arrays
-from realizer.face.basis import ARRAYS
+from realizer.face.basis import ARRAYS, ROWS
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
 from realizer.face.load import MESH, folder_of, load_face, read_head
 from realizer.face.model import Face
+from realizer.face.soundness import surface_faults, value_faults
 from realizer.tables import faps
 from realizer.tables.mappings import own_file, read_mapping
 
 __all__ = ["check_face"]
 
 OFF = 0.004  # m; a feature point further than this from its vertex is off the mesh
-PARTS = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "brows", "hair")
-EDGES_OF_SKIN = 1  # the clean cut under the collar is the only hole that a head may have
+NEEDED = ("skin", "left_eye", "right_eye")
+PARTS = (
+    *NEEDED, "upper_teeth", "lower_teeth", "tongue", "brows", "lashes", "hair", "beard", "shirt", "other",
+)  # fmt: skip
+KEYS = ("name", "source", "licence", "says", "parts", "cameras", "deformer")
+TONGUE = range(43, 48)  # FAPs that move nothing where there is none
+
+Read = TypeVar("Read")
 
 
 def check_face(name: str = "default", directory: Path | str | None = None) -> tuple[str, ...]:
@@ -29,79 +39,99 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     except FaceError as error:
         return (str(error),)
     faults: list[str] = []
-    for read in (
-        lambda: read_head(folder),
-        lambda: read_arrays(folder / "mesh.npz", MESH),
-        lambda: read_features(folder / "features.csv"),
-        lambda: read_arrays(folder / "fields.npz", ARRAYS),
-        lambda: _read_mapping(folder),
-    ):
+
+    def tried(read: Callable[[], Read]) -> Read | None:
         try:
-            read()
+            return read()
         except (FaceError, TableError) as error:
             faults.append(str(error))
-    if faults:
-        return tuple(faults)
-    mesh = read_arrays(folder / "mesh.npz", MESH)
-    head = read_head(folder)
-    points = read_features(folder / "features.csv")
-    faults += _mesh_faults(folder, mesh["vertices"], mesh["triangles"], mesh)
-    faults += _part_faults(folder, head["parts"], len(mesh["vertices"]))
-    faults += _point_faults(folder, points, mesh["vertices"])
-    try:
-        fapu_of({key: np.array(p.place, np.float32) for key, p in points.items()}, folder / "features.csv")
-        if not faults:
-            face = load_face(folder.name, folder.parent)
-            faults += _field_faults(folder, face)
-            faults += _hole_faults(folder, face)
-    except FaceError as error:
-        faults.append(str(error))
-    return tuple(faults)
+            return None
+
+    head = tried(lambda: read_head(folder))
+    mesh = tried(lambda: read_arrays(folder / "mesh.npz", MESH))
+    points = tried(lambda: read_features(folder / "features.csv"))
+    stored = tried(lambda: read_arrays(folder / "fields.npz", ARRAYS))
+    tried(lambda: _read_mapping(folder))
+    n = len(mesh["vertices"]) if mesh else None
+    values = value_faults(mesh) if mesh else []
+    faults += [f"{folder / 'mesh.npz'}: {fault}" for fault in values]
+    parts: list[str] = []
+    if head:
+        parts = _part_faults(folder, head["parts"], n)
+        faults += _key_faults(folder, head) + parts
+    if points:
+        tried(lambda: _fapu(folder, points))
+        if mesh and not values:
+            faults += _point_faults(folder, points, mesh["vertices"], mesh["triangles"])
+    if stored and n is not None:
+        faults += _stored_faults(folder, stored, n)
+    skin = head["parts"]["skin"] if head and not parts else None
+    for check in (lambda: _zone_faults(folder, skin), lambda: _shape_faults(folder)):
+        faults += tried(check) or []
+    for path in sorted(folder.glob("au_*.toml")):
+        faults += tried(lambda path=path: _model_faults(path)) or []  # type: ignore[misc]
+    if mesh and not values and head and not parts:
+        ranges = {key: (int(a), int(b)) for key, (a, b) in head["parts"].items()}
+        mouth = None if not points else (np.array(points["2.2"].place) + np.array(points["2.3"].place)) / 2
+        found = surface_faults(np.asarray(mesh["vertices"], float), mesh["triangles"], ranges, mouth)
+        faults += [f"{folder / 'mesh.npz'}: {fault}" for fault in found]
+    if not faults:
+        face = tried(lambda: load_face(folder.name, folder.parent))
+        faults += _field_faults(folder, face) if face else []
+    return tuple(dict.fromkeys(faults))
 
 
 def _read_mapping(folder: Path) -> None:
-    own = own_file(folder)
-    if own is not None:
+    """Its own words for action units, if it has any."""
+    if own := own_file(folder):
         read_mapping(own)
 
 
-def _mesh_faults(
-    folder: Path, vertices: np.ndarray, triangles: np.ndarray, mesh: dict[str, np.ndarray]
-) -> list[str]:
-    path, n = folder / "mesh.npz", len(vertices)
-    faults = []
-    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
-    if len(bad):
-        faults.append(
-            f"{path}: vertices: {len(bad)} are not finite, the first is {bad[0]}; build the face again"
-        )
-    if vertices.shape[1] != 3 or triangles.shape[1] != 3:
-        faults.append(
-            f"{path}: wanted vertices and triangles of 3 columns, got {vertices.shape}, {triangles.shape}"
-        )
-    elif len(triangles) and (triangles.min() < 0 or triangles.max() >= n):
-        faults.append(
-            f"{path}: triangles: wanted indices 0..{n - 1}, got {triangles.min()}..{triangles.max()}"
-        )
+def _fapu(folder: Path, points: dict[str, Point]) -> None:
+    fapu_of({key: np.array(p.place, np.float32) for key, p in points.items()}, folder / "features.csv")
+
+
+def _nearest(word: str, words: Any) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, list(words), n=1)
+    return f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(words)}"
+
+
+def _key_faults(folder: Path, head: dict[str, Any]) -> list[str]:
+    return [
+        f"{folder / 'face.toml'}: {key!r}: there is no such key{_nearest(key, KEYS)}"
+        for key in head
+        if key not in KEYS
+    ]
+
+
+def _part_faults(folder: Path, parts: dict[str, Any], n: int | None) -> list[str]:
+    path = folder / "face.toml"
+    faults = [f"{path}: parts: wanted {name!r}, got none" for name in NEEDED if name not in parts]
+    ranges = {}
+    for name, ends in parts.items():
+        if name not in PARTS:
+            faults.append(f"{path}: parts: {name!r}: there is no such part{_nearest(name, PARTS)}")
+        whole = isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, int) for end in ends)
+        if not whole or not 0 <= ends[0] < ends[1] or (n is not None and ends[1] > n):
+            most = "the number of vertices" if n is None else n
+            faults.append(f"{path}: parts: {name}: wanted [first, last + 1] in 0..{most}, got {ends}")
+        else:
+            ranges[name] = ends
+    ordered = sorted(ranges, key=lambda name: ranges[name])
     faults += [
-        f"{path}: {name}: wanted {n} rows, one a vertex, got {len(mesh[name])}"
-        for name in ("colours", "occlusion", "gloss")
-        if len(mesh[name]) != n
+        f"{path}: parts: {one} {ranges[one]} and {other} {ranges[other]} overlap: a vertex is of one part"
+        for one, other in pairwise(ordered)
+        if ranges[one][1] > ranges[other][0]
     ]
     return faults
 
 
-def _part_faults(folder: Path, parts: dict[str, list[int]], n: int) -> list[str]:
-    path = folder / "face.toml"
-    faults = [f"{path}: parts: wanted {name!r}, got none" for name in PARTS if name not in parts]
-    for name, (first, last) in parts.items():
-        if not 0 <= first < last <= n:
-            faults.append(f"{path}: parts: {name}: wanted a range in 0..{n}, got {first}..{last}")
-    return faults
-
-
-def _point_faults(folder: Path, points: dict[str, Point], vertices: np.ndarray) -> list[str]:
+def _point_faults(folder: Path, points: dict[str, Point], vertices: Any, triangles: Any) -> list[str]:
     path, n = folder / "features.csv", len(vertices)
+    on_surface = np.zeros(n, bool)
+    on_surface[triangles] = True
     faults = []
     for name, point in points.items():
         if not 0 <= point.vertex < n:
@@ -115,53 +145,93 @@ def _point_faults(folder: Path, points: dict[str, Point], vertices: np.ndarray) 
                     f"{path}: {name}: the point is {off * 1000:.1f} mm off its vertex {point.vertex}; "
                     "put the nearest vertex there, or move the point onto the mesh"
                 )
+            elif not on_surface[point.vertex]:
+                faults.append(
+                    f"{path}: {name}: vertex {point.vertex} lies on no surface, no triangle has it; "
+                    "put the nearest vertex of the surface there"
+                )
     return faults
+
+
+def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
+    """Fields made for another mesh, or cut short."""
+    path, faults = folder / "fields.npz", []
+    again = "build or import the face again"
+    if len(stored["head"]) != n:
+        faults.append(f"{path}: head: wanted {n} values, one a vertex, got {len(stored['head'])}; {again}")
+    for name in ("vertex", "lid"):
+        index = stored[name]
+        if len(index) and (index.min() < 0 or index.max() >= n):
+            faults.append(f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; {again}")
+    for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
+        if not np.isfinite(stored[name]).all():
+            faults.append(f"{path}: {name}: wanted finite numbers, got NaN or infinity; {again}")
+    row, start = stored["row"], stored["start"]
+    if len(row) and (row.min() < 3 or row.max() > ROWS or (np.diff(row) <= 0).any()):
+        faults.append(
+            f"{path}: row: wanted ascending numbers 3..{ROWS}, got {row.min()}..{row.max()}; {again}"
+        )
+    if len(start) != len(row) + 1 or (np.diff(start) < 0).any() or start[-1] != len(stored["vertex"]):
+        faults.append(f"{path}: start: wanted {len(row) + 1} ascending ends of vertex, got others; {again}")
+    if stored["move"].shape != (len(stored["vertex"]), 3):
+        faults.append(f"{path}: move: wanted 3 numbers a vertex, got {stored['move'].shape}; {again}")
+    return faults
+
+
+def _zone_faults(folder: Path, skin: Any) -> list[str]:
+    """Faults of the face's own zones, if it has any."""
+    from realizer.face.mpeg4.parameters import FILE, read_setup
+
+    path = folder / FILE
+    if not path.is_file():
+        return []
+    setup = read_setup(path)
+    return [
+        f"{path}: mask of FAP {fap}: wanted vertices of the skin, {skin[0]}..{skin[1] - 1}, got "
+        f"{mask.min()}..{mask.max()}; take out the others"
+        for fap, mask in setup.masks.items()
+        if skin and len(mask) and (mask.min() < skin[0] or mask.max() >= skin[1])
+    ]
+
+
+def _model_faults(path: Path) -> list[str]:
+    """Faults of a model of action units."""
+    from realizer.face.au.file import read_model
+    from realizer.face.au.units import units
+
+    model = read_model(path)
+    known = ", ".join(map(str, units()))
+    return [
+        f"{path}: [AU{au}]: there is no such unit in the model; wanted one of {known}"
+        for au in (*model.units, *model.degrees)
+        if au not in units()
+    ]
+
+
+def _shape_faults(folder: Path) -> list[str]:
+    """Faults of the face's own shapes, if it has any."""
+    from realizer.face.au.measure import read_shapes
+
+    path = folder / "au_shapes.npz"
+    if path.is_file():
+        read_shapes(path)
+    return []
 
 
 def _field_faults(folder: Path, face: Face) -> list[str]:
     from realizer.face.deform import deform
 
+    path = folder / "fields.npz"
     rows = np.zeros((69, 68), np.float32)
     for row in faps()[2:]:
         rows[row.fap, row.fap - 1] = 0.1 * row.most
     moved = np.abs(deform(face, rows) - face.vertices).max(axis=(1, 2))
     faults = []
     if moved[0] > 1e-6:
-        faults.append(
-            f"{folder / 'fields.npz'}: the neutral face moves by {moved[0]:.6f} m; build the face again"
-        )
-    for row in faps()[2:]:
-        if moved[row.fap] < 1e-6:
-            faults.append(
-                f"{folder / 'fields.npz'}: FAP {row.fap} {row.name} moves nothing; build the face again"
-            )
-    return faults
-
-
-def _hole_faults(folder: Path, face: Face) -> list[str]:
-    """Closed rims of the skin beyond the cut under the collar."""
-    first, last = face.parts["skin"]
-    triangles = face.triangles[(face.triangles >= first).all(axis=1) & (face.triangles < last).all(axis=1)]
-    edges = np.sort(
-        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
-    )
-    pairs, counts = np.unique(edges, axis=0, return_counts=True)
-    rim = pairs[counts == 1]
-    if not len(rim):
-        return []
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    names, index = np.unique(rim, return_inverse=True)
-    index = index.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(index)), (index[:, 0], index[:, 1])), (len(names),) * 2)
-    count, label = connected_components(graph, directed=False)
-    if count <= EDGES_OF_SKIN:
-        return []
-    lowest = face.vertices[names, 1]
-    bottom = label[int(np.argmin(lowest))]
-    other = names[label != bottom]
-    return [
-        f"{folder / 'mesh.npz'}: the skin has {count - 1} holes beside the cut under the collar, one at "
-        f"vertex {other[0]}, {np.round(face.vertices[other[0]], 4).tolist()}; close it"
+        faults.append(f"{path}: the neutral face moves by {moved[0]:.6f} m; build the face again")
+    faults += [
+        f"{path}: FAP {row.fap} {row.name} moves nothing; build the face again"
+        for row in faps()[2:]
+        if moved[row.fap] < 1e-6 and ("tongue" in face.parts or row.fap not in TONGUE)
     ]
+    return faults

@@ -64,8 +64,11 @@ def load_face(
     Raises:
         FaceError: no such face, or a folder that cannot be used; the text says which file and what to change.
     """
-    folder = folder_of(name, directory)
-    return _load(folder, _asked(deformer))
+    folder, chosen = folder_of(name, directory), _asked(deformer)
+    try:
+        return _load(folder, chosen)
+    except FaceError as error:
+        raise FaceError(f"{error}; run realizer faces check {folder.name}") from None
 
 
 def takes(
