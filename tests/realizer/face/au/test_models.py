@@ -104,8 +104,8 @@ def test_the_same_model_drives_a_mesh_of_another_topology(name: str, model: Mode
     assert len(index) == size
     assert len(corners) > 1.7 * size
     off, place = (np.asarray(found) for found in cKDTree(measured[1].at).query(skin[index]))
-    known = off < 1e-6
-    assert known.sum() > 0.4 * size
+    known = off < 5e-4
+    assert known.sum() > 0.3 * size
     misses = []
     for au, one in measured.items():
         goes = one.moves[place[known]]
