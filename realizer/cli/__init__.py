@@ -17,6 +17,7 @@ from realizer.cli.faces import faces
 from realizer.cli.lists import outputs, voices
 from realizer.cli.play import realize, schedule
 from realizer.cli.serve import serve
+from realizer.cli.track import track
 from realizer.errors import RealizerError
 
 __all__ = ["main"]
@@ -44,7 +45,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     options.speak_up(context, quiet=quiet, verbose=verbose)
 
 
-for command in (serve, realize, schedule, check, emotion, enrich, faces, voices, outputs, doctor, demo):
+for command in (serve, realize, schedule, check, emotion, track, enrich, faces, voices, outputs, doctor, demo):
     options.loudness(command)
     cli.add_command(command)
 

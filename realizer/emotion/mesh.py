@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -11,7 +12,7 @@ from realizer.arrays import Bool, Float32, Float64
 from realizer.emotion.measure import faps_from_points
 from realizer.face import Face, deform
 
-__all__ = ["faps_from_mesh", "points_of"]
+__all__ = ["faps_from_face", "faps_from_mesh", "points_of"]
 
 PROBE = 60.0  # FAPU; far enough to be measured, near enough to be proportional
 ROUNDS = 4  # what turns or slides is not proportional; each round takes away most of what is left
@@ -25,17 +26,26 @@ def points_of(face: Face, vertices: Any) -> dict[str, Float32]:
 def faps_from_mesh(face: Face, vertices: Any) -> tuple[Float32, Bool]:
     """The FAPs (n, 68) of vertices (n, n_vertices, 3) of that face, and which were observed.
 
-    Points hang together in a face: what moves one moves its neighbours too. How much, is measured on the face
-    itself, each FAP alone, and taken apart again; then the face is moved by what was found, and measured
-    beside what was given.
-
     Raises:
         ValueError: vertices of another shape.
     """
     vertices = np.asarray(vertices)
     if vertices.ndim != 3 or vertices.shape[1:] != face.vertices.shape:
         raise ValueError(f"vertices: wanted (n, {len(face.vertices)}, 3), got {vertices.shape}")
-    wanted, seen = faps_from_points(points_of(face, vertices), _at_rest(face), face.fapu)
+    return faps_from_face(face, points_of(face, vertices))
+
+
+def faps_from_face(face: Face, points: Mapping[str, Any]) -> tuple[Float32, Bool]:
+    """The same of all of its feature points, name -> (n, 3) metres.
+
+    Points hang together in a face: what moves one moves its neighbours too. How much, is measured on the face
+    itself, each FAP alone, and taken apart again; then the face is moved by what was found, and measured
+    beside what was given.
+
+    Raises:
+        ValueError: not its points.
+    """
+    wanted, seen = faps_from_points(points, _at_rest(face), face.fapu)
     apart = _apart(face)
     found = wanted @ apart
     for _ in range(ROUNDS):

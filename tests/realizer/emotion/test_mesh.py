@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.emotion import archetypes, recogniser
-from realizer.emotion.mesh import faps_from_mesh
+from realizer.emotion.mesh import faps_from_face, faps_from_mesh, points_of
 from realizer.face import Face, deform, load_face
 
 SEEDS = (0, 1, 2)
@@ -32,6 +32,13 @@ def test_faps_come_back_as_they_were_asked_for(face: Face) -> None:
     for asked, got in zip(frames, read, strict=True):
         there = seen & (asked != 0)
         assert np.abs(got - asked)[there].max() < 2
+
+
+def test_the_feature_points_alone_say_the_same_wherever_the_head_is(face: Face) -> None:
+    joy = archetypes("own")["joy"][0].frame()
+    points = points_of(face, deform(face, joy[None]))
+    read, seen = faps_from_face(face, {name: at + np.array([0, 0.2, 1]) for name, at in points.items()})
+    assert recogniser().names(read, seen) == ["joy"]
 
 
 def test_vertices_of_another_face_are_refused(face: Face) -> None:
