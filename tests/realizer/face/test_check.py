@@ -1,0 +1,165 @@
+"""A broken face folder: each fault names its file and what to change, and one does not hide another."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from realizer.cli.faces import faces
+from realizer.errors import FaceError
+from realizer.face import check_face, load_face
+from realizer.face.load import folder_of
+from realizer.face.mpeg4 import setup_of, write_setup
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(folder_of("ada"), tmp_path / "broken"))
+
+
+def faults(folder: Path) -> tuple[str, ...]:
+    return check_face(folder.name, folder.parent)
+
+
+def rewrite(path: Path, **change: Callable[[np.ndarray], np.ndarray]) -> None:
+    with np.load(path) as file:
+        arrays = {name: file[name] for name in file.files}
+    np.savez(path, **(arrays | {name: make(arrays[name].copy()) for name, make in change.items()}))
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text("utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), "utf-8")
+
+
+def skin_of(folder: Path) -> slice:
+    return slice(*load_face(folder.name, folder.parent).parts["skin"])
+
+
+def turned(triangles: np.ndarray) -> np.ndarray:
+    triangles[40] = triangles[40, ::-1]
+    return triangles
+
+
+def masked(folder: Path) -> None:
+    setup = setup_of(folder)
+    write_setup(folder / "mpeg4.toml", setup)
+    path = folder / "mpeg4.toml"
+    line = next(
+        line for line in path.read_text("utf-8").splitlines() if line.strip().endswith('"') and "-" in line
+    )
+    key = line.split("=")[0]
+    edit(path, line, f'{key}= "999990-999999"')
+
+
+BROKEN: dict[str, tuple[Callable[[Path], None], tuple[str, ...]]] = {
+    "an unknown key": (
+        lambda f: edit(f / "face.toml", "licence =", 'lisence = "x"\nlicence ='),
+        ("face.toml: 'lisence'", "did you mean 'licence'?"),
+    ),
+    "an unknown part": (lambda f: edit(f / "face.toml", "tongue =", "tung ="), ("'tung'", "'tongue'")),
+    "no skin": (lambda f: edit(f / "face.toml", "skin =", "shirt2 ="), ("wanted 'skin', got none",)),
+    "parts that overlap": (
+        lambda f: edit(f / "face.toml", "\nbrows = [", "\nbrows = [0, 50]\nother = ["),
+        ("overlap", "face.toml"),
+    ),
+    "colours above 255": (
+        lambda f: rewrite(f / "mesh.npz", colours=lambda a: a.astype(np.int32) * 300),
+        ("mesh.npz: colours: wanted 0..255",),
+    ),
+    "gloss of another kind": (
+        lambda f: rewrite(f / "mesh.npz", gloss=lambda a: a.astype(float) / 255),
+        ("mesh.npz: gloss: wanted bytes",),
+    ),
+    "an inverted triangle": (
+        lambda f: rewrite(f / "mesh.npz", triangles=turned),
+        ("mesh.npz: skin: 1 triangles are inverted",),
+    ),
+    "fields of another mesh": (
+        lambda f: rewrite(f / "fields.npz", head=lambda a: a[:-7]),
+        ("fields.npz: head: wanted", "one a vertex"),
+    ),
+    "fields that are not finite": (
+        lambda f: rewrite(f / "fields.npz", move=lambda a: np.where(a > 0, np.nan, a)),
+        ("fields.npz: move: wanted finite",),
+    ),
+    "fields cut short": (
+        lambda f: rewrite(f / "fields.npz", start=lambda a: a[:-1]),
+        ("fields.npz: start: wanted",),
+    ),
+    "a mask out of range": (masked, ("mpeg4.toml", "wanted vertices of the skin", "999990")),
+    "zones that are no zones": (
+        lambda f: (f / "mpeg4.toml").write_text("# source: x\n# units: y\n# licence: z\nzone = 7\n") and None,
+        ("mpeg4.toml",),
+    ),
+    "a model with an unknown unit": (
+        lambda f: edit(f / "au_published.toml", "[degrees]", "[degrees]\nAU99 = 3.0\n#"),
+        ("[AU99]", "no such unit"),
+    ),
+    "a model with NaN": (
+        lambda f: edit(f / "au_published.toml", "[neck]", "[neck]\ntop = nan\n[old]"),
+        ("au_published.toml: neck",),
+    ),
+    "a table that is no model": (
+        lambda f: (
+            (f / "au_mine.toml").write_text("# source: x\n# units: y\n# licence: z\nbrows = 2\n") and None
+        ),
+        ("au_mine.toml",),
+    ),
+    "shapes of another kind": (
+        lambda f: rewrite(f / "au_shapes.npz", moves=lambda a: a[:, :-1]),
+        ("au_shapes.npz: wanted moves",),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_fault_names_its_file_and_what_to_change(folder: Path, name: str) -> None:
+    spoil, words = BROKEN[name]
+    spoil(folder)
+    told = "\n".join(faults(folder))
+    for word in words:
+        assert word in told, told
+
+
+def test_one_fault_hides_no_other(folder: Path) -> None:
+    for name in ("an unknown key", "colours above 255", "fields of another mesh", "a model with NaN"):
+        BROKEN[name][0](folder)
+    (folder / "features.csv").unlink()
+    told = faults(folder)
+    assert len(told) >= 5
+    for file in ("face.toml", "mesh.npz", "fields.npz", "features.csv", "au_published.toml"):
+        assert any(file in fault for fault in told), file
+
+
+def test_a_point_on_no_surface_is_named(folder: Path) -> None:
+    path = folder / "mesh.npz"
+    cheek = load_face("ada").feature_points["5.1"]
+    rewrite(path, triangles=lambda a: a[(a != cheek).all(axis=1)])
+    told = "\n".join(faults(folder))
+    assert "5.1: vertex" in told
+    assert "no triangle has it" in told
+    assert "skin: it has 1 holes" in told
+    assert "open edges at vertex" in told
+
+
+def test_loading_says_the_first_fault_and_how_to_see_all(folder: Path) -> None:
+    (folder / "mesh.npz").unlink()
+    with pytest.raises(FaceError, match=r"mesh\.npz.*run realizer faces check broken"):
+        load_face("broken", folder.parent)
+
+
+def test_without_a_name_every_face_is_checked(folder: Path) -> None:
+    (folder / "mesh.npz").unlink()
+    ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)}).invoke(
+        faces, ["check"], standalone_mode=False
+    )
+    assert ran.return_value == 1
+    assert "ada: sound" in ran.output
+    assert "mesh.npz" in ran.output
