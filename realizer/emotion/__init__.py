@@ -3,6 +3,7 @@
 from realizer.emotion.archetypes import archetypes
 from realizer.emotion.intermediate import Anchor, between, same_category
 from realizer.emotion.measure import (
+    as_features_see,
     faps_from_features,
     faps_from_points,
     features_from_faps,
@@ -24,6 +25,7 @@ __all__ = [
     "WordPlace",
     "affect",
     "archetypes",
+    "as_features_see",
     "between",
     "emotion",
     "faps_from_features",

@@ -10,13 +10,20 @@ import numpy as np
 
 from realizer import tables
 from realizer.arrays import Bool, Float32, Float64
+from realizer.emotion.profile import Profile
 from realizer.tables.facial_features import facial_features
 from realizer.units import ANGLE_UNIT
 
 if TYPE_CHECKING:
     from realizer.face.model import Fapu
 
-__all__ = ["faps_from_features", "faps_from_points", "features_from_faps", "features_from_points"]
+__all__ = [
+    "as_features_see",
+    "faps_from_features",
+    "faps_from_points",
+    "features_from_faps",
+    "features_from_points",
+]
 
 Points = Mapping[str, Any]  # name such as "2.1" -> (n, 3) or (3,) metres
 
@@ -24,6 +31,7 @@ Points = Mapping[str, Any]  # name such as "2.1" -> (n, 3) or (3,) metres
 SKULL = ("11.1", "11.2", "11.3", "11.4", "11.5", "11.6")
 CORNERS = ("3.7", "3.8", "3.11", "3.12")
 HEAD = slice(47, 50)
+OUTER_LIPS = {4: 51, 5: 52}  # FAPs of the middle of the lips: the features are measured at 8.1 and 8.2
 CHIN, JAW, DEPRESS_CHIN, OPEN_JAW = "2.10", "2.1", 17, 2
 # Where the standard lets each FAP's point move: axis and sense of x to the character's left, y up, z forward.
 WAYS = {"left": (0, 1), "right": (0, -1), "up": (1, 1), "down": (1, -1), "forward": (2, 1)}
@@ -113,6 +121,35 @@ def faps_from_features(features: Any) -> tuple[Float32, Bool]:
             if not seen[fap - 1]:
                 frames[:, fap - 1], seen[fap - 1] = sign * part, True
     return frames, seen
+
+
+def as_features_see(profile: Profile) -> Profile:
+    """The profile that `faps_from_features` would tell of a face which shows this one.
+
+    Distances are taken between outer points of the lips, and lids are seen together: what a profile says of
+    the outer lips stands for the inner ones, the opening of the mouth is theirs, and FAPs of one feature
+    share its range.
+    """
+    told = dict(profile.ranges)
+    zero = (0.0, 0.0)
+    for inner, outer in OUTER_LIPS.items():
+        if outer in told:
+            told[inner] = told[outer]
+    if {*OUTER_LIPS.values()} & {*told}:  # the lips part by their own FAPs, and not as a jaw opens
+        (low, high), (a, b) = (told.get(outer, zero) for outer in OUTER_LIPS.values())
+        told[3] = -high - b, -low - a
+    ranges: dict[int, tuple[float, float]] = {}
+    for row in facial_features():
+        ends = [
+            tuple(sorted((sign * a, sign * b)))
+            for fap, sign in row.signs.items()
+            for a, b in [told.get(fap, zero)]
+        ]
+        low, high = (sum(end) / len(ends) for end in zip(*ends, strict=True))
+        for fap, sign in (row.signs | dict.fromkeys(row.also, 1)).items():
+            if (low or high) and fap not in ranges:
+                ranges[fap] = (low, high) if sign > 0 else (-high, -low)
+    return Profile(profile.name, profile.source, ranges)
 
 
 @cache

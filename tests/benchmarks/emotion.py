@@ -23,6 +23,7 @@ from realizer.emotion import (
     Profile,
     Recogniser,
     archetypes,
+    as_features_see,
     emotion,
     faps_from_features,
     features_from_points,
@@ -63,6 +64,7 @@ def through_mesh(
 def through_features(face: Face, known: Recogniser, profiles: Sequence[Profile], draws: int) -> Counts:
     """The same by the 15 features alone, without noise."""
     chance = np.random.default_rng(0)
+    known = Recogniser([as_features_see(profile) for profile in known.profiles])
     rest = {name: face.vertices[index] for name, index in face.feature_points.items()}
     found: Counts = {}
     for profile in profiles:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from realizer.emotion import (
+    Profile,
+    as_features_see,
     faps_from_features,
     faps_from_points,
     features_from_faps,
@@ -102,6 +104,27 @@ def test_a_feature_of_several_faps_gives_each_an_equal_part() -> None:
     assert frames[0, [5, 6, 52, 53]] == pytest.approx([40, 40, 40, 40])
     assert frames[0, 36] == 30  # and not a half of the 500
     assert set(np.flatnonzero(seen) + 1) == {fap for f in facial_features() for fap in (*f.signs, *f.also)}
+
+
+def test_a_profile_as_features_see_it_has_lids_together_and_the_outer_lips_for_the_inner() -> None:
+    told = as_features_see(
+        Profile.parse("F19 [100, 120], F21 [10, 20], F5 [0, 5], F52 [-200, -100], F51 [20, 30]")
+    )
+    assert told.ranges[19] == told.ranges[21] == (55, 70)
+    assert told.ranges[4] == (20, 30)
+    assert told.ranges[5] == (-200, -100)
+    assert told.ranges[3] == (70, 180)  # -(F51 + F52): how far the lips part
+    assert 52 not in told.ranges
+    shut = as_features_see(Profile.parse("F3 [100, 200]"))
+    assert dict(shut.ranges) == {3: (100, 200)}
+
+
+def test_what_features_tell_of_a_frame_is_in_the_profile_as_they_see_it() -> None:
+    profile = Profile.parse("F19 [90, 110], F21 [40, 60], F53 [70, 90], F54 [70, 90], F31 [100, 120]")
+    frames, seen = faps_from_features(features_from_faps(profile.frame()[None]))
+    for fap, (low, high) in as_features_see(profile).ranges.items():
+        assert seen[fap - 1]
+        assert low <= frames[0, fap - 1] <= high
 
 
 def test_bad_points_are_refused_in_words(face: Face) -> None:
