@@ -47,6 +47,7 @@ PARTS = {
 }
 WAYS = ("across", "up", "forward")
 AIM = 0.75
+ON_SKIN = 0.95  # of a shape's landmarks; a face that was built anew has shapes of another
 # Action units that are not among Wojdel's, and the face units that show them.
 MORE = {14: "mouthDimple:1", 29: "jawForward:1", 33: "cheekPuff:1", 34: "cheekPuff:1"}
 
@@ -74,8 +75,11 @@ class Skin:
         off, nearest = (np.asarray(found) for found in cKDTree(skin).query(shape.at))
         marks = np.flatnonzero(shape.seen & (off < 1e-5))
         nearest = nearest[marks]
-        if len(marks) < shape.seen.sum() / 2:
-            raise SystemExit(f"{face.name}: its shapes lie off its skin; measure them by --data")
+        if len(marks) < ON_SKIN * shape.seen.sum():
+            raise SystemExit(
+                f"{face.name}: {1 - len(marks) / shape.seen.sum():.0%} of its shapes lie off its skin; "
+                "measure them by --data"
+            )
         names = [(part, name) for part, points in PARTS.items() for name in points]
         near = np.asarray(cKDTree([face.points[name] for _, name in names]).query(skin[nearest])[1])
         part = np.array([names[k][0] for k in near])
