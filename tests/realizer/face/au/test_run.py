@@ -17,6 +17,7 @@ from realizer.face import deform, load_face
 from realizer.face.model import Face
 from realizer.player import Player
 from realizer.render import Renderer
+from realizer.server.session import Session
 from realizer.server.streams import Timeline
 from realizer.settings import Settings, SettingsError
 
@@ -121,6 +122,12 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
     assert window.poses.shape == (50, len(face.takes))
     assert np.array_equal(window.mesh, quantise(face, deform(face, window.poses)))
     assert not np.array_equal(window.mesh[0], window.mesh[-1])
+
+
+def test_a_session_draws_as_the_service_was_told(faces: dict[str, Face]) -> None:
+    session = Session("s", Settings(deformer="au"), 0.0)
+    assert session.face(0).takes == faces["au"].takes
+    assert Session("s", Settings(), 0.0).face(0).takes == faces["mpeg4"].takes
 
 
 @pytest.fixture(scope="module")
