@@ -22,6 +22,8 @@ FAPS = 68
 JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)
 ROWS = FAPS + 5
 
+LOOKS = {23, 24, 25, 26}  # FAPs that turn eyeballs, or have fields where the eyes are no balls
+
 ARRAYS = {
     "row": 1,  # which FAP (its number) or extra row (69..73 are JAW_COS.. + 1), ascending
     "start": 1,  # where the row's part of vertex and move begins; one more than rows
@@ -51,7 +53,8 @@ def basis_from(
         fields: (3 x moving, 73) sparse float32, metres per FAPU, then the jaw's and the tongue's five.
         head: (n, 1) float32 0..1; head_pivot: (3,).
         chin: (2,) float64, y and z of 2.1 about the jaw's axis.
-        eyes: ((first, last + 1), (3,) centre) for left and right; thrust: metres per FAPU of 27 and 28.
+        eyes: ((first, last + 1), (3,) centre) for left and right, (0, 0) of an eye that has fields instead
+            of a ball; thrust: metres per FAPU of 27 and 28.
         contours: which FAPs of the lips hold together.
         lid, lid_eye, lid_radius: (k,) each.
 
@@ -82,6 +85,7 @@ def basis_from(
         # The rows after FAP 68 are in metres already.
         scale = fapu.metres(table[row - 1].unit) if row <= FAPS else 1.0
         fields[row - 1, stored["vertex"][part] - first] = stored["move"][part].astype(np.float32) * scale
+    balls = not LOOKS & set(stored["row"].tolist())
     chin = np.asarray(points["2.1"][1:], np.float64) - stored["jaw_pivot"][1:]
     return {
         "moving": (first, last),
@@ -90,7 +94,7 @@ def basis_from(
         "head_pivot": stored["head_pivot"].astype(np.float32),
         "chin": chin,
         "eyes": tuple(
-            (parts[name], stored["eye_centre"][k].astype(np.float32))
+            (parts[name] if balls else (0, 0), stored["eye_centre"][k].astype(np.float32))
             for k, name in enumerate(("left_eye", "right_eye"))
         ),
         "thrust": np.float32(fapu.metres("ES")),

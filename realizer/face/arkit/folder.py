@@ -19,7 +19,7 @@ from realizer.face.arkit.names import canonical, nearest, shapes
 from realizer.face.arkit.points import points_of
 from realizer.face.arkit.pose import pose_of, stood
 from realizer.face.arkit.scene import read_pieces
-from realizer.face.arkit.sorting import ASIDE, FLOOR, ball_of, sort_parts
+from realizer.face.arkit.sorting import ASIDE, FLOOR, ball_of, behind, sort_parts
 from realizer.face.arkit.surface import Surface, cut, joined
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack, unpack
 from realizer.face.features import Point, write_features
@@ -96,7 +96,7 @@ def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
     surface, ranges = head.surface, head.ranges
     folder.mkdir(parents=True, exist_ok=True)
     _write_head(folder / "face.toml", name or folder.name, head)
-    points, guesses = points_of(surface, ranges)
+    points, guesses = points_of(surface, ranges, head.painted)
     write_features(folder / "features.csv", points)
     _write_mesh(folder / "mesh.npz", surface, ranges, points)
     made, words = _write_fields(folder, head, points)
@@ -141,7 +141,8 @@ def _read(path: Path) -> _Head:
     surface = surface.chosen(np.concatenate(list(parts.parts.values())))
     ends = np.cumsum([0] + [len(index) for index in parts.parts.values()])
     ranges = {name: (int(ends[k]), int(ends[k + 1])) for k, name in enumerate(parts.parts)}
-    balls = [ball_of(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
+    fit = behind if parts.painted else ball_of
+    balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
     surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
     found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.words, *parts.words]
     if foreign:
@@ -233,7 +234,8 @@ def _write_fields(
         rows[fap] = _dressed(at, ranges, field, rows[fap])
     if head.painted:
         rows |= _looks(surface, ranges)
-    eyes = [ball_of(at[slice(*ranges[part])]) for part in ("left_eye", "right_eye")]
+    fit = behind if head.painted else ball_of
+    eyes = [fit(at[slice(*ranges[part])]) for part in ("left_eye", "right_eye")]
     lid, lid_eye, lid_radius = sliding(rows, at, ranges, eyes)
     if head.painted:
         lid, lid_eye, lid_radius = lid[:0], lid_eye[:0], lid_radius[:0]
@@ -243,6 +245,7 @@ def _write_fields(
             stored
             | pack(rows)
             | {
+                "eye_centre": np.stack([centre for centre, _ in eyes]),
                 "lid": lid.astype(np.int32),
                 "lid_eye": lid_eye.astype(np.int32),
                 "lid_radius": lid_radius.astype(np.float32),
@@ -339,7 +342,7 @@ def _looks(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int, Fl
         ("left_eye", "Left", 23, 25, "Out"), ("right_eye", "Right", 24, 26, "In"),
     ):  # fmt: skip
         right = "In" if left == "Out" else "Out"
-        _, radius = ball_of(surface.vertices[slice(*ranges[part])])
+        _, radius = behind(surface.vertices[slice(*ranges[part])])
         for fap, one, other in ((yaw, left, right), (pitch, "Down", "Up")):
             move = (surface.move(f"eyeLook{one}{word}") - surface.move(f"eyeLook{other}{word}")) / 2
             size = float(np.linalg.norm(move, axis=1).max())

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.arrays import Float64
+from realizer.face.arkit.sorting import behind
 from realizer.face.arkit.surface import Surface
 from realizer.face.features import Point
 from realizer.face.mpeg4 import find_points
@@ -15,6 +16,9 @@ from realizer.face.patch import vertex_normals
 
 __all__ = ["points_of"]
 
+PUPILS = {"left_eye": "3.5", "right_eye": "3.6"}
+SPHERE = np.concatenate([np.eye(3), -np.eye(3), np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1)
+                                                          for z in (-1, 1)]) / np.sqrt(3)])  # fmt: skip
 HALF = {"2.6": "2.8", "2.7": "2.9"}  # upper -> lower, half-way to the corners
 NEAR = 0.0035  # m aside of a station in which the lips are looked for
 DEEP = 0.012  # m behind the front of the lips
@@ -23,7 +27,7 @@ BACK = 0.35  # a metre farther back weighs as much as so much farther from the o
 
 
 def points_of(
-    surface: Surface, ranges: Mapping[str, tuple[int, int]]
+    surface: Surface, ranges: Mapping[str, tuple[int, int]], painted: bool = False
 ) -> tuple[dict[str, Point], tuple[str, ...]]:
     """The feature points, and those that are guesses.
 
@@ -33,7 +37,20 @@ def points_of(
     Raises:
         FaceError: the eyes do not stand side by side.
     """
-    points, guesses = find_points(surface.vertices, surface.triangles, ranges)
+    at, parts = surface.vertices, dict(ranges)
+    if painted:
+        # Eyes that are part of the skin are no balls to measure by: let there be some behind them.
+        for name in PUPILS:
+            centre, radius = behind(surface.vertices[slice(*ranges[name])])
+            parts[name] = (len(at), len(at) + len(SPHERE))
+            at = np.concatenate([at, centre + radius * SPHERE])
+    points, guesses = find_points(at, surface.triangles, parts)
+    if painted:
+        for name, pupil in PUPILS.items():
+            begin, end = ranges[name]
+            off = np.linalg.norm(at[begin:end] - points[pupil].place, axis=1)
+            vertex = begin + int(np.argmin(off))
+            points[pupil] = Point(pupil, vertex, *at[vertex])
     first, last = ranges["skin"]
     skin = surface.chosen(np.arange(first, last))
     sure = _lids(skin, points, first) | _slit(skin, points, first)

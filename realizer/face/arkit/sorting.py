@@ -19,6 +19,7 @@ __all__ = ["Sorted", "sort_parts"]
 
 ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
 BALL = (0.006, 0.022)  # m, radii of eyeballs
+EYEBALL = 0.012  # m, the radius of people's eyes
 AT_EYE = 0.016  # m; a ball that has its middle so near to where the lids close is an eye
 FLOOR, ASIDE = -0.31, 0.24  # m; the bust ends there
 LOOKS = ("eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut")
@@ -143,6 +144,12 @@ def is_ball(at: Float64) -> bool:
     centre, radius = ball_of(at)
     off = np.abs(np.linalg.norm(at - centre, axis=1) - radius)
     return bool(BALL[0] < radius < BALL[1] and np.percentile(off, 80) < ROUND * radius)
+
+
+def behind(at: Float64) -> tuple[Float64, float]:
+    """Centre and radius of the ball that would lie behind an eye (n, 3) that is part of the skin."""
+    middle = np.asarray((at.min(axis=0) + at.max(axis=0)) / 2)
+    return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
 
 
 def ball_of(at: Float64) -> tuple[Float64, float]:

@@ -144,3 +144,21 @@ def ada_glb(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("glb") / "ada.glb"
     path.write_bytes(face_glb(load_face("ada")))
     return path
+
+
+@pytest.fixture
+def new_glb() -> type[Glb]:
+    """A GLB to put meshes into."""
+    return Glb
+
+
+@pytest.fixture
+def write_head(tmp_path: Path) -> Callable[..., Path]:
+    """Writes ada as GLB, in the unit, the direction and the spelling asked for."""
+
+    def write(**how: Any) -> Path:
+        path = tmp_path / "head.glb"
+        path.write_bytes(face_glb(load_face("ada"), **how))
+        return path
+
+    return write

@@ -45,3 +45,52 @@ def test_every_point_goes_as_far_as_before(brought: tuple[Face, Report], row: Fa
         for face in (brought[0], load_face("ada"))
     )
     assert again == pytest.approx(before, rel=0.05)
+
+
+def egg_with_painted_eyes(new_glb: type) -> bytes:
+    """An egg whose mouth and eyes are part of its skin, with seven shapes; no part has a telling name."""
+    rows, columns = 90, 120
+    polar = np.linspace(0.01, np.pi - 0.01, rows)[:, None]
+    turn = np.linspace(0, 2 * np.pi, columns, endpoint=False)[None]
+    at = np.stack(
+        [
+            0.075 * np.sin(polar) * np.sin(turn),
+            0.11 * np.cos(polar) + 0 * turn,
+            0.09 * np.sin(polar) * np.cos(turn),
+        ],
+        -1,
+    ).reshape(-1, 3)
+    front = at[:, 2] > 0
+    blob = lambda x, y, r: front * np.exp(-(((at[:, 0] - x) / r) ** 2) - ((at[:, 1] - y) / r) ** 2)  # noqa: E731
+    at[:, 2] += 0.02 * blob(0, -0.012, 0.012) + 0.006 * blob(0, -0.045, 0.012)
+    moves = {
+        "jawOpen": -0.02 * blob(0, -0.075, 0.03)[:, None] * [0, 1, 0.3],
+        "mouthSmileLeft": 0.01 * blob(0.022, -0.045, 0.012)[:, None] * [1, 1, 0],
+        "mouthSmileRight": 0.01 * blob(-0.022, -0.045, 0.012)[:, None] * [-1, 1, 0],
+        "eyeBlinkLeft": -0.01 * blob(0.03, 0.028, 0.009)[:, None] * [0, 1, 0],
+        "eyeBlinkRight": -0.01 * blob(-0.03, 0.028, 0.009)[:, None] * [0, 1, 0],
+        "eyeLookOutLeft": 0.004 * blob(0.03, 0.02, 0.006)[:, None] * [1, 0, 0],
+        "eyeLookOutRight": 0.004 * blob(-0.03, 0.02, 0.006)[:, None] * [-1, 0, 0],
+    }
+    glb = new_glb()
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    a, b = (r * columns + c).ravel(), (r * columns + (c + 1) % columns).ravel()
+    triangles = np.concatenate([np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)])
+    glb.mesh("Object_1", at, triangles, np.full(at.shape, 200), moves)
+    return bytes(glb.bytes())
+
+
+def test_an_egg_with_few_shapes_and_painted_eyes_becomes_a_face(new_glb: type, tmp_path: Path) -> None:
+    path = tmp_path / "egg.glb"
+    path.write_bytes(egg_with_painted_eyes(new_glb))
+    report = import_head(path, tmp_path / "egg")
+    assert any("the eyes are no balls" in line for line in report.found)
+    assert any(line.startswith("tongue") for line in report.missing)
+    face = load_face("egg", tmp_path)
+    row = np.zeros((2, 68), np.float32)
+    row[:, 22] = 0, 20000
+    rest, looking = deform(face, row)
+    moved = looking - rest
+    assert moved[:, 0].max() > 0.001
+    # By its shape: as far as the shape reaches, and the rest of the head stays.
+    assert np.abs(moved[face.vertices[:, 0] < 0]).max() < 1e-6
