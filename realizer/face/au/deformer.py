@@ -28,6 +28,7 @@ LIDS = (5, 6, 7, 9, CLOSE)  # what moves the lids
 LEAST = 1e-5  # m; what a unit moves less is left out of it
 # FAPs of each side's lids; and the presence that says how far speech has the lips.
 LID_FAPS, LIPS = {"L": (19, 21), "R": (20, 22)}, "lips"
+LID_POINTS = {"L": ("3.1", "3.3"), "R": ("3.2", "3.4")}
 
 
 def columns(model: Model) -> tuple[str, ...]:
@@ -74,6 +75,9 @@ class Moves:
             return csr_matrix(rows[:, self.moving].reshape(len(rows), -1).T.astype(np.float32))
 
         closes = np.array([au == CLOSE for au, _ in names])
+        for row, (au, side) in zip(moves, names, strict=True):
+            if au == CLOSE:
+                row *= _meeting(face, row, side)
         self._closing, self._rest = np.flatnonzero(closes), np.flatnonzero(~closes)
         self._close, self._move = matrix(moves[closes]), matrix(moves[~closes])
         self._sides = np.array(["LR".index(side) for au, side in names if au == CLOSE], np.intp)
@@ -152,6 +156,17 @@ def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Fl
             moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
     moves[np.abs(moves).max(axis=2) < LEAST] = 0
     return moves
+
+
+def _meeting(face: Face, moves: Float64, side: str) -> float:
+    """What to multiply moves that close an eye with, so that its lids meet and do not pass each other.
+
+    A lid that hangs lower at rest than on the face that was measured has less far to go.
+    """
+    upper, lower = (face.feature_points[point] for point in LID_POINTS[side])
+    gap = float(face.vertices[upper, 1] - face.vertices[lower, 1])
+    closed = float(moves[lower, 1] - moves[upper, 1])
+    return min(1.0, gap / closed) if closed > LEAST else 1.0
 
 
 def _shares(face: Face, moving: slice) -> tuple[tuple[Any, Float32], tuple[Any, Float32]]:

@@ -112,6 +112,13 @@ def test_closed_eyes_cover_their_balls(face: Face) -> None:
     assert (away > basis["lid_radius"] - 2e-5).all()
 
 
+def test_closed_lids_meet_and_do_not_pass_each_other(face: Face) -> None:
+    made = shown(face, au43=1)
+    for upper, lower in (("3.1", "3.3"), ("3.2", "3.4")):
+        apart = made[face.feature_points[upper], 1] - made[face.feature_points[lower], 1]
+        assert -0.0003 < apart < 0.002
+
+
 @pytest.mark.parametrize(
     "also",
     [{"au5": 1.0}, {"au7": 1.0}, {"au6": 1.0, "au7": 1.0}, {"close_t_l_eyelid": 470.0}],
