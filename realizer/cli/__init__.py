@@ -45,7 +45,20 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     options.speak_up(context, quiet=quiet, verbose=verbose)
 
 
-for command in (serve, realize, schedule, check, emotion, track, enrich, faces, voices, outputs, doctor, demo):
+for command in (
+    serve,
+    realize,
+    schedule,
+    check,
+    emotion,
+    track,
+    enrich,
+    faces,
+    voices,
+    outputs,
+    doctor,
+    demo,
+):
     options.loudness(command)
     cli.add_command(command)
 

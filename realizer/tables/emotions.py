@@ -18,7 +18,7 @@ FILE = "emotions.toml"
 
 @dataclass(frozen=True, slots=True)
 class EmotionFace:
-    """An emotion's (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1, and the face lexeme that it is, or ""."""
+    """An emotion's (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1, and its face lexeme or "" (none)."""
 
     emotion: str
     lexeme: str
