@@ -14,6 +14,7 @@ from realizer.errors import FaceError
 from realizer.face.arkit.fields import Grown, shape_fields
 from realizer.face.arkit.gltf import Gltf
 from realizer.face.arkit.jaw import drag_of, joint_of
+from realizer.face.arkit.measured import measured_units
 from realizer.face.arkit.mouth import mouth_of
 from realizer.face.arkit.names import canonical, nearest, shapes
 from realizer.face.arkit.points import points_of
@@ -21,8 +22,10 @@ from realizer.face.arkit.pose import pose_of, stood
 from realizer.face.arkit.scene import read_pieces
 from realizer.face.arkit.sorting import ASIDE, FLOOR, ball_of, behind, sort_parts
 from realizer.face.arkit.surface import Surface, cut, joined
+from realizer.face.au.measure import write_shapes
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack, unpack
 from realizer.face.features import Point, write_features
+from realizer.face.load import load_face
 from realizer.face.mpeg4 import default_setup
 from realizer.face.mpeg4.build import apply_zones
 from realizer.face.mpeg4.defaults import split_sides
@@ -103,6 +106,13 @@ def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
     report = head.report
     found = (*report.found, f"{len(made)} FAPs move by its shapes, the others by zones", *words)
     unsure = report.unsure
+    try:
+        measured = measured_units(load_face(folder.name, folder.parent), surface)
+    except FaceError as error:
+        measured, unsure = {}, (*unsure, f"no shapes for the model of action units: {error}")
+    if measured:
+        write_shapes(folder / "au_shapes.npz", measured)
+        found = (*found, f"{len(measured)} action units for realizer faces fit {folder.name}")
     if guesses:
         unsure = (*unsure, f"feature points that are guessed, look at them: {', '.join(guesses)}")
     return Report(found, report.missing, unsure)

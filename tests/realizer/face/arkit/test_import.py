@@ -9,6 +9,7 @@ import pytest
 
 from realizer.face import Face, check_face, deform, load_face
 from realizer.face.arkit import Report, import_head
+from realizer.face.au import read_shapes
 from realizer.tables import Fap, faps
 
 
@@ -28,6 +29,14 @@ def test_a_head_comes_back_with_its_size_and_parts(brought: tuple[Face, Report])
         assert getattr(face.fapu, unit) == pytest.approx(getattr(first.fapu, unit), rel=0.05)
     assert any("in metres" in line for line in report.found)
     assert report.missing == ()
+
+
+def test_its_action_units_can_be_fitted(brought: tuple[Face, Report], ada_glb: Path, tmp_path: Path) -> None:
+    import_head(ada_glb, tmp_path / "fit")
+    measured = read_shapes(tmp_path / "fit" / "au_shapes.npz")
+    assert {1, 2, 4, 5, 6, 9, 12, 15, 16, 17, 20, 26, 43} <= set(measured)
+    assert all(one.moves.any() and (one.at[:, 0] > -1e-6).all() for one in measured.values())
+    assert brought[1].found[-1].startswith(f"{len(measured)} action units")
 
 
 LINEAR = [row for row in faps()[2:] if row.direction in ("up", "down", "left", "right")]
