@@ -134,7 +134,7 @@ class CharacterMessage(Message):
     """Gives a character its face and its voice."""
 
     type: Literal["character"]
-    id: str = Field(min_length=1, max_length=256)
+    id: str | None = Field(None, min_length=1, max_length=256, description="none: the first")
     face: str | None = Field(None, max_length=64)
     voice: str | None = Field(None, max_length=64)
 

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 
 import pytest
 
+from realizer.face import list_faces, load_face
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = [
     pytest.mark.browser,
@@ -135,7 +137,7 @@ def quiet_page(browser):  # type: ignore[no-untyped-def]
         opened = browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
         opened.goto(address)
         style = f"#stage {{ width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
-        opened.add_style_tag(content=style + " #lights, #score { display: none !important }")
+        opened.add_style_tag(content=style + " .choice, #score { display: none !important }")
         opened.wait_for_function("realizerPage.stage.shownFrames > 0")
         yield opened
         opened.close()
@@ -190,6 +192,19 @@ def test_a_light_is_chosen_on_the_page(page) -> None:  # type: ignore[no-untyped
     page.wait_for_selector(f"{pressed}:has-text('Daylight')")
     assert page.locator(pressed).count() == 1
     assert sum(pixel(picture(page), 0.03, 0.5)) > sum(dark) + 200
+
+
+def test_another_face_is_chosen_on_the_page(page) -> None:  # type: ignore[no-untyped-def]
+    page.wait_for_function("realizerPage.stage.shownFrames > 1")
+    names = [info.name for info in list_faces()]
+    assert page.locator("#faces button").all_text_contents() == [name.capitalize() for name in names]
+    mine = page.locator("#faces button[aria-pressed='true']").text_content().lower()
+    other = next(name for name in names if name != mine)
+    page.click(f"#faces button:has-text('{other.capitalize()}')")
+    there = len(load_face(other).vertices)
+    page.wait_for_function(f"realizerPage.stage.mesh.geometry.attributes.position.count === {there}")
+    shown = page.evaluate("realizerPage.stage.shownFrames")
+    page.wait_for_function(f"realizerPage.stage.shownFrames > {shown} + 5")
 
 
 def test_the_face_is_there_and_alive(page) -> None:  # type: ignore[no-untyped-def]

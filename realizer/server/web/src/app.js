@@ -21,6 +21,7 @@ const link = new Link(name);
 const alive = new Set(); // ids of blocks that were accepted and have not ended
 let plays = 0;
 let face = null;
+let faces = []; // names of those that the service has
 
 link.onopen = () => {
   clock.reset();
@@ -40,6 +41,7 @@ link.onfeedback = (element, seq) => {
   else if (element.localName === "blockProgress" && id.endsWith(":end")) alive.delete(id.slice(0, -4));
 };
 link.onreply = (message) => {
+  if (message.type === "welcome") faces = message.capabilities.faces ?? [];
   if (message.type === "subscribed" && message.stream === "mesh") showFace(message);
   if (message.type === "subscribed" && message.stream === "audio") sound.rate = message.rate;
   if (message.type === "error") {
@@ -63,6 +65,7 @@ function subscribe() {
 }
 
 async function showFace(message) {
+  showFaces(message);
   const key = `${message.face}/${message.vertices}`;
   if (face === key) return;
   face = key;
@@ -76,23 +79,38 @@ async function showFace(message) {
   }
 }
 
+// A button for each face there is: the character gets it, and the mesh begins anew.
+function showFaces({ face }) {
+  choose("faces", faces, face, (name) => {
+    link.ask({ type: "character", face: name });
+    link.ask({ type: "unsubscribe", stream: "mesh" });
+    stage.reset();
+    link.ask({ type: "subscribe", stream: "mesh", fps: MESH_RATE });
+  });
+}
+
 // A button for each light there is; the one that is pressed is told by its table.
 function showLights() {
   const { lights, light } = stage.look;
   const own = Object.keys(lights).find((name) => JSON.stringify(lights[name]) === JSON.stringify(light));
-  const buttons = Object.keys(lights).map((name) => {
+  choose("lights", Object.keys(lights), stage.light ?? own, (name) => stage.shine(name));
+}
+
+// Buttons of which one is pressed.
+function choose(place, names, pressed, take) {
+  const buttons = names.map((name) => {
     const button = document.createElement("button");
     button.type = "button";
     button.textContent = name[0].toUpperCase() + name.slice(1);
-    button.setAttribute("aria-pressed", String(name === (stage.light ?? own)));
+    button.setAttribute("aria-pressed", String(name === pressed));
     button.onclick = () => {
-      stage.shine(name);
+      take(name);
       for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
     };
     return button;
   });
-  at("lights").replaceChildren(...buttons);
-  at("lights").hidden = false;
+  at(place).replaceChildren(...buttons);
+  at(place).hidden = buttons.length < 2;
 }
 
 function status(state, text) {
