@@ -99,6 +99,7 @@ class Lips:
                 self.w[vertex] = np.clip((k - MEET) / (BORDER - MEET), 0, 1)
                 self.is_upper[vertex] = min(place, 38 - place) <= corner
                 on_ring[vertex] = k
+        self._put_knots_at_points(ground)
         self.fade = np.zeros(n)
         self.fade[on_ring >= 0] = 1
         inside = self._into_the_mouth(ground, on_ring)
@@ -114,6 +115,16 @@ class Lips:
         reach = np.where(self.is_upper, 0.020, 0.021 + 0.006 * smooth(np.abs(self.u), 0.4, 1.0))
         self.around = np.where(ringed, 1.0, np.where(near, smooth(self.away / reach, 1.0, 0.06), 0.0))
         self.around[inside] = self.fade[inside]
+
+    def _put_knots_at_points(self, ground: Ground) -> None:
+        """Stretch u so that the points between middle and corner lie at its half, whoever's lips they are."""
+        for is_upper, names in ((True, ("2.6", "8.5")), (False, ("2.8", "8.7"))):
+            inner, outer = (float(self.u[ground.points[name]]) for name in names)
+            for ring in self.rings:
+                mine = np.array([i for i in ring if self.is_upper[i] == is_upper])
+                half = inner + (outer - inner) * self.w[mine[0]]
+                u = np.abs(self.u[mine])
+                self.u[mine] = np.sign(self.u[mine]) * np.interp(u, [0, half, 1], [0, 0.5, 1])
 
     def _into_the_mouth(self, ground: Ground, on_ring: Any) -> Bool:
         """Spread the inner ring's coordinates into the mouth, ring by ring, fading out."""
