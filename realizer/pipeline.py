@@ -170,6 +170,7 @@ def realize(
     idle: bool = True,
     language: str = "en-US",
     media: Path | None = None,
+    expressions: Path | None = None,
     cooccurrence: str = "on",
     mapping: Path | None = None,
 ) -> Realization:
@@ -185,12 +186,13 @@ def realize(
         seed: for idle motion; the same seed gives the same frames.
         idle: blinks and small head motion.
         media: the folder of the files that documents may name.
+        expressions: a folder of expressions of the user's own, which documents may name.
         cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
         mapping: a file of what AUs ask of FAPs; it goes before what the face says.
 
     Raises:
         FaceError: no such face.
-        TableError: a file of rules, or a mapping, that cannot be used.
+        TableError: a file of rules, a mapping or an expression that cannot be used.
         VoiceError: the named voice is not installed.
     """
     from realizer.face import face_name
@@ -205,6 +207,7 @@ def realize(
         idle=idle,
         language=language,
         media=media,
+        expressions=expressions,
         history=float("inf"),
         cooccurrence=cooccurrence,
     )

@@ -25,6 +25,7 @@ from realizer.composition.character import RELAX, Character
 from realizer.composition.ensemble import Ensemble
 from realizer.composition.playing import Speaking
 from realizer.composition.reporting import State
+from realizer.expressions import library_of
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Say, Utterance
 from realizer.tables.cooccurrence import chosen
@@ -45,6 +46,7 @@ class Player:
         idle: blinks and small head motion between and under the behaviours.
         language: BCP-47 of speech that does not name its own.
         media: the folder of the files that documents may name; None: they may name none.
+        expressions: a folder of expressions of the user's own, before those that ship; None: there are none.
         history: seconds before the last `due` for which frames can still be asked for.
         cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
 
@@ -61,11 +63,13 @@ class Player:
         idle: bool = True,
         language: str = "en-US",
         media: Path | None = None,
+        expressions: Path | None = None,
         history: float = HISTORY,
         cooccurrence: str = "on",
     ) -> None:
         self.kinds = kinds
-        self.world = World(scene=scene, seed=seed, language=language, media=media)
+        library = library_of(expressions)
+        self.world = World(scene=scene, seed=seed, language=language, media=media, library=library)
         self.idle = idle
         self.history = history
         self.rules = chosen(cooccurrence)

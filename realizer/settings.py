@@ -153,6 +153,9 @@ class Settings:
     fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
     scene: Path | None = _setting(None, _optional(Path), "a file of targets every session starts with")
     media: Path | None = _setting(None, _optional(_folder), "the folder of the files that documents may name")
+    expressions: Path | None = _setting(
+        None, _optional(_folder), "a folder of expressions of one's own; none: those that ship"
+    )
     seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
     cooccurrence: str = _setting("on", _switch_or_file, "rules of AUs together: on, off, or a file of them")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from typing import TypeAlias
 
@@ -13,22 +12,23 @@ from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import Target, au
 from realizer.arrays import Float64
+from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.preferred import preferred
+from realizer.behaviours.preferred import from_gaps, preferred
 from realizer.scheduling.timing import Timing
-from realizer.tables.lexemes import face_lexemes
 
 __all__ = ["KINDS"]
 
 Part: TypeAlias = FaceLexeme | FaceFacs
 Compound: TypeAlias = Face | FaceShift
 
+POINTS = ("start", "attackPeak", "relax", "end")
 # s; after an overshoot the face settles this fast, or in half of the hold if that is shorter.
 SETTLE = 0.25
 
 
 def timing_of_lexeme(node: FaceLexeme, world: World) -> Timing:
-    return preferred("faceLexeme", node.lexeme)
+    return from_gaps(POINTS, world.library[node.lexeme].gaps)
 
 
 def timing_of_facs(node: FaceFacs, world: World) -> Timing:
@@ -45,14 +45,14 @@ def timing_of_shift(node: FaceShift, world: World) -> Timing:
 
 def expand_part(node: Part, times: Float64, world: World) -> tuple[Channel, ...]:
     """0 at start, (1 + overshoot) amount at attackPeak, settling to amount, held to relax, 0 at end."""
-    return _rise_and_fall({t: {node.overshoot: v} for t, v in _targets(node).items()}, times, node.id)
+    return _rise_and_fall({t: {node.overshoot: v} for t, v in _targets(node, world).items()}, times, node.id)
 
 
 def expand_face(node: Face, times: Float64, world: World) -> tuple[Channel, ...]:
     """Its parts at one time; where several move one AU the stronger one shows."""
     asked: dict[Target, dict[float, float]] = {}
     for part in node.parts:
-        for target, value in _targets(part).items():
+        for target, value in _targets(part, world).items():
             # (1 + o)(1 + p) - 1: the compound's overshoot is laid over its parts'.
             overshoot = (1 + node.overshoot) * (1 + part.overshoot) - 1
             curve = asked.setdefault(target, {})
@@ -64,7 +64,7 @@ def expand_shift(node: FaceShift, times: Float64, world: World) -> tuple[Channel
     """From start to end the new base face rises, and stays."""
     values: dict[Target, float] = {}
     for part in node.parts:
-        for target, value in _targets(part).items():
+        for target, value in _targets(part, world).items():
             values[target] = max(values.get(target, 0.0), value * node.amount)
     return tuple(
         Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=node.id)
@@ -74,11 +74,11 @@ def expand_shift(node: FaceShift, times: Float64, world: World) -> tuple[Channel
 
 def check_part(node: Part, world: World) -> tuple[Fault, ...]:
     """An unknown lexeme or AU is fatal; a side of an AU that has none is not."""
-    return _faults((node,))
+    return _faults((node,), world)
 
 
 def check_compound(node: Compound, world: World) -> tuple[Fault, ...]:
-    return _faults(node.parts)
+    return _faults(node.parts, world)
 
 
 def _rise_and_fall(
@@ -98,25 +98,20 @@ def _rise_and_fall(
     return tuple(channels)
 
 
-def _targets(node: Part) -> dict[Target, float]:
+def _targets(node: Part, world: World) -> dict[Target, float]:
     """Column -> value at the sustained part."""
     if isinstance(node, FaceFacs):
         return dict.fromkeys(au(node.au, node.side), node.amount)
-    lexeme = face_lexemes()[node.lexeme.upper()]
-    values: dict[Target, float] = {}
-    for (number, side), intensity in lexeme.aus.items():
-        for target in au(number, side):
-            values[target] = max(values.get(target, 0.0), node.amount * intensity)
-    return values
+    return poses.columns(world.library[node.lexeme].aus, node.amount)
 
 
-def _faults(parts: Iterable[Part]) -> tuple[Fault, ...]:
+def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
     faults = []
     known = tables.by_number(tables.action_units())
     for part in parts:
         if isinstance(part, FaceLexeme):
-            if part.lexeme.upper() not in face_lexemes():
-                faults.append(unknown_lexeme(part.lexeme, face_lexemes()))
+            if part.lexeme not in world.library:
+                faults.append(poses.unknown("lexeme", part.lexeme, world.library))
         elif part.au not in known:
             said = f"au: wanted a FACS action unit, got {part.au}; near: {tables.nearest(part.au)}"
             faults.append(Fault("CANNOT_CREATE_BEHAVIOR", said))
@@ -130,14 +125,6 @@ def _faults(parts: Iterable[Part]) -> tuple[Fault, ...]:
                 )
             )
     return tuple(faults)
-
-
-def unknown_lexeme(lexeme: str, known: Iterable[str]) -> Fault:
-    """The fault that names the nearest lexemes there are."""
-    names = sorted(known)
-    near = difflib.get_close_matches(lexeme.upper(), names, n=1, cutoff=0.7)
-    hint = f", did you mean {near[0]}?" if near else ""
-    return Fault("CANNOT_CREATE_BEHAVIOR", f"lexeme: wanted one of {', '.join(names)}; got {lexeme!r}{hint}")
 
 
 def claims_of_shift(node: FaceShift, world: World) -> frozenset[str]:

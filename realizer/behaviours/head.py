@@ -12,7 +12,7 @@ from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
-from realizer.behaviours.face import unknown_lexeme
+from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import from_gaps, preferred
 from realizer.behaviours.scene import angles, limits, target_faults, turn
@@ -81,7 +81,7 @@ def _turned(number: int, keys: list[float], turned: Float64, source: str) -> Cha
 
 def check(node: Head, world: World) -> tuple[Fault, ...]:
     known = head_lexemes()
-    return () if node.lexeme.upper() in known else (unknown_lexeme(node.lexeme, known),)
+    return () if node.lexeme.upper() in known else (poses.unknown("lexeme", node.lexeme, known),)
 
 
 def timing_of_shift(node: HeadDirectionShift, world: World) -> Timing:

@@ -9,6 +9,7 @@ from typing import Any
 
 from realizer.animation.channel import Channel
 from realizer.arrays import Float64
+from realizer.expressions import Library, shipped
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Say, Utterance
 
@@ -28,6 +29,7 @@ class World:
         language: BCP-47 of speech without its own.
         seed: for anything random.
         media: the folder that holds the files documents may name; None: there are none.
+        library: the expressions that documents may name.
     """
 
     scene: Mapping[str, Position] | None = None
@@ -35,6 +37,7 @@ class World:
     language: str = "en-US"
     seed: int = 0
     media: Path | None = None
+    library: Library = field(default_factory=shipped)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from realizer.cli.demo import demo
 from realizer.cli.doctor import doctor
 from realizer.cli.emotion import emotion
 from realizer.cli.enrich import enrich
+from realizer.cli.expressions import expressions
 from realizer.cli.faces import faces
 from realizer.cli.lists import outputs, voices
 from realizer.cli.play import realize, schedule
@@ -53,6 +54,7 @@ for command in (
     emotion,
     track,
     enrich,
+    expressions,
     faces,
     voices,
     outputs,

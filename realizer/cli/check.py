@@ -31,6 +31,7 @@ MOST_ADVICE = 20  # on one block: one slip is often made all over a document
 @options.documents
 @click.option("--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z.")
 @options.media
+@options.expressions
 @role
 @mood
 @click.option(
@@ -45,6 +46,7 @@ def check(
     documents: tuple[str, ...],
     scene: str | None,
     media: Path | None,
+    expressions: Path | None,
     role: Role,
     mood: Mood | None,
     long: bool | None,
@@ -77,11 +79,15 @@ def check(
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a document may hold what the terminal's encoding does not
             stream.reconfigure(errors="backslashreplace")
+    chosen = options.settings(media=media, expressions=expressions)
     faults = 0
     for name, text in zip(documents, options.read_documents(documents), strict=True):
         # A player a file: what one document says must not colour the next one's report.
         player = Player(
-            scene=options.read_scene(scene), idle=False, media=options.settings(media=media).media
+            scene=options.read_scene(scene),
+            idle=False,
+            media=chosen.media,
+            expressions=chosen.expressions,
         )
         source = Source(text)
         blocks = found = 0

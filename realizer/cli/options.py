@@ -33,6 +33,14 @@ media = click.option(
 )
 
 
+expressions = click.option(
+    "--expressions",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Folder of expressions of your own, a .toml file each; before those that ship.",
+)
+
+
 cooccurrence = click.option(
     "--cooccurrence",
     metavar="on|off|FILE",
@@ -80,9 +88,10 @@ def settings(**flags: Any) -> Settings:
 
 
 def playing(command: Command) -> Command:
-    """--voice, --scene, --media and --strict."""
+    """--voice, --scene, --media, --expressions and --strict."""
     for option in (
         click.option("--strict", is_flag=True, help="Exit 1 if any behaviour was dropped."),
+        expressions,
         media,
         click.option(
             "--scene", type=click.Path(exists=True, dir_okay=False), help="File of targets: name x y z."

@@ -64,6 +64,7 @@ def realize(
     voice: str | None,
     scene: str | None,
     media: Path | None,
+    expressions: Path | None,
     strict: bool,
 ) -> int:
     """Play documents offline and write frames, pictures, sound or film.
@@ -87,6 +88,7 @@ def realize(
         voice=voice,
         scene=scene,
         media=media,
+        expressions=expressions,
         seed=seed,
         idle=False if no_idle else None,
         cooccurrence=cooccurrence,
@@ -111,6 +113,7 @@ def realize(
         idle=chosen.idle,
         language=chosen.language,
         media=chosen.media,
+        expressions=chosen.expressions,
         cooccurrence=chosen.cooccurrence,
         mapping=chosen.mapping,
     )
@@ -163,6 +166,7 @@ def schedule(
     voice: str | None,
     scene: str | None,
     media: Path | None,
+    expressions: Path | None,
     strict: bool,
 ) -> int:
     """Print when every sync point falls, in seconds from block start.
@@ -182,9 +186,13 @@ def schedule(
         raise click.UsageError("--detail: wanted --json too")
     if plot is not None:
         _check_plot(plot)
-    chosen = options.settings(voice=voice, scene=scene, media=media)
+    chosen = options.settings(voice=voice, scene=scene, media=media, expressions=expressions)
     player = Player(
-        scene=options.read_scene(chosen.scene), idle=False, language=chosen.language, media=chosen.media
+        scene=options.read_scene(chosen.scene),
+        idle=False,
+        language=chosen.language,
+        media=chosen.media,
+        expressions=chosen.expressions,
     )
     texts = options.read_documents(documents)
     accepted, refused = play(texts, player, chosen.voice)

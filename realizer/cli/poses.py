@@ -12,6 +12,7 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.targets import au, axis, fap
 from realizer.arrays import Float32
 from realizer.emotion import wheel
+from realizer.expressions import Expression
 from realizer.tables import action_units, by_number, faps
 from realizer.tables.emotions import archetypes
 from realizer.tables.feelings import ring
@@ -124,6 +125,15 @@ def of_emotions() -> list[Series]:
         Series("Emotions: archetypes", shown),
         Series("Emotions: the wheel, weak to strong", grid, len(ACTIVATIONS)),
     ]
+
+
+def of_expressions(expressions: Sequence[Expression]) -> list[Pose]:
+    """Each expression of the library, at full intensity."""
+    return _poses(
+        [one.aus for one in expressions],
+        [one.name for one in expressions],
+        [one.units for one in expressions],
+    )
 
 
 def _poses(

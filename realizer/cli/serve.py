@@ -34,6 +34,7 @@ __all__: list[str] = []
     "--scene", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Targets of every session."
 )
 @options.media
+@options.expressions
 @click.option("--seed", type=int, help="Of idle motion.  [default: 0]")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion.  [default: idle]")
 @options.cooccurrence

@@ -96,6 +96,7 @@ class Session:
             idle=settings.idle,
             language=settings.language,
             media=settings.media,
+            expressions=settings.expressions,
             cooccurrence=settings.cooccurrence,
         )
         self.load_face = load_face or (lambda name: _load_face(name, settings.deformer))

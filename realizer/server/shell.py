@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from realizer.behaviours.kind import Position
+from realizer.expressions import library_of
 from realizer.mapping import mapping_of
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
@@ -60,7 +61,7 @@ class Shell:
         Raises:
             ValueError: the scene file is not a scene.
             FaceError: no such face.
-            TableError: a mapping that cannot be used.
+            TableError: a mapping, or an expression of one's own, that cannot be used.
         """
         self._loop = asyncio.get_running_loop()
         if self.settings.scene is not None:
@@ -74,6 +75,7 @@ class Shell:
             None, lambda: load_face(self.settings.face, deformer=self.settings.deformer)
         )
         mapping_of(self.settings.face, self.settings.mapping)
+        library_of(self.settings.expressions)
         self._capabilities = await self._loop.run_in_executor(None, _capabilities)
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
 

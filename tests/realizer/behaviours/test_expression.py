@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from realizer.pipeline import realize
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import templates
 
@@ -67,3 +68,24 @@ def test_an_unknown_name_is_dropped_and_the_near_ones_are_named(play, name: str,
     assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
     assert meant in played.told
     assert played.times("h")
+
+
+def test_ones_own_expressions_are_played_by_both_elements(tmp_path) -> None:
+    (tmp_path / "smirk.toml").write_text(
+        "aus = { 12L = 0.6, 2R = 0.3 }\nonset = 0.2\napex = 0.5\noffset = 0.4\n", "utf-8"
+    )
+    body = '<own:expression xmlns:own="urn:bml-realizer:1" id="e" name="Smirk" intensity="1"/>'
+    body += '<faceLexeme id="f" lexeme="SMIRK" amount="0.5" start="3"/>'
+    played = realize(f'<bml id="b">{body}</bml>', fps=100, expressions=tmp_path, idle=False)
+    assert played.warnings == ()
+    names = played.to_json()["au"]["names"]
+    shown = played.aus.asked[:, [names.index("12L"), names.index("2R"), names.index("12R")]]
+    assert shown[40].tolist() == pytest.approx([0.6, 0.3, 0])
+    assert shown[340].tolist() == pytest.approx([0.3, 0.15, 0])
+    assert list(played.schedules[0]["e"].values()) == pytest.approx([0, 0.2, 0.7, 1.1])
+
+
+def test_a_template_may_be_a_lexeme_too(play) -> None:
+    played = play(f'<faceLexeme id="f" lexeme="template:grief" amount="1" {AT}/>')
+    assert played.warnings == []
+    assert set(played.aus(1.0)) == {"1L", "1R"}

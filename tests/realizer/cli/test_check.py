@@ -59,7 +59,7 @@ CASES = {
     "value": ('<head id="n" lexeme="NOD" amount="7"/>', ["7"], "without it, amount is 0.5"),
     "id": ('<head id="nod" lexeme="NOD"/><wait id="w" start="nodd:end"/>', ["nodd"], 'mean "nod"?'),
     "sync": ('<head id="nod" lexeme="NOD"/><wait id="w" start="nod:fin"/>', ["fin"], "nod has start, ready"),
-    "lexeme": ('<faceLexeme id="f" lexeme="RAISE_BROW"/>', ["RAISE_BROW"], "mean RAISE_BROWS?"),
+    "lexeme": ('<faceLexeme id="f" lexeme="RAISE_BROW"/>', ["RAISE_BROW"], "mean RAISE_BROWS or"),
     "side": ('<faceFacs id="f" au="1" side="LEF"/>', ["LEF"], 'mean "LEFT"?'),
     "element": ('<hed id="h"/>', ["hed"], 'mean "head"?'),
     "attribute": ('<head id="n" lexem="NOD"/>', ["lexem"], 'mean lexeme where it says "lexem"?'),

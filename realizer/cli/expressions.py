@@ -1,0 +1,155 @@
+"""`expressions`: what the library holds, and what in it means or shows what is asked for."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from realizer.cli import options
+
+if TYPE_CHECKING:
+    from realizer.expressions import Expression
+
+__all__: list[str] = []
+
+SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
+as_json = click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
+picture = click.option(
+    "-o", "--output", metavar="SHEET.png", type=click.Path(path_type=Path), help="Draw what is told."
+)
+face = click.option("--face", default="default", show_default=True, help="Whose face.")
+
+
+class Units(click.ParamType):  # type: ignore[type-arg]
+    """1,2,12L=0.5 -> (AU, side) -> intensity."""
+
+    name = "units"
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        from realizer.errors import TableError
+        from realizer.tables.lexemes import read_aus
+
+        found: dict[tuple[int, str], float] = {}
+        for part in str(value).replace("+", ",").split(","):
+            match = re.fullmatch(r"\s*(?:AU)?\s*([^=\s]*)\s*(?:=\s*(\d*\.?\d+))?\s*", part, re.IGNORECASE)
+            if match is None:
+                self.fail(f"wanted action units such as 1,2,12L=0.5, got {part!r}", parameter, context)
+            try:
+                found |= read_aus({match[1].upper(): float(match[2] or 1)}, "--au")
+            except TableError as error:
+                self.fail(str(error).removeprefix("--au: "), parameter, context)
+        return found
+
+
+@click.group()
+def expressions() -> None:
+    """List the expressions that documents and timelines may name, and look them up."""
+
+
+@expressions.command("list")
+@as_json
+@picture
+@face
+@options.expressions
+def list_(as_json: bool, output: Path | None, face: str, expressions: Path | None) -> None:
+    """A line for each: name, action units, seconds of onset, apex and offset, and what is seen."""
+    from realizer.expressions import library_of
+
+    _check_picture(output, face)
+    known = list(library_of(options.settings(expressions=expressions).expressions).values())
+    _tell(known, [""] * len(known), as_json)
+    if output is not None:
+        _draw(known, [one.units for one in known], output, face)
+
+
+@expressions.command()
+@click.argument("text", required=False)
+@click.option("--au", "units", type=Units(), metavar="1,2,12L=0.5", help="By action units, instead of words.")
+@click.option("--most", type=click.IntRange(1), default=8, show_default=True, help="How many to tell.")
+@as_json
+@picture
+@face
+@options.expressions
+def find(
+    text: str | None,
+    units: Any,
+    most: int,
+    as_json: bool,
+    output: Path | None,
+    face: str,
+    expressions: Path | None,
+) -> int:
+    """Look expressions up, by what TEXT says they mean or by the action units they show; the best first.
+
+    \b
+    realizer expressions find "sorry about that"
+    realizer expressions find --au 1,2,12L -o found.png
+    """
+    from realizer.expressions import by_action_units, by_meaning, library_of
+
+    if (text is None) == (units is None):
+        raise click.UsageError("wanted TEXT or --au, got " + ("neither" if text is None else "both"))
+    _check_picture(output, face)
+    library = library_of(options.settings(expressions=expressions).expressions)
+    if text is not None:
+        found = by_meaning(text, library.values())
+    else:
+        found = by_action_units(units, library.values())
+    found = found[:most]
+    scores = [f"{score:.2f}" for _, score in found]
+    _tell([one for one, _ in found], scores, as_json)
+    if not found:
+        asked = repr(text) if text is not None else "those action units"
+        click.echo(f"nothing in the library goes with {asked}; `realizer expressions list` has all", err=True)
+    elif output is not None:
+        _draw([one for one, _ in found], scores, output, face)
+    return 0 if found else 1
+
+
+def _check_picture(output: Path | None, face: str) -> None:
+    if output is not None and output.suffix.lower() != ".png":
+        raise click.UsageError(f"{output}: wanted a name that ends in .png")
+    if output is not None:
+        options.check_camera(face, "front")
+
+
+def _tell(found: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
+    if as_json:
+        told = [
+            one.to_json() | ({"score": float(score)} if score else {})
+            for one, score in zip(found, scores, strict=True)
+        ]
+        click.echo(json.dumps(told, indent=1))
+        return
+    width = max((len(one.name) for one in found), default=0)
+    units = max((len(one.units) for one in found), default=0)
+    for one, score in zip(found, scores, strict=True):
+        seconds = f"{one.onset:4.2f} {one.apex:4.2f} {one.offset:4.2f}"
+        own = f"  [{one.file}]" if one.file is not None else ""
+        line = f"{score + '  ' if score else ''}{one.name:<{width}}  {one.units:<{units}}  {seconds}"
+        click.echo(f"{line}  {one.features or ', '.join(one.means)}{own}".rstrip())
+
+
+def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: str) -> None:
+    """A picture of each on a sheet."""
+    from PIL import Image
+
+    from realizer.animation.pose import poses
+    from realizer.cli.poses import Series, frames, of_expressions
+    from realizer.face import takes
+    from realizer.mapping import mapping_of
+    from realizer.render import Renderer
+    from realizer.render.sheets import sheet
+
+    rows = poses(frames([Series("", of_expressions(found))]), takes(face), mapping_of(face))
+    with Renderer(face, (220, 280), "front") as renderer:
+        pictures = renderer.draw(rows)
+    Image.fromarray(sheet(list(pictures), [one.name for one in found], [(note,) for note in notes])).save(
+        path
+    )
+    click.echo(f"{path}: {len(found)} expressions", err=True)

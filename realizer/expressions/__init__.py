@@ -1,0 +1,24 @@
+"""The library of expressions: shipped ones and a user's own, what they mean, and timelines of them."""
+
+from realizer.expressions.expression import Expression, key
+from realizer.expressions.find import by_action_units, by_meaning
+from realizer.expressions.library import Library, library_of, shipped
+from realizer.expressions.own import read_folder
+from realizer.expressions.timeline import Entry, Span, Timeline, Track, read_timeline, spans
+
+__all__ = [
+    "Entry",
+    "Expression",
+    "Library",
+    "Span",
+    "Timeline",
+    "Track",
+    "by_action_units",
+    "by_meaning",
+    "key",
+    "library_of",
+    "read_folder",
+    "read_timeline",
+    "shipped",
+    "spans",
+]

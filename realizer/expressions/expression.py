@@ -1,0 +1,97 @@
+"""The value of the library: one expression, what it shows, what it means and how long it lasts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from realizer.tables.timing import Gap
+
+__all__ = ["Expression", "key"]
+
+LETTERS = {"LEFT": "L", "RIGHT": "R", "BOTH": ""}
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """A shape that a face takes, with a name of its own (Wojdel 2005, 5.4.1).
+
+    Attributes:
+        name: as it is written: "template:surprise", "SMILE".
+        features: what is seen, in words.
+        means: words and phrases that it is asked for by.
+        aus: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at intensity 1.
+        gaps: onset, apex and offset, each with where it comes from; seconds.
+        possible, probable: seconds for which it was seen on people, (least, most); None where nobody says.
+        source: where the expression comes from.
+        file: of a user's own; None for a shipped one.
+    """
+
+    name: str
+    features: str
+    means: tuple[str, ...]
+    aus: Mapping[tuple[int, str], float]
+    gaps: tuple[Gap, Gap, Gap]
+    possible: tuple[float, float] | None = None
+    probable: tuple[float, float] | None = None
+    source: str = ""
+    file: Path | None = None
+
+    @property
+    def onset(self) -> float:
+        """Seconds that it takes to rise."""
+        return self.gaps[0].preferred
+
+    @property
+    def apex(self) -> float:
+        """Seconds that it stays."""
+        return self.gaps[1].preferred
+
+    @property
+    def offset(self) -> float:
+        """Seconds that it takes to go."""
+        return self.gaps[2].preferred
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last of it."""
+        return self.onset + self.apex + self.offset
+
+    @property
+    def evident(self) -> float:
+        """Seconds for which it can be seen: the apex, and half of rising and going."""
+        return self.onset / 2 + self.apex + self.offset / 2
+
+    @property
+    def units(self) -> str:
+        """Its action units as FACS writes sums of them: "1+2+12L"."""
+        return "+".join(f"{au}{LETTERS[side]}" for au, side in self.aus)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; a range without an end has null there."""
+
+        def ends(of: tuple[float, float] | None) -> list[float | None] | None:
+            return None if of is None else [end if end < float("inf") else None for end in of]
+
+        return {
+            "name": self.name,
+            "features": self.features,
+            "means": list(self.means),
+            "aus": {f"{au}{LETTERS[side]}": value for (au, side), value in self.aus.items()},
+            **{
+                name: {"seconds": round(gap.preferred, 4), "source": gap.source}
+                for name, gap in zip(("onset", "apex", "offset"), self.gaps, strict=True)
+            },
+            "possible": ends(self.possible),
+            "probable": ends(self.probable),
+            "source": self.source,
+            "file": None if self.file is None else str(self.file),
+        }
+
+
+def key(name: str) -> str:
+    """What two spellings of a name have in common: case, and what stands between words, do not count."""
+    return re.sub(r"[\s_-]+", "_", re.sub(r"\s*:\s*", ":", name.strip())).upper()

@@ -1,0 +1,123 @@
+"""Templates, lexemes and a folder of a user's own in, every expression by its name out."""
+
+from __future__ import annotations
+
+import difflib
+import logging
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache, lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from realizer.expressions.expression import Expression, key
+from realizer.expressions.own import read_folder
+from realizer.tables.expression_words import expression_words
+from realizer.tables.lexemes import face_lexemes
+from realizer.tables.templates import Template, templates
+from realizer.tables.timing import Gap, gaps
+
+__all__ = ["Library", "library_of", "shipped"]
+
+PREFIX = "template:"
+log = logging.getLogger(__name__)
+
+
+class Library(Mapping[str, Expression]):
+    """Expressions by name, however it is spelt; of two with one name the later counts.
+
+    Attributes:
+        notes: which took the place of which.
+    """
+
+    def __init__(self, expressions: Iterable[Expression]) -> None:
+        self._known: dict[str, Expression] = {}
+        notes = []
+        for one in expressions:
+            before = self._known.get(key(one.name))
+            if before is not None:
+                notes.append(f"{one.file}: {one.name} takes the place of the shipped {before.name}")
+            self._known[key(one.name)] = one
+        self.notes = tuple(notes)
+
+    def __getitem__(self, name: str) -> Expression:
+        return self._known[key(name)]
+
+    def __iter__(self) -> Iterator[str]:
+        return (one.name for one in self._known.values())
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def near(self, name: str) -> list[str]:
+        """Names that are nearly this one, the nearest first; at most three."""
+        parts: dict[str, list[str]] = {}
+        for spelt, one in self._known.items():
+            for part in {spelt, spelt.rpartition(":")[2]}:
+                parts.setdefault(part, []).append(one.name)
+        found = difflib.get_close_matches(key(name)[:100], parts, n=3)
+        return list(dict.fromkeys(name for part in found for name in parts[part]))[:3]
+
+
+@cache
+def shipped() -> Library:
+    """The twelve templates of Wojdel, as "template:...", and every face lexeme.
+
+    Raises:
+        TableError: one of their tables is damaged.
+    """
+    return Library([*map(_of_lexeme, face_lexemes()), *map(_of_template, templates().values())])
+
+
+def library_of(folder: Path | None = None) -> Library:
+    """What ships, and a user's own expressions before them. A folder is read once.
+
+    Raises:
+        TableError: files that are no expressions; every fault, with file and key.
+    """
+    return shipped() if folder is None else _with_own(folder.resolve())
+
+
+@lru_cache(maxsize=16)
+def _with_own(folder: Path) -> Library:
+    own = read_folder(folder)
+    library = Library([*shipped().values(), *own])
+    for note in library.notes:
+        log.warning(note)
+    if not own:
+        log.warning("%s: wanted expressions, a .toml file each, found none", folder)
+    return library
+
+
+def _of_lexeme(name: str) -> Expression:
+    words = expression_words()[name]
+    onset, apex, offset = gaps("faceLexeme", name).gaps
+    return Expression(
+        name,
+        words.features,
+        words.words,
+        face_lexemes()[name].aus,
+        (onset, apex, offset),
+        source="faceLexeme of BML, or a word in common use; action units and intensities: lexemes.toml",
+    )
+
+
+def _of_template(template: Template) -> Expression:
+    """The apex fills what the average, within its probable range, leaves beside half of onset and offset."""
+    onset, hold, offset = gaps("face").gaps
+    evident = template.evident
+    if template.probable is not None:
+        evident = float(np.clip(evident, *template.probable))
+    held = max(evident - onset.preferred / 2 - offset.preferred / 2, 0.0)
+    stiffness = hold.stiffness if template.deviation is None else template.deviation**-2
+    name = PREFIX + template.name.lower()
+    return Expression(
+        name,
+        template.features,
+        expression_words()[name].words,
+        template.aus,
+        (onset, Gap("hold", held, 0.0, stiffness, "Wojdel 2005 tables 6.4 and 6.15"), offset),
+        template.possible,
+        template.probable,
+        "Wojdel 2005 table 6.2; action units ours, from its words",
+    )

@@ -1,0 +1,168 @@
+"""A folder of a user's own expressions in, a TOML file each; expressions out, or every fault at once."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from realizer.errors import TableError
+from realizer.expressions.expression import Expression, key
+from realizer.tables.lexemes import read_aus
+from realizer.tables.timing import Gap, gaps
+
+__all__ = ["read_folder"]
+
+KEYS = ("name", "means", "features", "aus", "onset", "apex", "offset", "possible", "probable", "source")
+NEUTRAL = "NEUTRAL"  # the word for no expression, in timelines
+NAME = re.compile(r"[^\W\d_][\w .:'-]{0,99}")
+LONGEST = 3600.0  # s
+
+
+def read_folder(folder: Path) -> tuple[Expression, ...]:
+    """The expressions of a folder, by the names of their files.
+
+        name = "polite smile"                # else the name of the file
+        means = ["greeting", "thank you"]    # what it is found by
+        features = "raised corners of the mouth, one brow up"
+        aus = { 12 = 0.5, 6 = 0.2, 2L = 0.4 }
+        onset = 0.3                          # seconds; those that are missing are as for any face
+        apex = 0.8
+        offset = 0.5
+        possible = [0.3, 4.0]                # seconds for which it can be seen
+        probable = [0.5, 2.0]
+        source = "seen at the front desk"
+
+    Raises:
+        TableError: all that is wrong, a line each: file, key, what was wanted, what came.
+    """
+    found: dict[str, Expression] = {}
+    faults: list[str] = []
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            row = tomllib.loads(path.read_text("utf-8"))
+        except OSError as error:
+            faults.append(f"{path}: {error.strerror}")
+            continue
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            faults.append(f"{path}: wanted TOML, got: {error}")
+            continue
+        reading = _Reading(path, row)
+        one = reading.expression()
+        faults += reading.faults
+        if one is None:
+            continue
+        other = found.get(key(one.name))
+        if other is not None:
+            faults.append(f"{path}: name: wanted one of its own, got {one.name!r}, which {other.file} has")
+        found[key(one.name)] = one
+    if faults:
+        raise TableError("\n".join(faults))
+    return tuple(found.values())
+
+
+class _Reading:
+    """One file, and what is wrong with it."""
+
+    def __init__(self, path: Path, row: dict[str, Any]) -> None:
+        self.path, self.row = path, row
+        self.faults: list[str] = []
+
+    def expression(self) -> Expression | None:
+        """None where the file has faults."""
+        for name in self.row.keys() - set(KEYS):
+            near = difflib.get_close_matches(name, KEYS, n=1)
+            hint = f", did you mean {near[0]}?" if near else ""
+            self._fault(name, f"one of {', '.join(KEYS)}", f"{name!r}{hint}")
+        name, means, aus = self._name(), self._means(), self._aus()
+        onset, apex, offset = self._gaps()
+        possible, probable = self._range("possible"), self._range("probable")
+        features, source = self._text("features"), self._text("source")
+        if possible and probable and not possible[0] <= probable[0] < probable[1] <= possible[1]:
+            self._fault("probable", f"a range within the possible one, {_said(possible)}", _said(probable))
+        if self.faults:
+            return None
+        found = Expression(
+            name, features, means, aus, (onset, apex, offset), possible, probable, source, self.path
+        )
+        if possible and not possible[0] - 1e-6 <= found.evident <= possible[1] + 1e-6:
+            wanted = f"a time with which it is seen for the possible {_said(possible)}"
+            self._fault("apex", wanted, f"{found.evident:.3g} s (half of onset and offset, and the apex)")
+            return None
+        return found
+
+    def _fault(self, key: str, wanted: str, got: object) -> None:
+        self.faults.append(f"{self.path}: {key}: wanted {wanted}, got {got}")
+
+    def _name(self) -> str:
+        name = self.row.get("name", self.path.stem)
+        if not isinstance(name, str) or not NAME.fullmatch(name.strip()):
+            self._fault("name", "a name that begins with a letter, of up to 100 characters", repr(name))
+        elif key(name) == NEUTRAL:
+            self._fault("name", "another name, as neutral is the face without expression", repr(name))
+        return str(name).strip()
+
+    def _text(self, name: str) -> str:
+        value = self.row.get(name, "")
+        if not isinstance(value, str):
+            self._fault(name, "text", repr(value))
+        return str(value)
+
+    def _means(self) -> tuple[str, ...]:
+        value = self.row.get("means", [])
+        if isinstance(value, str):
+            value = [value]
+        if not isinstance(value, list) or not all(isinstance(word, str) and word.strip() for word in value):
+            self._fault("means", 'words, such as ["greeting", "thank you"]', repr(value))
+            return ()
+        return tuple(value)
+
+    def _aus(self) -> dict[tuple[int, str], float]:
+        cells = self.row.get("aus")
+        if not isinstance(cells, dict) or not cells:
+            self._fault("aus", "action units by intensity, such as { 12 = 0.6, 2L = 0.3 }", repr(cells))
+            return {}
+        aus: dict[tuple[int, str], float] = {}
+        for cell, amount in cells.items():
+            if isinstance(amount, bool) or not isinstance(amount, int | float):
+                self._fault(f"aus.{cell}", "an intensity above 0 and to 1", repr(amount))
+                continue
+            try:
+                aus |= read_aus({cell: amount}, f"{self.path}: aus")
+            except TableError as error:
+                self.faults.append(str(error))
+        return aus
+
+    def _gaps(self) -> tuple[Gap, Gap, Gap]:
+        found = []
+        for name, usual in zip(("onset", "apex", "offset"), gaps("face").gaps, strict=True):
+            seconds = self.row.get(name, usual.preferred)
+            if not _number(seconds) or not usual.least <= seconds <= LONGEST:
+                self._fault(name, f"seconds, {usual.least:g} to {LONGEST:g}", repr(seconds))
+                seconds = usual.preferred
+            source = str(self.path) if name in self.row else usual.source
+            found.append(Gap(usual.name, float(seconds), usual.least, usual.stiffness, source))
+        onset, apex, offset = found
+        return onset, apex, offset
+
+    def _range(self, name: str) -> tuple[float, float] | None:
+        cell = self.row.get(name)
+        if cell is None:
+            return None
+        if isinstance(cell, list) and len(cell) == 2 and _number(cell[0]):
+            low, high = cell
+            if (high == math.inf or _number(high)) and 0 <= low < high:
+                return float(low), float(high)
+        self._fault(name, "[least, most] in seconds (inf: no end)", repr(cell))
+        return None
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _said(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:g} to {ends[1]:g} s" if ends[1] < math.inf else f"{ends[0]:g} s or more"

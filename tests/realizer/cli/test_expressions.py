@@ -1,0 +1,73 @@
+"""`realizer expressions`: the library on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+from realizer.expressions import shipped
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(cli, ["expressions", *words])
+
+
+def test_all_are_listed_with_their_units_and_times() -> None:
+    done = run("list")
+    assert done.exit_code == 0
+    lines = done.stdout.splitlines()
+    assert len(lines) == len(shipped())
+    assert any(line.split()[:2] == ["SMILE", "6+12"] for line in lines)
+
+
+def test_the_list_as_json_has_everything() -> None:
+    told = {one["name"]: one for one in json.loads(run("list", "--json").stdout)}
+    grief = told["template:grief"]
+    assert grief["aus"] == {"1": 1.0}
+    assert grief["possible"] == [0.25, 4.0]
+    assert "Wojdel" in grief["apex"]["source"]
+
+
+def test_an_expression_is_found_by_words_and_by_units() -> None:
+    assert "template:regret" in run("find", "sorry").stdout.splitlines()[0]
+    assert "template:disgust" in run("find", "--au", "9").stdout.splitlines()[0]
+    assert "LEFT_BROW" in run("find", "--au", "AU1L=0.8, 2L").stdout.splitlines()[0]
+
+
+def test_no_more_are_told_than_asked_for() -> None:
+    told = json.loads(run("find", "smile", "--most", "2", "--json").stdout)
+    assert len(told) == 2
+    assert told[0]["score"] >= told[1]["score"] > 0
+
+
+def test_ones_own_are_found_too(tmp_path: Path) -> None:
+    (tmp_path / "wave.toml").write_text('means = ["hullo"]\naus = { 12R = 0.5 }\n', "utf-8")
+    done = run("find", "hullo", "--expressions", str(tmp_path))
+    assert "wave" in done.stdout
+    assert "wave.toml" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["find"], "wanted TEXT or --au, got neither"),
+        (["find", "smile", "--au", "1"], "wanted TEXT or --au, got both"),
+        (["find", "--au", "99"], "wanted an action unit such as 12 or 12L, got '99'"),
+        (["find", "--au", "1=7"], "wanted an intensity above 0 and to 1, got 7"),
+        (["list", "-o", "sheet.txt"], "sheet.txt: wanted a name that ends in .png"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(words: list[str], told: str) -> None:
+    done = CliRunner().invoke(cli, ["expressions", *words])
+    assert done.exit_code == 2
+    assert told in " ".join(done.stderr.split())
+
+
+def test_nothing_found_is_said_and_counts() -> None:
+    done = CliRunner().invoke(cli, ["expressions", "find", "qqqq"], standalone_mode=False)
+    assert done.return_value == 1
+    assert "nothing in the library goes with 'qqqq'" in done.stderr

@@ -1,0 +1,25 @@
+"""One expression as a value."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.expressions import key, shipped
+
+
+def test_it_is_seen_for_its_apex_and_half_of_coming_and_going() -> None:
+    one = shipped()["SURPRISE"]
+    assert one.duration == pytest.approx(one.onset + one.apex + one.offset)
+    assert one.evident == pytest.approx(one.duration - (one.onset + one.offset) / 2)
+
+
+def test_its_units_are_written_as_facs_writes_them() -> None:
+    assert shipped()["SURPRISE"].units == "1+2+5+26"
+    assert shipped()["RAISE_LEFT_BROW"].units == "1L+2L"
+
+
+@pytest.mark.parametrize(
+    "name", ["template:ironic smile", "TEMPLATE:IRONIC_SMILE", " template : ironic-smile "]
+)
+def test_spellings_have_one_key(name: str) -> None:
+    assert key(name) == "TEMPLATE:IRONIC_SMILE"
