@@ -143,3 +143,16 @@ def test_furrows_as_numbers_make_the_same_points_and_tones(face, wrinkles):
     tone = np.array([sum(amounts[k] * t for k, t in pairs) for pairs in table["tones"]])[:, None]
     shown = 0.5 * (1 - np.maximum(tone, 0) * table["shade"] + np.maximum(-tone, 0))
     assert shown == pytest.approx(colours, abs=1e-3)
+
+
+def test_a_furrows_curve_is_the_monotone_cubic_through_its_knots():
+    from scipy.interpolate import PchipInterpolator
+
+    from realizer.render.wrinkles import _through
+
+    random = np.random.default_rng(0)
+    for count in (2, 3, 6):
+        along = np.concatenate([[0], np.cumsum(random.random(count - 1) + 0.05)])
+        knots = random.normal(size=(count, 2))
+        where = np.linspace(0, along[-1], 17)
+        assert _through(along, knots, where) == pytest.approx(PchipInterpolator(along, knots)(where))
