@@ -60,7 +60,7 @@ from bml_schema.nodes import (
     Required,
     Synchronize,
 )
-from bml_schema.own import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood
+from bml_schema.own import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood, Timeline
 from bml_schema.parser import MOST_BEHAVIOURS
 from bml_schema.shape import attribute, child, children, mixed, node, sync_ref, text
 from bml_schema.sync_refs import SyncRef
@@ -130,6 +130,7 @@ __all__ = [
     "SyncPointProgress",
     "SyncRef",
     "Synchronize",
+    "Timeline",
     "Trajectory",
     "Value",
     "Wait",

@@ -7,7 +7,7 @@ from bml_schema.nodes import Behaviour, Part, own
 from bml_schema.shape import attribute, children, node
 from bml_schema.values import integer, number, one_of, string, word
 
-__all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood"]
+__all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood", "Timeline"]
 
 _ANGLE = number(-360, 360)  # degrees on the wheel of emotions
 _ACTIVATION = number(1, 7)  # on Whissel's scale
@@ -93,6 +93,14 @@ class FapFile(Behaviour):
     """Play a .fap file of the media folder."""
 
     tag = own("fapFile")
+    file_name: str = attribute(word)
+
+
+@node
+class Timeline(Behaviour):
+    """Play a file of the media folder that has expressions one after the other, in several channels."""
+
+    tag = own("timeline")
     file_name: str = attribute(word)
 
 

@@ -405,6 +405,7 @@ KINDS: dict[str, Callable[[Author, str], Tag]] = {
         "r", "faps", (), a.element(Tag("r", "fap", (("number", "31"), ("value", a.number(0, 3000)))))
     ),
     "fapFile": _with("fapFile", "r", fileName=("no-such.fap", "../out.fap")),
+    "timeline": _with("timeline", "r", fileName=("no-such.toml", "../out.json")),
     "blink": _with("blink", "r", side=("BOTH", "LEFT"), amount=Author.amount),
     "idle": _with("idle", "r", blinks=Author.amount, motion=Author.amount),
     "interrupt": _interrupt,

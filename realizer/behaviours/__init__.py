@@ -20,6 +20,7 @@ from realizer.behaviours import (
     idle_control,
     keyframes,
     speech,
+    timeline,
     wait,
 )
 from realizer.behaviours.kind import Kind
@@ -36,6 +37,7 @@ MODULES = (
     emotion,
     expression,
     fap_values,
+    timeline,
     keyframes,
     blink,
     idle_control,

@@ -24,7 +24,17 @@ GROUPS = {
     "speech": ("speech", "audiofile"),
     "gaze": ("gaze", "gazeShift"),
     "head": ("head", "headDirectionShift"),
-    "face": ("face", "faceFacs", "faceLexeme", "faceShift", "facekeyframe", "faps", "fapFile", "blink"),
+    "face": (
+        "face",
+        "faceFacs",
+        "faceLexeme",
+        "faceShift",
+        "facekeyframe",
+        "faps",
+        "fapFile",
+        "timeline",
+        "blink",
+    ),
     "mood": ("emotion", "expression", "mood", "idle"),
     "body": ("gesture", "pointing", "posture", "postureShift", "locomotion"),
 }

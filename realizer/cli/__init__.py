@@ -18,6 +18,7 @@ from realizer.cli.faces import faces
 from realizer.cli.lists import outputs, voices
 from realizer.cli.play import realize, schedule
 from realizer.cli.serve import serve
+from realizer.cli.timeline import timeline
 from realizer.cli.track import track
 from realizer.errors import RealizerError
 
@@ -55,6 +56,7 @@ for command in (
     track,
     enrich,
     expressions,
+    timeline,
     faces,
     voices,
     outputs,

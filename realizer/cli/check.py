@@ -13,6 +13,7 @@ import click
 
 from realizer.cli import options
 from realizer.cli.enrich import mood, role
+from realizer.cli.timeline import advice_on, faults_in, is_timeline
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -56,6 +57,7 @@ def check(
     Standard output holds the faults and nothing else; a line each, unless it is a terminal. Advice on what is
     no fault but looks like a slip goes to standard error, and does not count; so does advice on expressions
     that last, follow each other or go with words otherwise than people's do, as who talks or listens.
+    A .toml or .json file is a timeline (`realizer timeline`).
     """
     from bml_schema import Block, read
     from bml_schema.source import Source
@@ -82,6 +84,9 @@ def check(
     chosen = options.settings(media=media, expressions=expressions)
     faults = 0
     for name, text in zip(documents, options.read_documents(documents), strict=True):
+        if is_timeline(name):
+            faults += _check_timeline(name, text, chosen.expressions, role, mood, context.obj["quiet"])
+            continue
         # A player a file: what one document says must not colour the next one's report.
         player = Player(
             scene=options.read_scene(scene),
@@ -111,6 +116,23 @@ def check(
             click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)
         faults += found
     return 1 if faults else 0
+
+
+def _check_timeline(
+    name: str, text: bytes, folder: Path | None, role: Role, mood: Mood | None, quiet: bool
+) -> int:
+    """How many faults a timeline has; each is told, and advice on a sound one."""
+    from realizer.expressions import library_of
+
+    library = library_of(folder)
+    faults = faults_in(text, library)
+    for fault in faults:
+        click.echo(f"{name}: {fault}")
+    if not faults and not quiet:
+        for words in advice_on(text, library, role, mood):
+            click.echo(f"{name}: ADVICE {words}", err=True)
+        click.echo(f"{name}: no fault in this timeline", err=True)
+    return len(faults)
 
 
 def examine(block: Block, player: Player) -> tuple[Schedule, list[Warning]]:

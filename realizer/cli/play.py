@@ -12,7 +12,7 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from realizer.charts.timeline import BlockLine
     from realizer.player import Player
@@ -24,30 +24,58 @@ PICTURES = (".png", ".mp4", ".webm")
 TRANSPARENT = "transparent"
 
 
+def performing(command: options.Command) -> options.Command:
+    """What can be asked of a performance that is written to a file."""
+    for option in (
+        options.playing,
+        options.mapping,
+        options.cooccurrence,
+        click.option("--no-idle", is_flag=True, help="No blinks, no small head motion."),
+        click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]"),
+        options.background,
+        options.light,
+        click.option("--camera", default="front", show_default=True, help=options.CAMERAS),
+        click.option(
+            "--size", default="512x512", show_default=True, callback=options.size, help="Of pictures."
+        ),
+        options.deformer,
+        click.option("--face", metavar="NAME", help="A face of `realizer faces list`."),
+        click.option(
+            "--at",
+            type=options.Number(0),
+            metavar="SECONDS",
+            help="With .png: the picture of that instant.",
+        ),
+        click.option(
+            "--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.  [default: 25]"
+        ),
+        click.option(
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="Where to; its suffix picks the encoding. Default: JSON here.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
 @click.command()
 @options.documents
-@click.option(
-    "-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding. Default: JSON here."
-)
-@click.option("--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.  [default: 25]")
-@click.option(
-    "--at", type=options.Number(0), metavar="SECONDS", help="With .png: the picture of that instant."
-)
-@click.option("--face", metavar="NAME", help="A face of `realizer faces list`.")
-@options.deformer
-@click.option("--size", default="512x512", show_default=True, callback=options.size, help="Of pictures.")
-@click.option("--camera", default="front", show_default=True, help=options.CAMERAS)
-@options.light
-@options.background
-@click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]")
-@click.option("--no-idle", is_flag=True, help="No blinks, no small head motion.")
-@options.cooccurrence
-@options.mapping
-@options.playing
+@performing
 @click.pass_context
-def realize(
+def realize(context: click.Context, /, documents: tuple[str, ...], **asked: Any) -> int:
+    """Play documents offline and write frames, pictures, sound or film.
+
+    Several documents are submitted at 0 s in order; their composition attributes apply.
+    """
+    return perform(context, lambda: options.read_documents(documents), **asked)
+
+
+def perform(
     context: click.Context,
-    documents: tuple[str, ...],
+    read: Callable[[], list[bytes]],
+    *,
     output: str | None,
     fps: float | None,
     at: float | None,
@@ -67,9 +95,9 @@ def realize(
     expressions: Path | None,
     strict: bool,
 ) -> int:
-    """Play documents offline and write frames, pictures, sound or film.
+    """Play the documents that `read` gives, as the options of `performing` ask; returns the exit status.
 
-    Several documents are submitted at 0 s in order; their composition attributes apply.
+    They are read when all that was asked has been found possible.
     """
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
@@ -103,7 +131,7 @@ def realize(
             param_hint="--background",
         )
     realization = run(
-        options.read_documents(documents),
+        read(),
         face=chosen.face,
         deformer=chosen.deformer,
         fps=chosen.fps,

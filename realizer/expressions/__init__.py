@@ -4,7 +4,17 @@ from realizer.expressions.expression import Expression, key
 from realizer.expressions.find import by_action_units, by_meaning
 from realizer.expressions.library import Library, library_of, shipped
 from realizer.expressions.own import read_folder
-from realizer.expressions.timeline import Entry, Span, Timeline, Track, read_timeline, spans
+from realizer.expressions.timeline import (
+    Entry,
+    Span,
+    Timeline,
+    Track,
+    evident,
+    faults_of,
+    lasts,
+    read_timeline,
+    spans,
+)
 
 __all__ = [
     "Entry",
@@ -15,7 +25,10 @@ __all__ = [
     "Track",
     "by_action_units",
     "by_meaning",
+    "evident",
+    "faults_of",
     "key",
+    "lasts",
     "library_of",
     "read_folder",
     "read_timeline",

@@ -58,6 +58,12 @@ class Library(Mapping[str, Expression]):
         found = difflib.get_close_matches(key(name)[:100], parts, n=3)
         return list(dict.fromkeys(name for part in found for name in parts[part]))[:3]
 
+    def unknown(self, name: str) -> str:
+        """What to say of a name that is none of these."""
+        near = self.near(name)
+        hint = f", did you mean {' or '.join(near)}?" if near else ""
+        return f"wanted a name of `realizer expressions list`, got {name[:60]!r}{hint}"
+
 
 @cache
 def shipped() -> Library:

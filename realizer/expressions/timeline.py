@@ -6,15 +6,16 @@ import difflib
 import json
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal, cast, get_args
 
 from realizer.errors import TableError
 from realizer.expressions.expression import Expression, key
+from realizer.expressions.library import Library
 
-__all__ = ["Entry", "Span", "Timeline", "Track", "read_timeline", "spans"]
+__all__ = ["Entry", "Span", "Timeline", "Track", "evident", "faults_of", "lasts", "read_timeline", "spans"]
 
 Joins = Literal["both", "onset", "offset"]
 Curve = Literal["linear", "smooth"]
@@ -120,6 +121,38 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
         begin, end = begins[k], begins[k + 1]
         found.append(Span(entry, begin, begin + rise * part, end - fall * part, end))
     return found
+
+
+def lasts(timeline: Timeline, library: Mapping[str, Expression]) -> float:
+    """Seconds to the end of the longest track."""
+    return max(spans(track, library)[-1].end for track in timeline.tracks)
+
+
+def evident(
+    timeline: Timeline, library: Mapping[str, Expression]
+) -> Iterator[tuple[str, Expression, float, float]]:
+    """(place, expression, begin, end) of each entry but breaks: the seconds from when to when it can be seen.
+
+    It can from half of what leads to it to half of what leads from it.
+    """
+    for track in timeline.tracks:
+        shown = spans(track, library)
+        lefts = [shown[0].start, *(span.left for span in shown)]
+        reached = [*(span.reached for span in shown), shown[-1].end]
+        for k, span in enumerate(shown):
+            if not span.entry.neutral:
+                begin, end = (lefts[k] + span.reached) / 2, (span.left + reached[k + 1]) / 2
+                yield f"channel {track.name}, entry {k + 1}", library[span.entry.expression], begin, end
+
+
+def faults_of(timeline: Timeline, library: Library) -> list[str]:
+    """Entries whose expression is not in the library: channel, entry, what was wanted, what came."""
+    return [
+        f"channel {track.name}, entry {number}, expression: {library.unknown(entry.expression)}"
+        for track in timeline.tracks
+        for number, entry in enumerate(track.entries, 1)
+        if not entry.neutral and entry.expression not in library
+    ]
 
 
 def _onset_and_offset(entry: Entry, library: Mapping[str, Expression]) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from realizer.tables.emotional_words import word_list
 from realizer.tables.knowledge import Company, Mood, Placing, Role, knowledge
 from realizer.tables.templates import templates
 
-__all__ = ["Advice", "Seen", "advise"]
+__all__ = ["Advice", "Seen", "advise", "lasting"]
 
 NEAR = 1.0  # s; what is nearer than that is "in the neighbourhood" (6.3.3)
 FEW = 3  # expressions; of fewer no pace can be told
@@ -78,20 +78,35 @@ def advise(
 
 def _length(one: Seen) -> Iterator[Advice]:
     template = templates()[one.template.upper()]
-    if template.possible is None or template.probable is None:
-        return
-    lasts = one.end - one.start
-    low, high = template.possible
-    if not low - 1e-3 <= lasts <= high + 1e-3:
-        said = (
-            f"{one.template} can be seen for {lasts:.2g} s; nobody was seen to show it so {_how(lasts, low)}"
-        )
-        yield Advice(one.id, said, f"it lasts {_range(template.possible)} (Wojdel 2005, table 6.15)")
-        return
-    low, high = template.probable
-    if not low - 1e-3 <= lasts <= high + 1e-3:
-        said = f"{one.template} can be seen for {lasts:.2g} s, which is unusually {_how(lasts, low)}"
-        yield Advice(one.id, said, f"it mostly lasts {_range(template.probable)} (Wojdel 2005, table 6.15)")
+    source = "Wojdel 2005, table 6.15"
+    yield from lasting(
+        one.id, one.template, one.end - one.start, template.possible, template.probable, source
+    )
+
+
+def lasting(
+    id: str,
+    name: str,
+    lasts: float,
+    possible: tuple[float, float] | None,
+    probable: tuple[float, float] | None,
+    source: str,
+) -> Iterator[Advice]:
+    """Advice where an expression can be seen for a time that it is not, or rarely, seen for on people.
+
+    Args:
+        id: of what shows it; name: of the expression.
+        lasts: seconds.
+        possible, probable: seconds, (least, most); None where nobody says.
+        source: who says so.
+    """
+    if possible is not None and not possible[0] - 1e-3 <= lasts <= possible[1] + 1e-3:
+        how = _how(lasts, possible[0])
+        said = f"{name} can be seen for {lasts:.2g} s; nobody was seen to show it so {how}"
+        yield Advice(id, said, f"it lasts {_range(possible)} ({source})")
+    elif probable is not None and not probable[0] - 1e-3 <= lasts <= probable[1] + 1e-3:
+        said = f"{name} can be seen for {lasts:.2g} s, which is unusually {_how(lasts, probable[0])}"
+        yield Advice(id, said, f"it mostly lasts {_range(probable)} ({source})")
 
 
 def _how(lasts: float, low: float) -> str:

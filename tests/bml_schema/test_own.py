@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import OWN, Behaviour, Block, Emotion, Fap, FapFile, Faps, Idle, Mood, parse, write
+from bml_schema import OWN, Behaviour, Block, Emotion, Fap, FapFile, Faps, Idle, Mood, Timeline, parse, write
 
 
 def document(inside: str) -> Block:
@@ -66,6 +66,7 @@ def test_what_raw_faps_do_not_take(inside: str, said: str) -> None:
 
 
 def test_files_and_idle_motion() -> None:
+    assert only("<r:timeline id='t' fileName='a.toml'/>") == Timeline(id="t", file_name="a.toml")
     assert only("<r:fapFile id='f' fileName='a.fap'/>") == FapFile(id="f", file_name="a.fap")
     assert only("<r:idle id='i' blinks='0'/>") == Idle(id="i", blinks=0.0)
 

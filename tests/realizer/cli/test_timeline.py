@@ -1,0 +1,90 @@
+"""`realizer timeline` and `realizer check` of timelines."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+
+GOOD = """
+[[channel]]
+name = "brows"
+entries = [
+    { expression = "template:surprise" },
+    { expression = "neutral" },
+    { expression = "wry", duration = 3 },
+]
+"""
+OWN = "aus = { 12R = 0.6 }\nprobable = [0.5, 1.5]\n"
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(cli, list(words), standalone_mode=False)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "wry.toml").write_text(OWN, "utf-8")
+    path = tmp_path / "a & b.toml"
+    path.write_text(GOOD, "utf-8")
+    return path
+
+
+def test_a_timeline_plays_as_a_document_does(file: Path) -> None:
+    out = file.with_suffix(".json")
+    done = run("timeline", str(file), "--expressions", str(file.parent / "mine"), "-o", str(out), "--no-idle")
+    assert done.return_value == 0, done.stderr
+    told = json.loads(out.read_text("utf-8"))
+    assert told["warnings"] == []
+    names = told["au"]["names"]
+    values = told["au"]["values"]
+    assert max(row[names.index("1L")] for row in values) == pytest.approx(0.9, abs=1e-3)
+    assert max(row[names.index("12R")] for row in values) == pytest.approx(0.6, abs=1e-3)
+    assert told["duration"] == pytest.approx(1.4 + 0.5 + 3, abs=1e-3)
+
+
+def test_a_bad_timeline_is_refused_with_every_fault(file: Path) -> None:
+    done = run("timeline", str(file))
+    assert done.return_value == 1
+    assert f"{file}: channel brows, entry 3, expression: wanted a name" in done.stderr
+    assert done.stdout == ""
+
+
+def test_checking_tells_faults_on_standard_output(file: Path) -> None:
+    done = run("check", str(file))
+    assert done.return_value == 1
+    assert done.stdout.startswith(f"{file}: channel brows, entry 3, expression: wanted")
+    file.write_text("channel = [1, 2]", "utf-8")
+    assert len(run("check", str(file)).stdout.splitlines()) == 2
+
+
+def test_a_sound_timeline_gets_advice_that_does_not_count(file: Path) -> None:
+    done = run("check", str(file), "--expressions", str(file.parent / "mine"))
+    assert done.return_value == 0
+    assert done.stdout == ""
+    assert "ADVICE channel brows, entry 3: wry can be seen for 2.6 s, which is unusually long" in done.stderr
+    assert "wry.toml" in done.stderr
+    text = '{"channel": [{"entries": [{"expression": "template:disgust", "duration": 4}]}]}'
+    file.with_suffix(".json").write_text(text, "utf-8")
+    done = run("check", str(file.with_suffix(".json")))
+    assert "nobody was seen to show it so long" in done.stderr
+    assert "disgust stands alone" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["x.bml"], "x.bml: wanted a name that ends in .toml or .json"),
+        (["x.toml", "--media", "."], "names no"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(tmp_path: Path, words: list[str], told: str) -> None:
+    (tmp_path / words[0]).write_text("", "utf-8")
+    done = CliRunner().invoke(cli, ["timeline", str(tmp_path / words[0]), *words[1:]])
+    assert done.exit_code == 2
+    assert told in " ".join(done.stderr.split())
