@@ -57,6 +57,7 @@ def fit(
         fit_models,
         read_measured,
         read_shapes,
+        runaways,
         table,
         table_text,
         write_model,
@@ -73,7 +74,6 @@ def fit(
         from realizer.face.au.shapes import measure_shapes
 
         measured = measure_shapes(face, folder, data)
-        write_shapes(folder / SHAPES, measured)
     elif measurements:
         measured, source = read_measured(measurements), f"measured landmarks, {measurements.name}"
     elif (folder / SHAPES).is_file():
@@ -91,7 +91,15 @@ def fit(
         if not (context.obj or {}).get("quiet"):
             click.echo(f"{done}/{len(measured)} {words}", err=True)
 
-    for kind, model in fit_models(face, measured, tuple(files), say, source).items():
+    models = fit_models(face, measured, tuple(files), say, source)
+    faults = [
+        f"{kind}: {words}" for kind, model in models.items() for words in runaways(face, model, measured)
+    ]
+    if faults:
+        raise FaceError("; ".join((f"{folder}: nothing written, a fit tears the face", *faults)))
+    if data:
+        write_shapes(folder / SHAPES, measured)
+    for kind, model in models.items():
         write_model(files[kind], model)
         click.echo(f"{kind} form\n{table_text(table(model, measured))}")
         click.echo(f"{files[kind]}: written", err=True)

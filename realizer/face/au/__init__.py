@@ -3,6 +3,7 @@
 from realizer.face.au.deformer import Moves, columns, moves_of
 from realizer.face.au.file import read_model, write_model
 from realizer.face.au.fit import fit_models, table, table_text
+from realizer.face.au.limit import runaways
 from realizer.face.au.measure import Measured, read_measured, read_shapes, write_shapes
 from realizer.face.au.mixers import additive, mix, opened, successive
 from realizer.face.au.model import Model
@@ -20,6 +21,7 @@ __all__ = [
     "read_measured",
     "read_model",
     "read_shapes",
+    "runaways",
     "successive",
     "table",
     "table_text",

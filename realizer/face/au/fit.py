@@ -9,6 +9,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.errors import FaceError
+from realizer.face.au.limit import Watched, watched
 from realizer.face.au.measure import Measured
 from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.face.au.mouth import fit_mouth
@@ -55,7 +56,7 @@ def fit_models(
     """Fit the displacement units that were measured; the turns come from the face's own pivots.
 
     Each function is fitted by its own cost first (4.8, 4.9), then both are polished together. The extended
-    form grows out of the published one.
+    form grows out of the published one. No vertex of the face may go much further than the furthest landmark.
 
     Args:
         forms: of "published" (one or two Gaussians) and "extended" (up to four).
@@ -72,10 +73,11 @@ def fit_models(
         if form not in FORMS:
             raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
     mouth, jaw = fit_mouth(face), _jaw(face)
+    places = watched(face, mouth)
     fitted: dict[str, dict[int, UnitModel]] = {form: {} for form in forms}
     for au, one in measured.items():
         ratios = []
-        for form, unit in _fit_unit(one, mouth, forms).items():
+        for form, unit in _fit_unit(one, mouth, places, forms).items():
             if au in (26, 27):
                 unit = UnitModel(au, unit.motions, _jaw_degrees(face, unit, mouth, jaw))
             fitted[form][au] = unit
@@ -135,7 +137,7 @@ def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
     )
 
 
-def _fit_unit(one: Measured, mouth: Mouth, forms: Sequence[str]) -> dict[str, UnitModel]:
+def _fit_unit(one: Measured, mouth: Mouth, places: Watched, forms: Sequence[str]) -> dict[str, UnitModel]:
     # Her units are even: what was measured on one side holds for the other, so all of it is laid on the left.
     flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     at, moves = one.at * flip, one.moves * flip
@@ -150,12 +152,14 @@ def _fit_unit(one: Measured, mouth: Mouth, forms: Sequence[str]) -> dict[str, Un
     if units()[one.au].split:
         upper = mouth.upper(at) if one.upper is None else one.upper
         halves = {"upper": weight * upper, "lower": weight * (1 - upper)}
-    motions = {half: _fit_motion(at, moves, mine, size, forms) for half, mine in halves.items()}
+    motions = {
+        half: _fit_motion(at, moves, mine, size, places.of(half), forms) for half, mine in halves.items()
+    }
     return {form: UnitModel(one.au, {half: found[form] for half, found in motions.items()}) for form in forms}
 
 
 def _fit_motion(
-    at: Float64, moves: Float64, weight: Float64, size: float, forms: Sequence[str]
+    at: Float64, moves: Float64, weight: Float64, size: float, around: Float64, forms: Sequence[str]
 ) -> dict[str, Motion]:
     long = np.linalg.norm(moves, axis=1)
     here = weight > 1e-3
@@ -175,7 +179,7 @@ def _fit_motion(
     share = weight * long[use]
     origin = share @ at[use] / share.sum()
     origin[0] = 0
-    fit = Fit((at[use] - origin) / CENTIMETRE, moves[use] / size, weight)
+    fit = Fit((at[use] - origin) / CENTIMETRE, moves[use] / size, weight, (around - origin) / CENTIMETRE)
     found = {"published": fit.published()}
     if "extended" in forms:
         found["extended"] = fit.extended(found["published"])

@@ -10,6 +10,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.face.au.functions import ANGLE, GAUSSIAN, angle, density, direction
+from realizer.face.au.limit import overshoot
 
 __all__: list[str] = []
 
@@ -147,10 +148,11 @@ class Fit:
         at: (n, 3) centimetres from the motion's origin; the half x >= 0 is enough.
         moves: (n, 3), the largest about 1.
         weight: (n,) how much each point counts.
+        around: (k, 3) centimetres, where nothing may go much further than 1 (`limit.overshoot`).
     """
 
-    def __init__(self, at: Float64, moves: Float64, weight: Float64) -> None:
-        self.at, self.moves, self.weight = at, moves, weight
+    def __init__(self, at: Float64, moves: Float64, weight: Float64, around: Float64) -> None:
+        self.at, self.moves, self.weight, self.around = at, moves, weight, around
         self.length = np.linalg.norm(moves, axis=1)
         self.alpha, self.beta = mirrored_angles()
 
@@ -190,9 +192,14 @@ class Fit:
         x = np.array(list(self._bells(layout)))
 
         def residual(x: Float64) -> tuple[Float64, Float64]:
-            value, slopes = density(form(x).reshape(-1, GAUSSIAN), self.at)
+            gaussians = form(x).reshape(-1, GAUSSIAN)
+            value, slopes = density(gaussians, self.at)
             by = np.sqrt(self.weight)
-            return by * (value - self.length), by[:, None] * (slopes @ form.matrix)
+            over, steep = overshoot(gaussians, self.around)
+            return (
+                np.concatenate([by * (value - self.length), over]),
+                np.concatenate([by[:, None] * slopes, steep]) @ form.matrix,
+            )
 
         x = least(residual, x, 150)
         return x, float((residual(x)[0] ** 2).sum())
@@ -208,11 +215,18 @@ class Fit:
             way, by_angle = self._way(x[split:], self.at)
             return value, by_bell @ form.matrix, way, by_angle
 
+        def far(x: Float64) -> tuple[Float64, Float64]:
+            over, steep = overshoot(form(x[:split]).reshape(-1, GAUSSIAN), self.around)
+            return over, np.pad(steep @ form.matrix, ((0, 0), (0, len(x) - split)))
+
         def miss(x: Float64) -> Float64:
             value, _, way, _ = moved(x)
             return np.asarray(value[:, None] * way - self.moves)
 
-        best, cost = x, float(self.weight @ np.linalg.norm(miss(x), axis=1))
+        def whole(x: Float64) -> float:
+            return float(self.weight @ np.linalg.norm(miss(x), axis=1) + (far(x)[0] ** 2).sum())
+
+        best, cost = x, whole(x)
         for _ in range(ROUNDS[1]):
             by = lengths(miss(x), self.weight)
 
@@ -221,13 +235,14 @@ class Fit:
                 slopes = np.concatenate(
                     [way[:, :, None] * by_bell[:, None, :], value[:, None, None] * by_angle], axis=2
                 )
+                over, steep = far(x)
                 return (
-                    (by[:, None] * (value[:, None] * way - self.moves)).ravel(),
-                    (by[:, None, None] * slopes).reshape(-1, len(x)),
+                    np.concatenate([(by[:, None] * (value[:, None] * way - self.moves)).ravel(), over]),
+                    np.concatenate([(by[:, None, None] * slopes).reshape(-1, len(x)), steep]),
                 )
 
             x = least(residual, x, 25)
-            now = float(self.weight @ np.linalg.norm(miss(x), axis=1))
+            now = whole(x)
             if now > cost * 0.999:
                 best, cost = (x, now) if now < cost else (best, cost)
                 break
