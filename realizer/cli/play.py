@@ -101,7 +101,6 @@ def perform(
     """
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
-    from realizer.pipeline import realize as run
 
     writer = None
     if output not in (None, "-"):
@@ -130,8 +129,15 @@ def perform(
             "can be transparent",
             param_hint="--background",
         )
+    texts = read()
+    drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)
+    if writer is not None:
+        drawing = writer.begin(drawing, chosen.face, chosen.deformer)
+    # What planning needs is imported while the drawing process gets ready.
+    from realizer.pipeline import realize as run
+
     realization = run(
-        read(),
+        texts,
         face=chosen.face,
         deformer=chosen.deformer,
         fps=chosen.fps,
@@ -154,7 +160,6 @@ def perform(
         sys.stdout.flush()
     elif output is not None:
         try:
-            drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)
             writer.write(realization, Path(output), drawing)
         except OSError as error:
             raise click.UsageError(f"{output}: {error.strerror or error}") from None

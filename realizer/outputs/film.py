@@ -176,11 +176,16 @@ def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
     """Draw and encode side by side: the drawing process is a batch ahead."""
     _av()  # before the drawing starts
     form = FORMATS[Path(path).suffix.lower()]
-    size = (drawing.size[0] + drawing.size[0] % 2, drawing.size[1] + drawing.size[1] % 2)
+    size, _ = _draws(drawing)
     rows = realization.poses
     with replacing(path) as draft, drawing.renderer(realization, size) as renderer:
         pictures = renderer.frames(rows)
         encode_film(draft, form, pictures, len(rows), realization.fps, realization.sound(RATE))
+
+
+def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
+    width, height = drawing.size
+    return (width + width % 2, height + height % 2), False  # 4:2:0 wants even
 
 
 def _av() -> Any:
@@ -192,6 +197,6 @@ def _av() -> Any:
 
 
 OUTPUTS = (
-    Output(".mp4", "video/mp4", "film with sound, H.264 and AAC", write_film, "film"),
-    Output(".webm", "video/webm", "film with sound, VP9 and Opus", write_film, "film"),
+    Output(".mp4", "video/mp4", "film with sound, H.264 and AAC", write_film, "film", _draws),
+    Output(".webm", "video/webm", "film with sound, VP9 and Opus", write_film, "film", _draws),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,19 +23,28 @@ class Drawing:
     at: float | None = None  # seconds; None: the whole span
     light: str | None = None  # a preset; None: as `realizer.render.Renderer` takes it, as is
     background: str | None = None  # "#rrggbb", or of one picture "transparent"
+    begun: Renderer | None = None  # what draws, where `Output.begin` started it
 
     def renderer(self, realization: Realization, size: tuple[int, int], *, alpha: bool = False) -> Renderer:
         """What draws poses of a realization like that; `alpha` where the picture may be transparent."""
+        if self.begun is not None and self.begun.size == size:
+            return self.begun
+        return self.renderer_of(realization.face_name, realization.deformer, size, alpha=alpha)
+
+    def renderer_of(
+        self, face: str, deformer: str | None, size: tuple[int, int], *, alpha: bool = False
+    ) -> Renderer:
+        """What draws that face, moved by that deformer; nothing has started yet."""
         from realizer.render import Renderer
 
         return Renderer(
-            realization.face_name,
+            face,
             size,
             self.camera,
             light=self.light,
             background=self.background,
             alpha=alpha,
-            deformer=realization.deformer,
+            deformer=deformer,
         )
 
 
@@ -49,6 +58,7 @@ class Output:
         says: one line for `realizer outputs`.
         write: (realization, path, drawing) -> None; `path` may be any place that can be written.
         needs: the extra to install, or "" if it always works.
+        draws: width and height of its pictures, and whether they may be transparent; None: there are none.
     """
 
     suffix: str
@@ -56,3 +66,17 @@ class Output:
     says: str
     write: Callable[[Realization, Path, Drawing], None]
     needs: str = ""
+    draws: Callable[[Drawing], tuple[tuple[int, int], bool]] | None = None
+
+    def begin(self, drawing: Drawing, face: str, deformer: str | None = None) -> Drawing:
+        """The drawing to hand to `write`; what draws starts now, and gets ready while the rest is planned.
+
+        Raises:
+            RenderError: `drawing.background` is none.
+        """
+        if self.draws is None:
+            return drawing
+        size, alpha = self.draws(drawing)
+        renderer = drawing.renderer_of(face, deformer, size, alpha=alpha)
+        renderer.start()
+        return replace(drawing, begun=renderer)

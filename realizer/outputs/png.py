@@ -77,17 +77,24 @@ def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
     """With `drawing.at` the picture of that instant; otherwise the sheet, its pictures at half the size."""
     from realizer.render.sheets import sheet
 
+    size, alpha = _draws(drawing)
     if drawing.at is not None:
-        with drawing.renderer(realization, drawing.size, alpha=True) as renderer:
+        with drawing.renderer(realization, size, alpha=alpha) as renderer:
             (picture,) = renderer.draw(row_at(realization, drawing.at)[None])
         write_bytes(path, encode_png(picture))
         return
     shown = moments(realization)
-    half = (max(1, drawing.size[0] // 2), max(1, drawing.size[1] // 2))
-    with drawing.renderer(realization, half) as renderer:
+    with drawing.renderer(realization, size, alpha=alpha) as renderer:
         pictures = renderer.draw(realization.poses[[moment.frame for moment in shown]])
     titles = [f"{moment.time:.2f} s" for moment in shown]
     write_bytes(path, encode_png(sheet(list(pictures), titles, [moment.points for moment in shown])))
+
+
+def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
+    width, height = drawing.size
+    if drawing.at is not None:
+        return (width, height), True
+    return (max(1, width // 2), max(1, height // 2)), False
 
 
 def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
@@ -103,4 +110,6 @@ def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
     return {frame: tuple(names) for frame, names in found.items()}
 
 
-OUTPUTS = (Output(".png", "image/png", "a contact sheet over time, or one instant", write_png, "render"),)
+OUTPUTS = (
+    Output(".png", "image/png", "a contact sheet over time, or one instant", write_png, "render", _draws),
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import weakref
 from functools import cache
 from pathlib import Path
@@ -16,7 +17,7 @@ from realizer.errors import RenderError
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from realizer.render.wire import Message, Open, Pixels
+    from realizer.render.wire import Message, Open
 
 __all__ = ["DRAW", "Child", "asked", "available"]
 
@@ -25,15 +26,16 @@ PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes abo
 
 
 class Child:
-    """One drawing process that has opened its canvas."""
-
-    pixels: Pixels
+    """One drawing process; it opens its canvas while its owner goes on."""
 
     def __init__(self, order: Open) -> None:
         from realizer.render.backdrop import channels
         from realizer.render.wire import Pixels, connection
 
+        self._memory = Path(order.memory)
+        self._opened = threading.Event()
         try:
+            self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
             self._popen = subprocess.Popen(
                 _command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
             )
@@ -43,17 +45,28 @@ class Child:
             self._answers = connection(self._popen.stdout.fileno(), writes=False)
             self._popen.stdin.close()
             self._popen.stdout.close()
-            self._end = weakref.finalize(self, _end, self._popen, self._orders, self._answers)
             self.pid = self._popen.pid
-            try:
-                self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
-                self.send(order)
-                self.way = self.receive()
-            except BaseException:
-                self.end()
-                raise
+            self._end = weakref.finalize(
+                self, _end, self._popen, self._orders, self._answers, self._opened, self._memory
+            )
+            self.send(order)
+        except BaseException:
+            self._memory.unlink(missing_ok=True)
+            raise
+
+    def open(self) -> None:
+        """Wait until it can draw; does nothing the second time.
+
+        Raises:
+            RenderError: it cannot; says why.
+        """
+        if self._opened.is_set():
+            return
+        try:
+            self.receive()
         finally:
-            Path(order.memory).unlink()
+            self._memory.unlink(missing_ok=True)
+        self._opened.set()
 
     def send(self, message: Message) -> None:
         try:
@@ -85,15 +98,22 @@ class Child:
         return RenderError(f"the drawing process ended (exit status {code}); the next call starts a new one")
 
 
-def _end(popen: subprocess.Popen[bytes], orders: Connection, answers: Connection) -> None:
-    """Hang up, and insist where that does not help."""
+def _end(
+    popen: subprocess.Popen[bytes],
+    orders: Connection,
+    answers: Connection,
+    opened: threading.Event,
+    memory: Path,
+) -> None:
+    """Hang up, and insist where that does not help; what has opened nothing has nothing to close."""
     orders.close()
     answers.close()
     try:
-        popen.wait(0.5)
+        popen.wait(0.5 if opened.is_set() else 0)
     except subprocess.TimeoutExpired:
         popen.kill()
         popen.wait()
+    memory.unlink(missing_ok=True)
 
 
 def available(way: str | None = None) -> str | None:

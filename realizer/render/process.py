@@ -25,8 +25,9 @@ HALF_BYTES = 32 << 20  # and at most this much of it
 class Renderer:
     """Draws a face, in a process of its own that holds the GL context.
 
-    The process starts at the first picture and dies with us. If it crashes, the call that noticed raises
-    RenderError and the next call starts a new one. May be called from any thread, one call at a time.
+    The process starts at the first picture, or at `start`, and dies with us. If it crashes, the call that
+    noticed raises RenderError and the next call starts a new one. May be called from any thread, one call at
+    a time.
     """
 
     def __init__(
@@ -63,6 +64,15 @@ class Renderer:
         self._lock = threading.Lock()
         self._process: Child | None = None
 
+    def start(self) -> None:
+        """Start the process before there is anything to draw; what goes wrong in it is said at a picture.
+
+        Raises:
+            RenderError: `background` is none.
+        """
+        with self._lock:
+            self._started()
+
     def draw(self, poses: Float32) -> UInt8:
         """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, k) poses.
 
@@ -93,7 +103,7 @@ class Renderer:
         rows = self._rows(poses)
         pieces = [rows[i : i + self._half] for i in range(0, len(rows), self._half)]
         with self._lock:
-            process = self._started()
+            process = self._ready()
             waiting = 0
             try:
                 for k, piece in enumerate(pieces[:2]):
@@ -121,7 +131,7 @@ class Renderer:
 
         (row,) = self._rows(np.asarray(pose)[None])
         with self._lock:
-            process = self._started()
+            process = self._ready()
             try:
                 process.send(Jpeg(row, quality))
                 encoded: bytes = process.receive()
@@ -172,6 +182,15 @@ class Renderer:
             )
             self._process = Child(order)
         return self._process
+
+    def _ready(self) -> Child:
+        process = self._started()
+        try:
+            process.open()
+        except BaseException:
+            self._drop()
+            raise
+        return process
 
     def _drop(self) -> None:
         if self._process is not None:

@@ -29,11 +29,11 @@ class Artist:
     def __init__(self, order: Open) -> None:
         from realizer.face import load_face
 
+        self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         if isinstance(order.face, str):
             self.face = load_face(order.face, deformer=order.deformer)
         else:
             self.face = order.face
-        self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         self.way, self.canvas = open_canvas(
             self.face,
             order.size,

@@ -64,3 +64,23 @@ def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_pa
     drawn(realization, tmp_path / "y.png", Drawing((160, 120)))
     assert first.shape[1] > 3 * 80
     assert (tmp_path / "x.png").read_bytes() == (tmp_path / "y.png").read_bytes()
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("at", [None, 0.4])
+def test_what_draws_may_be_started_before_there_is_anything_to_draw(realization, tmp_path, at):
+    drawing = Drawing((160, 120), at=at)
+    early = OUTPUTS[".png"].begin(drawing, realization.face_name, realization.deformer)
+    assert early.begun is not None
+    started = early.begun.pid
+    assert started is not None
+    size, alpha = ((160, 120), True) if at is not None else ((80, 60), False)
+    assert early.renderer(realization, size, alpha=alpha).pid == started
+    assert np.array_equal(
+        drawn(realization, tmp_path / "x.png", early), drawn(realization, tmp_path / "y.png", drawing)
+    )
+
+
+def test_nothing_starts_for_what_has_no_pictures(realization):
+    drawing = Drawing()
+    assert OUTPUTS[".fap"].begin(drawing, realization.face_name) is drawing

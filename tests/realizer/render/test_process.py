@@ -117,6 +117,26 @@ def test_close_ends_the_process_and_leaves_no_memory_behind():
 
 
 @pytest.mark.gl
+def test_a_process_that_was_started_before_is_the_one_that_draws(renderer):
+    with Renderer("default", SIZE) as early:
+        early.start()
+        started = early.pid
+        early.start()
+        assert np.array_equal(early.draw(rows(3)), renderer.draw(rows(3)))
+        assert early.pid == started
+
+
+def test_a_process_that_was_started_for_nothing_leaves_nothing_behind():
+    with Renderer("default", (97, 83)) as renderer:
+        renderer.start()
+        pid = renderer.pid
+        assert pid is not None
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+    assert not [p for p in Path("/dev/shm").glob("realizer-*") if p.stat().st_size == 16 * 97 * 83 * 3]
+
+
+@pytest.mark.gl
 def test_the_process_dies_with_its_owner():
     """The owner is killed, so it can tidy nothing; its drawing process sees the pipe close."""
     code = (
