@@ -172,6 +172,17 @@ class Player:
         self._characters[character].set_direct(values, now)
         self._blocks.course.changed()
 
+    def set_feeling(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
+        """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the one held before; {}: none.
+
+        It lies among the expressions, below speech, gaze and what is set directly, whatever is set first.
+
+        Raises:
+            KeyError: no such AU or FAP.
+        """
+        self._characters[character].set_feeling(values, now)
+        self._blocks.course.changed()
+
     # feedback out -------------------------------------------------------------------------------
 
     def due(self, now: float) -> list[Feedback]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -19,7 +20,7 @@ from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
 from realizer.tables.feelings import ring
 
-__all__ = ["KINDS"]
+__all__ = ["KINDS", "values_of", "values_of_affect"]
 
 # Ours play as action units, so that speech and blinks find their place in them; the published ones as FAPs.
 OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
@@ -47,12 +48,12 @@ def timing_of_mood(node: Mood, world: World) -> Timing:
 
 def expand(node: Emotion, times: Float64, world: World) -> tuple[Channel, ...]:
     """There at attackPeak, held to relax, gone at end."""
-    return poses.shown(_values(node), times, node.id)
+    return poses.shown(values_of(node), times, node.id)
 
 
 def expand_mood(node: Mood, times: Float64, world: World) -> tuple[Channel, ...]:
     """From start to end the new base face rises, and stays; the neutral one has no channels."""
-    return poses.kept(_values(node), times, node.id)
+    return poses.kept(values_of(node), times, node.id)
 
 
 def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
@@ -71,7 +72,7 @@ def claims_of_mood(node: Mood, world: World) -> frozenset[str]:
     return frozenset({"base face"})
 
 
-def _values(node: Emotion | Mood) -> dict[Target, float]:
+def values_of(node: Emotion | Mood) -> dict[Target, float]:
     """Column -> what it shows: AUs 0..1, or FAPs of a published profile."""
     if node.profile in PUBLISHED:
         found = (
@@ -80,12 +81,21 @@ def _values(node: Emotion | Mood) -> dict[Target, float]:
             else profile_of(node.name or "", node.profile)
         )
         return {fap(number): node.intensity * value for number, value in found.midpoint().items()}
-    parts, strength = _mix(node)
+    return _shown(*_mix(node), node.intensity)
+
+
+def values_of_affect(valence: float, arousal: float, intensity: float) -> dict[Target, float]:
+    """Column -> what it shows at a place in the plane of valence and arousal, -1..1 each (Paul 2010, 8.2)."""
+    parts = shares(math.degrees(math.atan2(arousal, valence)), "own", "affect")
+    return _shown(parts, min(math.hypot(valence, arousal), 1.0), intensity)
+
+
+def _shown(parts: Mapping[str, float], strength: float, intensity: float) -> dict[Target, float]:
     aus: dict[tuple[int, str], float] = {}
     for name, share in parts.items():
         for cell, value in emotion_faces()[name].aus.items():
             aus[cell] = aus.get(cell, 0.0) + share * strength * value
-    return poses.columns(aus, node.intensity)
+    return poses.columns(aus, intensity)
 
 
 def _mix(node: Emotion | Mood) -> tuple[Mapping[str, float], float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from realizer.animation.channel import Channel, Layer
+from realizer.animation.curves import gain_at
 from realizer.animation.targets import axis, region
 
 __all__: list[str] = []
@@ -40,6 +41,7 @@ class Character:
     id: str | None
     shifts: list[Shift] = field(default_factory=list)
     direct: dict[str, Channel] = field(default_factory=dict)
+    feeling: dict[str, Channel] = field(default_factory=dict)
 
     def shift(self, shifts: Collection[Shift]) -> None:
         """Take new base states, in order of their begin."""
@@ -62,33 +64,29 @@ class Character:
         Raises:
             KeyError: no such AU or FAP; nothing is changed then.
         """
-        columns = axis()
-        targets = {name: columns[name] for name in values}
-        for name, value in values.items():
-            held = self.direct.get(name)
-            if value is None:
-                if held is not None:
-                    self.direct[name] = held.faded(now, now + RELAX)
-                continue
-            before = 0.0 if held is None else float(np.interp(now, held.times, held.values))
-            self.direct[name] = Channel(
-                targets[name],
-                np.array([now, now + SETTLE]),
-                np.array([before, value]),
-                layer=Layer.DIRECT,
-                holds=True,
-                source="set",
-            )
+        _hold(self.direct, values, now, Layer.DIRECT, SETTLE)
+
+    def set_feeling(self, values: Mapping[str, float], now: float) -> None:
+        """Hold an emotion from `now` on instead of the one before: AUs (0..1) and FAPs (FAPU) by name.
+
+        It lies where expressions do, so that mood, speech, gaze and what is set directly find their places
+        beside it, whatever came first. {} lets go of it.
+
+        Raises:
+            KeyError: no such AU or FAP; nothing is changed then.
+        """
+        asked = dict.fromkeys(self.feeling) | dict(values)
+        _hold(self.feeling, asked, now, Layer.EXPRESSION, RELAX)
 
     def channels(self) -> list[Channel]:
-        """Base states, each until the next shift of its region takes over, and what was set directly."""
+        """Base states, each until the next shift of its region takes over, and what was set."""
         out: list[Channel] = []
         for index, shift in enumerate(self.shifts):
             for channel in shift.channels:
                 own = region(channel.target)
                 heir = next((s for s in self.shifts[index + 1 :] if own in s.regions), None)
                 out.append(channel if heir is None else channel.faded(heir.begin, heir.end))
-        return [*out, *self.direct.values()]
+        return [*out, *self.feeling.values(), *self.direct.values()]
 
     def forget(self, before: float) -> None:
         """Drop what can no longer be seen after `before`, so that the cost does not grow with the past."""
@@ -98,3 +96,25 @@ class Character:
             if not any(s.end < before and shift.regions <= s.regions for s in self.shifts[index + 1 :])
         ]
         self.direct = {n: c for n, c in self.direct.items() if c.gone > before}
+        self.feeling = {n: c for n, c in self.feeling.items() if c.gone > before}
+
+
+def _hold(
+    held: dict[str, Channel], values: Mapping[str, float | None], now: float, layer: Layer, rise: float
+) -> None:
+    """Let channels go to these values within `rise` seconds, and stay; None fades one out. In place."""
+    columns = axis()
+    targets = {name: columns[name] for name in values}
+    for name, value in values.items():
+        old = held.get(name)
+        if value is None:
+            if old is not None:
+                held[name] = old.faded(now, now + RELAX)
+            continue
+        before = 0.0
+        if old is not None:
+            before = float(np.interp(now, old.times, old.values)) * float(
+                gain_at(old.gains, np.array([now]))[0]
+            )
+        keys, ends = np.array([now, now + rise]), np.array([before, value])
+        held[name] = Channel(targets[name], keys, ends, layer=layer, holds=True, source="set")

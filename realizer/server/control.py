@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from bml_schema import Emotion
 from realizer.animation.targets import AU_NAMES
+from realizer.behaviours import emotion
+from realizer.behaviours.kind import World
 from realizer.errors import FaceError, VoiceError
 from realizer.mapping import mapping_of
 from realizer.server.connection import (
@@ -23,6 +26,7 @@ from realizer.server.messages import (
     CharacterMessage,
     Control,
     ErrorMessage,
+    Feeling,
     Hello,
     Ping,
     Pong,
@@ -220,7 +224,38 @@ def _set(session: Session, message: SetMessage, t: float) -> None:
         if name not in [row.name for row in rows[2:]]:
             raise Wrong("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
         values[name] = value
-    session.player.set_direct(values, t, index_of(session, message.character))
+    feeling = _feeling(message.emotion) if "emotion" in message.model_fields_set else None
+    index = index_of(session, message.character)
+    if feeling is not None:
+        session.player.set_feeling(feeling, t, index)
+    session.player.set_direct(values, t, index)
+
+
+def _feeling(asked: Feeling | None) -> dict[str, float]:
+    """Name of AU -> 0..1; {} for none."""
+    if asked is None:
+        return {}
+    affect = asked.valence is not None or asked.arousal is not None
+    if (asked.name is not None) + (asked.angle is not None) + affect != 1:
+        raise Wrong("emotion", "wanted one of a name, an angle, or valence with arousal")
+    if asked.activation is not None and asked.angle is None:
+        raise Wrong("emotion.activation", "wanted an angle with it, got none")
+    if affect:
+        if asked.valence is None or asked.arousal is None:
+            raise Wrong("emotion", "wanted valence and arousal together, got one of them")
+        values = emotion.values_of_affect(asked.valence, asked.arousal, asked.intensity)
+    else:
+        node = Emotion(
+            id="set",
+            name=asked.name,
+            angle=asked.angle,
+            activation=asked.activation,
+            intensity=asked.intensity,
+        )
+        for fault in emotion.check(node, World()):
+            raise Wrong("emotion", fault.text)
+        values = emotion.values_of(node)
+    return {target.name: value for target, value in values.items()}
 
 
 def _state(session: Session, connection: Connection, t: float) -> StateMessage:

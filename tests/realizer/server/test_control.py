@@ -1,0 +1,146 @@
+"""Mixing controls: an emotion below, action units refining it, FAPs on top, in whatever order they come."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from realizer.tables.emotions import emotion_faces
+
+SETS = (
+    {"emotion": {"angle": 45, "activation": 6}},
+    {"aus": {"12": 0.3, "1L": 0.9, "25": 0}},
+    {"faps": {"open_jaw": 120, "raise_l_i_eyebrow": -80}},
+)
+BLOCKS = (
+    '<bml id="a"><mood xmlns="urn:bml-realizer:1" id="m" name="sad" intensity="0.4" end="1"/></bml>',
+    '<bml id="b"><faceFacs id="f" au="4" amount="0.5" start="0" attackPeak="0.5" relax="9" end="9.5"/></bml>',
+    '<bml id="c"><faceLexeme id="l" lexeme="SMILE" start="0" attackPeak="0.5" relax="9" end="9.5"/></bml>',
+)
+
+
+class Face:
+    """A session whose AUs are watched."""
+
+    def __init__(self, drive) -> None:
+        self.driver = drive(idle=False)
+        told = self.driver.send({"type": "subscribe", "stream": "au", "fps": 25})
+        self.names = told.of("subscribed")[0]["names"]
+
+    def set(self, seconds: float = 0.5, **asked) -> dict[str, float]:
+        """What shows that long after something was set."""
+        self.driver.send({"type": "set", **asked})
+        return self.after(seconds)
+
+    def after(self, seconds: float) -> dict[str, float]:
+        frames = self.driver.run(self.driver.now + seconds).frames
+        return dict(zip(self.names, map(float, frames[-1].values), strict=True))
+
+    @property
+    def whole(self) -> np.ndarray:
+        """Every target there is, AUs before the rules, FAPs that did not come from them."""
+        return self.driver.session.player.frames(np.array([self.driver.now])).values[0]
+
+
+@pytest.fixture
+def face(drive) -> Face:
+    return Face(drive)
+
+
+@pytest.mark.parametrize("pause", [0, 1])
+def test_the_order_of_what_is_set_does_not_matter(drive, pause: float) -> None:
+    found = []
+    for messages in permutations(SETS):
+        face = Face(drive)
+        for message in messages:
+            face.set(pause, **message)
+        face.after(1)
+        found.append(face.whole)
+    together = Face(drive)
+    together.set(1, **{key: value for message in SETS for key, value in message.items()})
+    found.append(together.whole)
+    assert np.abs(found[0]).sum() > 1
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], abs=1e-5)
+
+
+def test_the_order_of_what_is_set_and_of_documents_does_not_matter(drive) -> None:
+    found = []
+    for chosen in permutations((*BLOCKS, SETS[0], SETS[1])):
+        face = Face(drive)
+        for one in chosen:
+            if isinstance(one, str):
+                face.driver.send(one)
+            else:
+                face.set(0, **one)
+        face.after(3)
+        found.append(face.whole)
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], abs=1e-5)
+
+
+def test_an_action_unit_refines_the_emotion_and_lets_it_show_again(face) -> None:
+    joy = face.set(emotion={"name": "happiness"})
+    wanted = emotion_faces()["joy"].aus
+    assert joy["12L"] == pytest.approx(wanted[12, "BOTH"], abs=0.02)
+    less = face.set(aus={"12R": 0.2})
+    assert less["12R"] == pytest.approx(0.2, abs=0.02)
+    assert less["12L"] == pytest.approx(joy["12L"])
+    again = face.set(aus={"12R": None})
+    assert again["12R"] == pytest.approx(joy["12R"], abs=0.01)
+
+
+def test_another_emotion_takes_its_place_without_a_jump_and_null_lets_go(face) -> None:
+    face.set(emotion={"name": "happiness"})
+    count = len(face.driver.clients[1].frames)
+    fear = face.set(emotion={"name": "fear"})
+    assert fear["12L"] == pytest.approx(0, abs=0.01)
+    assert fear["20L"] > 0.5
+    course = np.array([frame.values for frame in face.driver.clients[1].frames[count - 1 :]], float)
+    assert np.abs(np.diff(course, axis=0)).max() < 0.5  # a frame; it takes 0.3 s
+    rest = face.set(emotion=None)
+    assert max(rest.values()) < 0.01
+
+
+def test_what_is_said_of_other_things_leaves_the_emotion(face) -> None:
+    before = face.set(emotion={"name": "anger", "intensity": 0.5})
+    after = face.set(faps={"open_jaw": 50})
+    assert after["4L"] == pytest.approx(before["4L"], abs=1e-3)
+    assert before["4L"] == pytest.approx(0.5 * emotion_faces()["anger"].aus[4, "BOTH"], abs=0.02)
+
+
+def test_an_emotion_may_be_a_place_of_valence_and_arousal(face) -> None:
+    good = face.set(emotion={"valence": 0.9, "arousal": 0.3})
+    assert good["12L"] > 0.4
+    assert good["15L"] == pytest.approx(0, abs=0.01)
+    rest = face.set(emotion={"valence": 0, "arousal": 0})
+    assert max(rest.values()) < 0.01
+
+
+def test_expressions_play_over_what_is_set(face) -> None:
+    face.set(emotion={"name": "sadness", "intensity": 0.3})
+    face.driver.send(BLOCKS[1])
+    shown = face.after(2)
+    assert shown["4L"] == pytest.approx(0.5, abs=0.02)
+    assert shown["15L"] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("asked", "where"),
+    [
+        ({}, "set.emotion"),
+        ({"name": "joy", "angle": 3}, "set.emotion"),
+        ({"valence": 0.5}, "set.emotion"),
+        ({"name": "joy", "activation": 3}, "set.emotion.activation"),
+        ({"name": "jjoyy"}, "set.emotion"),
+        ({"angle": -700}, "set.emotion.angle"),
+        ({"angle": 7, "activation": 40}, "set.emotion.activation"),
+    ],
+)
+def test_an_emotion_that_is_none_is_refused_and_nothing_is_set(face, asked, where: str) -> None:
+    face.driver.send({"type": "set", "emotion": asked, "aus": {"12": 1}})
+    (error,) = face.driver.clients[1].of("error")
+    assert error["where"] == where
+    assert max(face.after(1).values()) == 0
