@@ -9,7 +9,7 @@ import numpy as np
 from realizer import tables
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.mapping import FapMapping, standard
-from realizer.animation.targets import presence
+from realizer.animation.targets import axis, presence
 from realizer.arrays import Float32
 
 __all__ = ["to_fap"]
@@ -24,6 +24,7 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
 
     1. Each AU asks each FAP for a value (polylines of the mapping). A FAP gets the strongest positive plus
        the strongest negative; rotations add up.
+       Two that are a "different" combination in FACS show something more together.
     2. A closing eye lets go of what holds it open, and lids do not pass through each other.
     3. Where speech has the lips (presence "lips"), what AUs ask is taken away by `speech_owns`.
     4. The FAPs that did not come from AUs are added; each FAP is limited to `least`..`most`.
@@ -40,6 +41,7 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     positive, negative = demand.extremes(aus)
     _close_lids(positive, negative, demand.closed)
     values = positive + negative
+    _combine(values, aus)
     for upper, lower in LIDS:
         values[lower] = np.minimum(values[lower], APERTURE - values[upper])
     own, least, most = _limits()
@@ -59,6 +61,23 @@ def _close_lids(positive: Float32, negative: Float32, closed: Float32) -> None:
             open_ = 1 - np.minimum(positive[upper] / closed[upper], 1)
             negative[upper] *= open_
             negative[lower] *= open_
+
+
+def _combine(values: Float32, aus: Float32) -> None:
+    """Add what two units show only together, in place: as much of it as the weaker one is there."""
+    for unit, other, fap, value in _combinations():
+        if aus[unit].any() and aus[other].any():
+            values[fap] += value * np.minimum(aus[unit], aus[other])
+
+
+@cache
+def _combinations() -> tuple[tuple[int, int, int, float], ...]:
+    """Rows of both units among the AUs, column (FAP - 1), value."""
+    column = {name: target.column for name, target in axis().items()}
+    return tuple(
+        (column[f"{row.au}{row.side}"], column[f"{row.other}{row.side}"], row.fap - 1, row.value)
+        for row in tables.au_combinations()
+    )
 
 
 @cache

@@ -19,9 +19,11 @@ from realizer.errors import TableError
 
 __all__ = [
     "ActionUnit",
+    "AuCombination",
     "AuToFap",
     "Fap",
     "action_units",
+    "au_combinations",
     "au_to_fap",
     "by_number",
     "faps",
@@ -163,6 +165,23 @@ class AuToFap:
     @property
     def key(self) -> tuple[int, str, int]:
         return self.au, self.side, self.fap
+
+
+@dataclass(frozen=True, slots=True)
+class AuCombination:
+    """What two action units show together beside what each shows: a value of a FAP, in its own unit."""
+
+    au: int
+    other: int
+    side: Literal["L", "R", ""]
+    fap: int
+    value: float
+
+
+@cache
+def au_combinations() -> tuple[AuCombination, ...]:
+    """The combinations that FACS calls different, in file order."""
+    return read_csv(text_of("au_combinations.csv"), AuCombination, "au_combinations.csv")
 
 
 @cache

@@ -53,10 +53,11 @@ def test_a_demand_grows_linearly_with_its_action_unit() -> None:
 
 
 def test_a_fap_gets_the_strongest_of_each_sign() -> None:
-    up, down = value(31, au1L=1.0), value(31, au4L=1.0)
+    up, down = value(33, au1L=1.0), value(33, au4L=1.0)
     assert up > 0 > down
-    assert value(31, au1L=1.0, au2L=1.0) == max(up, value(31, au2L=1.0))
-    assert value(31, au1L=1.0, au4L=1.0) == pytest.approx(up + down)
+    assert value(33, au1L=1.0, au4L=1.0) == pytest.approx(up + down)
+    outer, joined = value(5, au25=1.0), value(5, au25=1.0, au26=1.0)
+    assert joined == pytest.approx(min(outer, value(5, au26=1.0)))
 
 
 def test_rotations_add_up() -> None:
@@ -160,3 +161,19 @@ def test_columns_of_speech_and_presences_are_where_the_frames_look_for_them() ->
     assert clip.faps[0, 49] == 5
     assert fap(50).name == "head_roll"
     assert clip.values[0, presence("lips").column] == 0.5
+
+
+@pytest.mark.parametrize(("inner", "middle", "side"), [(31, 33, "L"), (32, 34, "R")])
+def test_both_brow_raisers_lift_the_brow_in_one_arch(inner: int, middle: int, side: str) -> None:
+    one, two = {f"au1{side}": 1.0}, {f"au2{side}": 1.0}
+    assert value(middle, **one, **two) > max(value(middle, **one), value(middle, **two))
+    assert 0 < value(inner, **one, **two) < value(inner, **one)
+
+
+def test_a_combination_is_there_as_far_as_its_weaker_unit_is() -> None:
+    def more(first: float, second: float) -> float:
+        both = value(33, au1L=first, au2L=second)
+        return both - max(value(33, au1L=first), value(33, au2L=second))
+
+    assert more(1.0, 0.0) == 0
+    assert more(1.0, 0.5) == pytest.approx(more(0.5, 1.0)) == pytest.approx(more(1.0, 1.0) / 2)
