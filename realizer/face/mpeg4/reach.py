@@ -6,7 +6,7 @@ from functools import cache
 
 from realizer.tables import au_to_fap, faps
 
-__all__ = ["company", "usual"]
+__all__ = ["borne", "company", "usual"]
 
 # Where no action unit asks for a FAP: what faces reach, in its own unit.
 REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "angle_unit": 20000.0}
@@ -26,9 +26,16 @@ def usual(fap: int, sign: int) -> float:
     row = faps()[fap - 1]
     most = max((_asked(fap, sign, au) for au in _units()), default=0.0)
     if most <= 0:
-        most = EYEBALLS_OUT if row.name.endswith("eyeball") and row.unit == "ES" else REACH[row.unit]
-        most = PUPIL if row.direction == "growing" else most
+        most = _reached(fap)
     return float(min(most, row.most if sign > 0 else -row.least))
+
+
+@cache
+def borne(fap: int, sign: int) -> float:
+    """The most that a face must bear of a FAP alone: what is usual, and no less than faces reach."""
+    row = faps()[fap - 1]
+    most = row.most if sign > 0 else -row.least
+    return max(usual(fap, sign), min(_reached(fap), float(most)))
 
 
 @cache
@@ -37,6 +44,13 @@ def company(fap: int, sign: int) -> dict[int, float]:
     strongest = max(_units(), key=lambda au: sign * _units()[au].get(fap, 0.0))
     whole = _units()[strongest]
     return dict(whole) if sign * whole.get(fap, 0.0) > 0 else {}
+
+
+def _reached(fap: int) -> float:
+    row = faps()[fap - 1]
+    if row.direction == "growing":
+        return PUPIL
+    return EYEBALLS_OUT if row.name.endswith("eyeball") and row.unit == "ES" else REACH[row.unit]
 
 
 def _asked(fap: int, sign: int, au: str) -> float:

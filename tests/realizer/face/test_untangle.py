@@ -1,7 +1,10 @@
 """Fields that turn triangles over are stiffened until none does; feature points keep their moves."""
 
+from typing import Any
+
 import numpy as np
 
+from realizer.arrays import Float64
 from realizer.face.parts import grid
 from realizer.face.untangle import turned, untangled
 
@@ -12,25 +15,38 @@ TRIANGLES = grid(SIDE, SIDE)
 MIDDLE = SIDE * SIDE // 2
 
 
-def bump(width: float) -> np.ndarray:
+def bump(width: float) -> Float64:
     size = np.clip(1 - np.hypot(*AT[:, :2].T) / width, 0, 1)
-    return size[:, None] * [1.0, 0, 0]
+    return np.asarray(size[:, None] * [1.0, 0, 0])
+
+
+def mended(fields: list[Float64], plays: list[tuple[Float64, Any, float]], fixed: list[int]) -> Float64:
+    return untangled(np.stack(fields), AT, TRIANGLES, plays, fixed)
 
 
 def test_a_narrow_bump_that_is_pushed_through_its_neighbours_is_widened() -> None:
     field = bump(1.6)
     assert turned(AT, AT + 2.5 * field, TRIANGLES).any()
-    mended = untangled(field, AT, TRIANGLES, [(2.5, 0.0, 0.0)], [MIDDLE])
-    assert not turned(AT, AT + 2.5 * mended, TRIANGLES).any()
-    assert np.array_equal(mended[MIDDLE], field[MIDDLE])
+    (wide,) = mended([field], [(np.array([2.5]), 0.0, 0.0)], [MIDDLE])
+    assert not turned(AT, AT + 2.5 * wide, TRIANGLES).any()
+    assert np.array_equal(wide[MIDDLE], field[MIDDLE])
 
 
 def test_a_field_that_turns_nothing_over_stays_as_it_is() -> None:
     field = bump(6)
-    assert np.array_equal(untangled(field, AT, TRIANGLES, [(2.0, 0.0, 0.0), (-2.0, 0.0, 0.0)], []), field)
+    plays = [(np.array([way]), 0.0, 0.0) for way in (2.0, -2.0)]
+    assert np.array_equal(mended([field], plays, [])[0], field)
 
 
 def test_what_moves_along_counts() -> None:
     field = bump(1.6)
-    together = [(2.5, 2.5 * (bump(7) - field), 0.0)]
-    assert np.array_equal(untangled(field, AT, TRIANGLES, together, [MIDDLE]), field)
+    together = [(np.array([2.5]), 2.5 * (bump(7) - field), 0.0)]
+    assert np.array_equal(mended([field], together, [MIDDLE])[0], field)
+
+
+def test_fields_that_add_up_to_one_still_do_when_one_of_them_is_mended() -> None:
+    field = bump(1.6)
+    rest = [1.0, 0, 0] - field
+    one, other = mended([field, rest], [(np.array([2.5, 0.0]), 0.0, 0.0)], [MIDDLE])
+    assert not np.array_equal(one, field)
+    assert np.allclose(one + other, [1.0, 0, 0])

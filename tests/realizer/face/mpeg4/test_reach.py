@@ -2,7 +2,7 @@
 
 import pytest
 
-from realizer.face.mpeg4.reach import company, usual
+from realizer.face.mpeg4.reach import borne, company, usual
 from realizer.tables import au_to_fap, faps
 
 
@@ -11,6 +11,11 @@ def test_every_displacement_has_a_usual_reach_inside_the_coding_range() -> None:
         for sign, most in ((1, row.most), (-1, -row.least)):
             if most > 0:
                 assert 0 < usual(row.fap, sign) <= most
+
+
+@pytest.mark.parametrize(("fap", "least"), [(6, 150), (33, 160), (61, 100), (65, 100)])
+def test_what_a_face_bears_is_no_less_than_usual_or_faces_reach(fap: int, least: float) -> None:
+    assert borne(fap, -1) >= max(least, usual(fap, -1))
 
 
 def test_a_lower_lip_counts_what_it_does_beyond_its_jaw() -> None:
