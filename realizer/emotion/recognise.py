@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,26 +39,31 @@ class Recogniser:
     profiles. Where two are believed in alike, the one that asks for more FAPs is meant.
     """
 
-    def __init__(self, profiles: Iterable[Profile], absent: bool = True) -> None:
+    def __init__(
+        self, profiles: Iterable[Profile], absent: bool = True, strengths: Sequence[float] = (1.0,)
+    ) -> None:
         """
         Args:
             profiles: at least one; an emotion is the name without the number at its end.
             absent: what another profile moves and this one does not is in a class of its own, around 0;
                 without it (as published) a profile of few FAPs is believed in wherever one of more is.
+            strengths: a profile is believed in as far as it is at the likeliest of these parts of itself.
         """
         self.profiles = tuple(profiles)
         if not self.profiles:
             raise ValueError("profiles: wanted at least one, got none")
         model = emotion_model()
         shape = (len(self.profiles), 68)
-        self._middle, self._half = np.zeros(shape), np.full(shape, model.absent)
+        self._middle, self._length = np.zeros(shape), np.full(shape, 2 * model.absent)
         self._used = np.zeros(shape, bool)
         for k, profile in enumerate(self.profiles):
             for fap, (low, high) in profile.ranges.items():
                 self._middle[k, fap - 1] = (low + high) / 2
-                self._half[k, fap - 1] = max(high - low, model.least_length) / 2
+                self._length[k, fap - 1] = high - low
                 self._used[k, fap - 1] = True
+        self._moving = self._used.copy()
         self._moved = self._used.sum(axis=1)
+        self._classes = [self._class(strength, model.least_length) for strength in strengths]
         if absent:
             self._used |= self._used.any(axis=0)
         self._core, self._base = model.core, model.base
@@ -75,12 +80,14 @@ class Recogniser:
             raise ValueError(f"frames: wanted (n, 68), got {values.shape}")
         if not np.isfinite(values).all():
             raise ValueError("frames: wanted finite values, got NaN or infinity")
-        away = np.abs(values[:, None] - self._middle) / self._half
-        membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
         judged = self._used if seen is None else self._used & seen
-        product: Float64 = np.where(judged, membership, 1.0).prod(axis=2)
+        best: Float64 = np.zeros((len(values), len(self.profiles)))
+        for middle, half in self._classes:
+            away = np.abs(values[:, None] - middle) / half
+            membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
+            np.maximum(best, np.where(judged, membership, 1.0).prod(axis=2), out=best)
         # A profile none of whose FAPs was seen is nothing to believe in.
-        return product * judged.any(axis=1)
+        return best * judged.any(axis=1)
 
     def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
         """The emotion of each frame (eq. 11), None where nothing fits."""
@@ -95,6 +102,11 @@ class Recogniser:
         names = (profile.name for profile in self.profiles)
         return Recognition(self._best(beliefs), emotions, dict(zip(names, map(float, beliefs), strict=True)))
 
+    def _class(self, strength: float, least: float) -> tuple[Float64, Float64]:
+        """(profiles, 68) twice: the middles of the classes, and half their lengths; absence has one size."""
+        length = np.where(self._moving, np.maximum(self._length * strength, least), self._length)
+        return self._middle * strength, length / 2
+
     def _best(self, beliefs: Float64) -> str | None:
         best = int(np.lexsort((self._moved, beliefs))[-1])
         return self._emotions[best] if beliefs[best] > 0 else None
@@ -103,10 +115,12 @@ class Recogniser:
 def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
     """That of all profiles of a set: "own", "published" or "raw".
 
-    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised.
+    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. Of
+    the published sets an emotion has many profiles, weak and strong; of ours one, which counts at any strength.
     """
+    strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
-    return Recogniser([*every, Profile("neutral", profiles, {})] if absent else every, absent)
+    return Recogniser([*every, Profile("neutral", profiles, {})] if absent else every, absent, strengths)
 
 
 def _emotion(name: str) -> str:

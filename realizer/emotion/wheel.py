@@ -87,7 +87,8 @@ def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, fl
     if not math.isfinite(angle):
         raise ValueError(f"angle: wanted a number of degrees, got {angle}")
     anchors, angles = _anchors(profiles, ring)
-    after = bisect_right(angles, angle % 360.0) % len(anchors)
+    angle %= 360.0  # before anything is taken from it: of a huge angle, a few degrees would be lost
+    after = bisect_right(angles, angle) % len(anchors)
     low, high = anchors[after - 1], anchors[after]
     share = ((angle - low.angle) % 360.0) / ((high.angle - low.angle) % 360.0)
     return (low, 1.0 - share), (high, share)

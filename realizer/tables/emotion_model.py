@@ -25,6 +25,7 @@ class EmotionModel:
         core, base: parts of a range's length within which a value belongs to it for sure, and perhaps.
         least_length: FAPU, of a range.
         absent: FAPU, as far as a FAP that is not moved may be off.
+        strengths: parts of one of our own profiles at which it is recognised.
     """
 
     most: float
@@ -34,6 +35,7 @@ class EmotionModel:
     base: float
     least_length: float
     absent: float
+    strengths: tuple[float, ...]
 
 
 @cache
@@ -41,10 +43,13 @@ def emotion_model() -> EmotionModel:
     """The table.
 
     Raises:
-        TableError: a membership that does not fall.
+        TableError: a membership that does not fall, no strength, or one of nothing.
     """
     table = tables.read_toml(tables.text_of(FILE), FILE)
-    model = EmotionModel(**table["wheel"], chosen=table["chosen"], **table["recognition"])
+    recognition = table["recognition"] | {"strengths": tuple(table["recognition"]["strengths"])}
+    model = EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)
     if not (0 <= model.core < model.base and model.least_length > 0 and model.absent > 0):
         raise TableError(f"{FILE}, recognition: wanted 0 <= core < base, and lengths above 0, got {model}")
+    if not model.strengths or min(model.strengths) <= 0:
+        raise TableError(f"{FILE}, recognition: wanted strengths above 0, got {model.strengths}")
     return model

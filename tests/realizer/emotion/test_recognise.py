@@ -82,6 +82,23 @@ def test_the_archetypes_are_recognised_as_themselves_through_noise(profiles: str
             assert right >= 0.95 * DRAWS, profile.name
 
 
+@pytest.mark.parametrize("strength", [0.4, 0.5, 0.56, 0.7, 0.85, 1.1])
+def test_our_own_archetypes_are_recognised_at_less_than_full_strength(strength: float) -> None:
+    known = recogniser()
+    for name, numbered in archetypes().items():
+        weaker = numbered[0].scaled(strength)
+        assert known.recognise(weaker.frame()).emotion == name, weaker
+        right = sum(got == name for got in known.names(noisy(weaker, 3)))
+        assert right >= 0.9 * DRAWS, name
+
+
+def test_a_word_of_a_category_is_recognised_as_its_archetype() -> None:
+    known = recogniser()
+    wanted = {"sad": "sadness", "afraid": "fear", "angry": "anger", "disgusted": "disgust", "happy": "joy"}
+    assert {word: known.recognise(emotion(word).frame()).emotion for word in wanted} == wanted
+    assert known.recognise(emotion("terrified").frame()).emotion == "fear"
+
+
 @pytest.mark.parametrize("profiles", ["own", "published"])
 def test_the_words_that_whissell_rated_are_told_from_each_other_through_noise(profiles: str) -> None:
     words = [word for word, source in known_words().items() if source == "whissell"]

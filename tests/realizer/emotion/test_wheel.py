@@ -103,3 +103,8 @@ def test_what_is_off_the_wheel_is_refused_in_words(arguments: tuple[float, ...],
 def test_what_is_off_the_plane_is_refused_in_words(valence: float, arousal: float) -> None:
     with pytest.raises(ValueError, match=r"(valence|arousal): wanted -1\.\.1"):
         affect(valence, arousal)
+
+
+def test_a_huge_angle_is_a_place_like_any_other() -> None:
+    assert wheel(1e308).ranges == wheel(1e308 % 360).ranges
+    assert sum(shares(-1e300).values()) == pytest.approx(1)
