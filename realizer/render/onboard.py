@@ -55,6 +55,8 @@ class OnboardCanvas:
         pixels = self._raster(places, nearness, figure.triangles, figure.colours)
         if out is None:
             out = np.empty((*pixels.shape[:2], self._channels), np.uint8)
+        if self._channels == 3:
+            return self._raster.over(self._backdrop, out)
         return over(pixels, self._backdrop, out)
 
     def close(self) -> None:

@@ -38,8 +38,8 @@ class Raster:
         width, height = size
         self._samples = SMOOTH if smooth else PLAIN
         # A pixel's samples side by side: what a small triangle writes is near in memory.
-        self._nearest = np.zeros((height, width, len(self._samples)), np.float32)
-        self._tones = np.zeros((height, width, len(self._samples)), np.uint32)
+        # Each is one number, nearness above and tone below: the greater one is the nearer one.
+        self._keys = np.zeros((height, width, len(self._samples)), np.uint64)
         self._picture = np.zeros((height, width), np.uint32)
         # A band of rows for each processor: the loops let go of Python's lock.
         bands = max(1, min(THREADS, os.cpu_count() or 1, height))
@@ -59,20 +59,32 @@ class Raster:
         Raises:
             RenderError: no numba; the text says what to install.
         """
-        fill, mean = _compiled()
+        fill, mean, _ = _compiled()
         points = np.ascontiguousarray(points, np.float64)
         nearness = np.ascontiguousarray(nearness, np.float32)
         tones = np.ascontiguousarray(colours * np.float32(255) + np.float32(0.5), np.float32)
 
         def band(rows: tuple[int, int]) -> None:
             part = slice(*rows)
-            self._nearest[part] = 0
-            self._tones[part] = 0
-            fill(points, nearness, triangles, tones, self._samples, *rows, self._nearest, self._tones)
-            mean(self._tones[part], self._picture[part])
+            fill(points, nearness, triangles, tones, self._samples, *rows, self._keys)
+            mean(self._keys[part], self._picture[part])
 
         list(self._pool.map(band, self._bands))
         return self._picture.view(np.uint8).reshape(*self._picture.shape, 4)
+
+    def over(self, behind: UInt8, out: UInt8) -> UInt8:
+        """The last picture over (h, w, 4) opaque pixels, into (h, w, 3); as `realizer.render.backdrop.over`.
+
+        A seventh of its time: nothing is made on the way.
+        """
+        _, _, lay = _compiled()
+
+        def band(rows: tuple[int, int]) -> None:
+            part = slice(*rows)
+            lay(self._picture[part], behind[part], out[part])
+
+        list(self._pool.map(band, self._bands))
+        return out
 
     def close(self) -> None:
         """End its threads."""
@@ -89,17 +101,17 @@ def ready() -> str | None:
 
 
 @cache
-def _compiled() -> tuple[Callable[..., None], Callable[..., None]]:
-    """The two loops below as machine code; kept on disk where a place can be written, so compiled once."""
+def _compiled() -> tuple[Callable[..., None], ...]:
+    """The three loops below as machine code; kept on disk where a place can be written, so compiled once."""
     try:
         import numba
     except ImportError as error:
         raise RenderError(f"{NO_NUMBA} ({error})") from None
     options: Any = {"nogil": True, "error_model": "numpy"}
     try:
-        return numba.njit(cache=True, **options)(_fill), numba.njit(cache=True, **options)(_mean)
+        return tuple(numba.njit(cache=True, **options)(loop) for loop in (_fill, _mean, _lay))
     except RuntimeError:  # neither our folder nor the user's can be written
-        return numba.njit(**options)(_fill), numba.njit(**options)(_mean)
+        return tuple(numba.njit(**options)(loop) for loop in (_fill, _mean, _lay))
 
 
 def _fill(
@@ -110,15 +122,15 @@ def _fill(
     samples: Any,
     begin: int,
     stop: int,
-    nearest: Any,
-    tones: Any,
+    keys: Any,
 ) -> None:
-    """Write each triangle's samples where nothing nearer is: nearness, and RGBA in one number.
+    """Write each triangle's samples where nothing nearer is: nearness and RGBA in one number.
 
-    Args as `Raster.__call__`, but colours 0.5..255.5 and a tuple of samples; `nearest` and `tones` are
-    (h, w, samples), and those rows from `begin` to `stop` are written.
+    Args as `Raster.__call__`, but colours 0.5..255.5 and a tuple of samples; `keys` is (h, w, samples), and
+    those rows from `begin` to `stop` are written.
     """
-    width = nearest.shape[1]
+    width = keys.shape[1]
+    high_half = np.uint64(32)
     per = len(samples)
     pitch = 1.0 / per
     firsts, lasts = np.empty(per, np.int64), np.empty(per, np.int64)
@@ -192,37 +204,67 @@ def _fill(
             green, blue = np.float32(g0 + gx * dx + gy * dy), np.float32(b0 + bx * dx + by * dy)
             for x in range(left, beyond):
                 # The middle may lie beside the triangle.
-                tone = np.uint32(
-                    np.int32(min(max(red, LEAST), MOST))
-                    | (np.int32(min(max(green, LEAST), MOST)) << 8)
-                    | (np.int32(min(max(blue, LEAST), MOST)) << 16)
+                tone = np.uint64(
+                    np.int64(min(max(red, LEAST), MOST))
+                    | (np.int64(min(max(green, LEAST), MOST)) << 8)
+                    | (np.int64(min(max(blue, LEAST), MOST)) << 16)
                     | np.int64(0xFF000000)
                 )
                 for k in range(per):
                     if firsts[k] <= x < lasts[k]:
-                        here = near + beside[k]
-                        if here > nearest[line, x, k]:
-                            nearest[line, x, k] = here
-                            tones[line, x, k] = tone
+                        here = np.float32(near + beside[k])
+                        if here > LEAST:  # floats above 0 are in the order of their bits
+                            key = (np.uint64(here.view(np.uint32)) << high_half) | tone
+                            if key > keys[line, x, k]:
+                                keys[line, x, k] = key
                 near += nx
                 red += rx
                 green += gx
                 blue += bx
 
 
-def _mean(tones: Any, picture: Any) -> None:
-    """The mean of each pixel's samples, one or four; all four bytes at once."""
+def _mean(keys: Any, picture: Any) -> None:
+    """The mean of each pixel's samples, one or four, all four bytes at once; clears the samples."""
     height, width = picture.shape
-    if tones.shape[2] == 1:
-        picture[:] = tones[:, :, 0]
+    nothing = np.uint64(0)
+    if keys.shape[2] == 1:
+        for y in range(height):
+            for x in range(width):
+                picture[y, x] = np.uint32(keys[y, x, 0])
+                keys[y, x, 0] = nothing
         return
     upper, lower, half = np.uint32(0x3F3F3F3F), np.uint32(0x03030303), np.uint32(0x02020202)
     two = np.uint32(2)
     for y in range(height):
         for x in range(width):
-            a, b, c, d = tones[y, x, 0], tones[y, x, 1], tones[y, x, 2], tones[y, x, 3]
+            first, second, third, fourth = keys[y, x, 0], keys[y, x, 1], keys[y, x, 2], keys[y, x, 3]
+            if (first | second | third | fourth) == nothing:
+                picture[y, x] = 0
+                continue
+            keys[y, x, 0] = keys[y, x, 1] = keys[y, x, 2] = keys[y, x, 3] = nothing
+            a, b, c, d = np.uint32(first), np.uint32(second), np.uint32(third), np.uint32(fourth)
             quarters = (
                 ((a >> two) & upper) + ((b >> two) & upper) + ((c >> two) & upper) + ((d >> two) & upper)
             )
             rest = (a & lower) + (b & lower) + (c & lower) + (d & lower) + half
             picture[y, x] = quarters + ((rest >> two) & lower)
+
+
+def _lay(picture: Any, behind: Any, out: Any) -> None:
+    """Premultiplied pixels over opaque ones, a channel at a time."""
+    height, width = picture.shape
+    byte = np.uint32(255)
+    for y in range(height):
+        for x in range(width):
+            pixel = picture[y, x]
+            rest = byte - (pixel >> np.uint32(24))
+            red, green, blue = (
+                pixel & byte,
+                (pixel >> np.uint32(8)) & byte,
+                (pixel >> np.uint32(16)) & byte,
+            )
+            if rest > 0:
+                red += (behind[y, x, 0] * rest + 127) // 255
+                green += (behind[y, x, 1] * rest + 127) // 255
+                blue += (behind[y, x, 2] * rest + 127) // 255
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = min(red, 255), min(green, 255), min(blue, 255)

@@ -85,3 +85,20 @@ def test_a_picture_says_nothing_of_the_one_before():
     first = raster(points, near, triangles, np.ones((3, 3), np.float32)).copy()
     raster(points + 3, 5 * near, triangles, np.ones((3, 3), np.float32))
     assert np.array_equal(raster(points, near, triangles, np.ones((3, 3), np.float32)), first)
+
+
+def test_a_picture_over_a_backdrop_is_what_numpy_makes_of_it():
+    from realizer.render.backdrop import over
+
+    raster = Raster(SIZE)
+    triangles, tones = np.array([[0, 1, 2]], np.int32), np.full((3, 3), 0.7, np.float32)
+    pixels = raster(np.array(BIG), np.ones(3, np.float32), triangles, tones).copy()
+    behind = np.random.default_rng(0).integers(0, 256, (40, 60, 4), np.uint8)
+    behind[..., 3] = 255
+    wanted = over(pixels, behind, np.empty((40, 60, 3), np.uint8))
+    assert np.array_equal(raster.over(behind, np.empty((40, 60, 3), np.uint8)), wanted)
+
+
+def test_what_is_behind_the_lens_is_not_drawn_before_all_others():
+    picture = draw([BIG, BIG], (RED, BLUE), (np.nan, 1.0))
+    assert picture[20, 20].tolist() == [0, 0, 255, 255]
