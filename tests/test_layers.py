@@ -41,6 +41,14 @@ MAY: dict[str, set[str]] = {
     },
     "realizer.emotion": VALUES | {"realizer.emotion", "realizer.face", "realizer.tables"},
     "realizer.expressions": VALUES | {"realizer.expressions", "realizer.tables"},
+    "realizer.expressions.likeness": VALUES
+    | {
+        "realizer.animation",
+        "realizer.expressions",
+        "realizer.face",
+        "realizer.mapping",
+        "realizer.render",
+    },
     "realizer.face": VALUES | {"realizer.face", "realizer.tables"},
     "realizer.render": VALUES | {"realizer.face", "realizer.render", "realizer.tables"},
     "realizer.knowledge": VALUES

@@ -14,6 +14,7 @@ from realizer.cli import options
 
 if TYPE_CHECKING:
     from realizer.expressions import Expression
+    from realizer.expressions.likeness import Likeness
 
 __all__: list[str] = []
 
@@ -23,6 +24,7 @@ picture = click.option(
     "-o", "--output", metavar="SHEET.png", type=click.Path(path_type=Path), help="Draw what is told."
 )
 face = click.option("--face", default="default", show_default=True, help="Whose face.")
+whose = click.option("--face", metavar="NAME", help="Whose face; --like takes any, else the default one.")
 
 
 class Units(click.ParamType):  # type: ignore[type-arg]
@@ -70,45 +72,67 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
 @expressions.command()
 @click.argument("text", required=False)
 @click.option("--au", "units", type=Units(), metavar="1,2,12L=0.5", help="By action units, instead of words.")
+@click.option(
+    "--like",
+    metavar="IMAGE",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="By a picture of one of our faces from the front, in any of our lights.",
+)
 @click.option("--most", type=click.IntRange(1), default=8, show_default=True, help="How many to tell.")
 @as_json
 @picture
-@face
+@whose
 @options.expressions
 def find(
     text: str | None,
     units: Any,
+    like: Path | None,
     most: int,
     as_json: bool,
     output: Path | None,
-    face: str,
+    face: str | None,
     expressions: Path | None,
 ) -> int:
-    """Look expressions up, by what TEXT says they mean or by the action units they show; the best first.
+    """Look expressions up: by what TEXT says they mean, by action units, by a picture; the best first.
 
     \b
     realizer expressions find "sorry about that"
     realizer expressions find --au 1,2,12L -o found.png
+    realizer expressions find --like face.png
     """
     from realizer.expressions import by_action_units, by_meaning, library_of
 
-    if (text is None) == (units is None):
-        raise click.UsageError("wanted TEXT or --au, got " + ("neither" if text is None else "both"))
-    _check_picture(output, face)
-    library = library_of(options.settings(expressions=expressions).expressions)
+    if sum(way is not None for way in (text, units, like)) != 1:
+        raise click.UsageError("wanted one of TEXT, --au and --like")
+    _check_picture(output, face or "default")
+    known = list(library_of(options.settings(expressions=expressions).expressions).values())
     if text is not None:
-        found = by_meaning(text, library.values())
+        found = by_meaning(text, known)
+    elif units is not None:
+        found = by_action_units(units, known)
     else:
-        found = by_action_units(units, library.values())
+        assert like is not None
+        seen = _looked_up(like, known, face)
+        face, found = seen.face, [pair for pair in seen.found if pair[1] > 0]
+        click.echo(f"{like}: {seen.face}, {seen.light}{', neutral' if seen.neutral else ''}", err=True)
     found = found[:most]
     scores = [f"{score:.2f}" for _, score in found]
     _tell([one for one, _ in found], scores, as_json)
     if not found:
-        asked = repr(text) if text is not None else "those action units"
+        asked = repr(text) if text is not None else "that"
         click.echo(f"nothing in the library goes with {asked}; `realizer expressions list` has all", err=True)
     elif output is not None:
-        _draw([one for one, _ in found], scores, output, face)
+        _draw([one for one, _ in found], scores, output, face or "default")
     return 0 if found else 1
+
+
+def _looked_up(like: Path, known: Sequence[Expression], face: str | None) -> Likeness:
+    from realizer.expressions.likeness import UnknownPictureError, by_picture, read_picture
+
+    try:
+        return by_picture(read_picture(like), known, None if face is None else [face])
+    except UnknownPictureError as error:
+        raise click.UsageError(str(error)) from None
 
 
 def _check_picture(output: Path | None, face: str) -> None:

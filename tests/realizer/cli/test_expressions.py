@@ -54,8 +54,8 @@ def test_ones_own_are_found_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["find"], "wanted TEXT or --au, got neither"),
-        (["find", "smile", "--au", "1"], "wanted TEXT or --au, got both"),
+        (["find"], "wanted one of TEXT, --au and --like"),
+        (["find", "smile", "--au", "1"], "wanted one of TEXT, --au and --like"),
         (["find", "--au", "99"], "wanted an action unit such as 12 or 12L, got '99'"),
         (["find", "--au", "1=7"], "wanted an intensity above 0 and to 1, got 7"),
         (["list", "-o", "sheet.txt"], "sheet.txt: wanted a name that ends in .png"),
