@@ -1,4 +1,4 @@
-"""How true a face's FAPs are: the 127 displacements by rules, beside what Paul 2010 gave other faces.
+"""How true a face's FAPs are: the 127 displacements by rules and by eye, beside what Paul 2010 gave others.
 
 python tests/benchmarks/face.py [--face NAME ...] [--all] [--worst 10]
 """
@@ -7,9 +7,38 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import dataclass
+from pathlib import Path
 
 from realizer.face import list_faces, load_face
 from realizer.face.mpeg4 import PEERS, Truth, face_truth, mean_score
+from realizer.tables import read_csv
+
+BY_EYE = Path(__file__).with_name("fap_scores_by_eye.csv")
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What one FAP in one direction (1 or -1) looked like, and its score of 3, 2, 1 or 0."""
+
+    face: str
+    fap: int
+    direction: int
+    score: int
+    seen: str
+
+
+def by_eye(name: str, truths: tuple[Truth, ...]) -> str:
+    """The mean of what was looked at, weighted as the rules' is; what nobody looked at does not count."""
+    rows = read_csv(BY_EYE.read_text("utf-8"), Seen, BY_EYE.name)
+    scores = {(row.fap, row.direction): row.score for row in rows if row.face == name}
+    seen = [(truth.weight, scores[key]) for truth in truths if (key := (truth.fap, truth.sign)) in scores]
+    if not seen:
+        return f"{name + ', weighted mean':30}     -   (by eye: not looked at)"
+    mean = sum(weight * score for weight, score in seen) / sum(weight for weight, _ in seen)
+    return (
+        f"{name + ', weighted mean':30}{mean:6.2f}   (by eye at 512, {len(seen)} of {len(truths)} looked at)"
+    )
 
 
 def line(truth: Truth) -> str:
@@ -40,6 +69,7 @@ def main() -> None:
         each = ", ".join(f"{k}: {sum(t.score == k for t in truths)}" for k in (3, 2, 1, 0))
         print(f"scores {each}")
         print(f"{name + ', weighted mean':30}{mean_score(truths):6.2f}   (rules)")
+        print(by_eye(name, truths))
         for peer, score in PEERS.items():
             print(f"{peer:30}{score:6.2f}   (by eye, Paul 2010; FAPs that it lacks count 0)")
 
