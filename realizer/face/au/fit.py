@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.errors import FaceError
-from realizer.face.au.limit import Watched, watched
+from realizer.face.au.limit import FURTHEST, Watched, furthest, watched
 from realizer.face.au.measure import Measured
 from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.face.au.mouth import fit_mouth
@@ -73,11 +73,16 @@ def fit_models(
         if form not in FORMS:
             raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
     mouth, jaw = fit_mouth(face), _jaw(face)
-    places = watched(face, mouth)
+    places, finer = watched(face, mouth), watched(face, mouth, between=True)
     fitted: dict[str, dict[int, UnitModel]] = {form: {} for form in forms}
     for au, one in measured.items():
         ratios = []
-        for form, unit in _fit_unit(one, mouth, places, forms).items():
+        size = _d_max(one)
+        found = _fit_unit(one, mouth, places, forms)
+        # Seldom does a unit run away between vertices that stay: then all these places are watched.
+        if any(furthest(unit, mouth, finer)[0] > FURTHEST * size for unit in found.values()):
+            found = _fit_unit(one, mouth, finer, forms)
+        for form, unit in found.items():
             if au in (26, 27):
                 unit = UnitModel(au, unit.motions, _jaw_degrees(face, unit, mouth, jaw))
             fitted[form][au] = unit
@@ -126,9 +131,15 @@ def table_text(rows: tuple[Row, ...]) -> str:
     return "\n".join(lines)
 
 
+def _d_max(one: Measured) -> float:
+    if not one.moves[one.seen].any():
+        raise FaceError(f"AU{one.au}: wanted a landmark that moves and can be seen, got none")
+    return float(np.linalg.norm(one.moves[one.seen], axis=1).max())
+
+
 def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
     long = np.linalg.norm(one.moves, axis=1)
-    d_max = float(long[one.seen].max())
+    d_max = _d_max(one)
     counts = one.seen & (long > MOVES * d_max)
     upper = None if one.upper is None else one.upper[counts]
     miss = np.linalg.norm(unit.displacement(one.at[counts], mouth, upper) - one.moves[counts], axis=1)
@@ -142,9 +153,7 @@ def _fit_unit(one: Measured, mouth: Mouth, places: Watched, forms: Sequence[str]
     flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     at, moves = one.at * flip, one.moves * flip
     long = np.linalg.norm(moves, axis=1)
-    if not one.seen.any() or not long[one.seen].any():
-        raise FaceError(f"AU{one.au}: wanted a landmark that moves and can be seen, got none")
-    size = float(long[one.seen].max())
+    size = _d_max(one)
     weight = np.where(one.seen, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
     # A point in the middle stands for itself alone, any other for its twin too.
     weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
