@@ -90,6 +90,9 @@ def test_what_is_watched_is_each_vertex_once_on_the_left(face: Face) -> None:
     assert 1000 < len(places.at) < len(face.vertices)
     corner = np.linalg.norm(places.at - face.points["8.3"], axis=1)
     assert corner.min() < 1e-6
+    finer = watched(face, model.mouth, between=True)
+    assert len(finer.at) > 3 * len(places.at)
+    assert {tuple(at) for at in places.at.tolist()} <= {tuple(at) for at in finer.at.tolist()}
     # Every place belongs to a half, or in part to both.
     assert len(places.of("upper")) + len(places.of("lower")) >= len(places.of("whole")) == len(places.at)
 
