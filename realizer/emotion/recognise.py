@@ -115,8 +115,9 @@ class Recogniser:
 def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
     """That of all profiles of a set: "own", "published" or "raw".
 
-    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. Of
-    the published sets an emotion has many profiles, weak and strong; of ours one, which counts at any strength.
+    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. In
+    the published sets an emotion has many profiles, weak and strong; in ours one, which counts at any
+    strength.
     """
     strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
