@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
     from realizer.knowledge.enrich import Enricher
 
 __all__: list[str] = []
+
+FILES = (".bml", ".xml", ".txt")  # a single word that ends so is meant to be a file
+# What XML 1.0 has no way to write (production 2, Char).
+UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 class MoodWord(click.ParamType):  # type: ignore[type-arg]
@@ -71,52 +77,88 @@ def enrich(text: str, role: Any, mood: Any, language: str, words: Path | None, o
     realizer realize sure.bml -o sure.mp4
     """
     from bml_schema import write
+    from realizer.errors import TableError
     from realizer.knowledge.enrich import Enricher
     from realizer.tables.emotional_words import word_list, words_of
 
     said = _read(text)
     if not said.strip():
         raise click.UsageError("wanted a text or a BML document, got nothing but blanks")
-    own = words_of(words) if words is not None else None
+    try:
+        own = words_of(words) if words is not None else None
+    except TableError as error:
+        raise click.UsageError(str(error)) from None
     if own is None and word_list(language) is None:
         click.echo(
             f"no emotional words for language {language!r}: only punctuation counts; see --words", err=True
         )
     enricher = Enricher(role, mood, language, own)
     faults = 0
-    if said.lstrip("\ufeff \t\r\n").startswith("<"):
-        blocks, faults = _documents(said, enricher)
+    before = 0
+    if isinstance(said, bytes) or said.lstrip().startswith("<"):
+        blocks, before, faults = _documents(said, enricher)
     else:
-        blocks = [enricher.text(said)]
+        blocks = list(enricher.texts(_writable(said)))
     result = "".join(write(block) for block in blocks)
     if output is None:
         sys.stdout.write(result)
     else:
         output.write_text(result, "utf-8")
-        placed = sum(bool(getattr(node, "because", "")) for block in blocks for node in block.behaviours)
+        placed = sum(map(_placed, blocks)) - before
         click.echo(f"{output}: {placed} expressions placed", err=True)
     return 1 if faults else 0
 
 
-def _read(text: str) -> str:
-    """The text itself, or what a file of that name or standard input holds."""
+def _placed(block: Block) -> int:
+    """How many expressions of a block say which rule placed them."""
+    return sum(bool(getattr(node, "because", "")) for node in block.behaviours)
+
+
+def _read(text: str) -> str | bytes:
+    """The text itself, or what a file or standard input holds; XML, which names its encoding, as bytes.
+
+    Raises:
+        click.UsageError: what looks like the name of a file, and is none; a text that is not UTF-8.
+    """
     try:
         is_file = text == "-" or Path(text).is_file()
+        is_folder = Path(text).is_dir() and os.sep in text
     except (OSError, ValueError):  # too long for a name
-        is_file = False
+        is_file = is_folder = False
     if not is_file:
+        if is_folder or (not text.split()[1:] and text.lower().rstrip().endswith(FILES)):
+            raise click.UsageError(f"{text}: wanted a text, or a file that is there; a text may come by -")
         return text
-    return options.read_documents([text])[0].decode("utf-8", "replace")
+    data = options.read_documents([text])[0]
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        name = "standard input" if text == "-" else text
+        raise click.UsageError(
+            f"{name}: wanted a text in UTF-8, got byte 0x{data[error.start]:02X} at {error.start}"
+        ) from None
 
 
-def _documents(text: str, enricher: Enricher) -> tuple[list[Block], int]:
-    """Every block of a stream of documents, enriched; a broken one is told, and left out."""
+def _writable(text: str) -> str:
+    """The text with blanks for characters that XML has no way to write; how many is told."""
+    clean, count = UNWRITABLE.subn(" ", text)
+    if count:
+        click.echo(f"{count} character{'s' * (count > 1)} that XML cannot hold became blanks", err=True)
+    return clean
+
+
+def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int, int]:
+    """Blocks of documents, enriched; how many expressions they had before; how many faults were told.
+
+    A broken document is left out.
+    """
     from bml_schema import Block, Speech, read
     from realizer.behaviours import VOCABULARY
-    from realizer.knowledge.sentences import sentences
 
     blocks: list[Block] = []
-    faults = 0
+    before = faults = 0
     for item in read(text, VOCABULARY):
         problems = item.problems if isinstance(item, Block) else (item,)
         for problem in problems:
@@ -125,15 +167,31 @@ def _documents(text: str, enricher: Enricher) -> tuple[list[Block], int]:
         if not isinstance(item, Block):
             continue
         if enricher.role == "speaker":
+            for node in item.behaviours:
+                if isinstance(node, Speech) and node.text is not None and node.descriptions:
+                    click.echo(
+                        f"{item.id}:{node.id}: a description may be spoken instead of its text, where no mark"
+                        " of ours is: nothing is placed in it",
+                        err=True,
+                    )
+            before += _placed(item)
             blocks.append(enricher.block(item))
-            continue
-        said: list[tuple[str, float]] = []
-        now = 0.0
-        for node in item.behaviours:
-            if isinstance(node, Speech) and node.text is not None:
-                said.append((str(node.text), now))
-                now += max(
-                    (s.words[-1].end for s in sentences(str(node.text), enricher.language)), default=0.0
-                )
-        blocks.append(enricher.listener(said, f"{item.id}-listener"))
-    return blocks, faults
+        else:
+            blocks.append(enricher.listener(_heard(item), f"{item.id}-listener"))
+    return blocks, before, faults
+
+
+def _heard(block: Block) -> list[tuple[str, float]]:
+    """The texts of a block, and the second at which each begins, as the block is scheduled."""
+    from bml_schema import Speech
+    from realizer.pipeline import submitted
+    from realizer.player import Player
+    from realizer.speech import SilentVoice
+
+    times = submitted(Player(), block, SilentVoice()).times
+    said = [
+        (str(node.text), float(times[node.id][0]))
+        for node in block.behaviours
+        if isinstance(node, Speech) and node.text is not None and node.id in times
+    ]
+    return sorted(said, key=lambda one: one[1])

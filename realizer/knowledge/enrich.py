@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,8 @@ from realizer.tables.timing import gaps
 __all__ = ["Enricher", "template_of"]
 
 PREFIX = "template:"
+LONGEST = 20_000  # characters of a text in one block: with its expressions a fifth of what a document may be
+OPENING = "\"'“‘„«‹([¿¡"
 INTENSITY = 0.7  # of what is placed: people talk with less than a full face
 NEVER = 0.2  # s; what would be shorter than that is not placed
 
@@ -51,6 +54,12 @@ class Enricher:
             return self.listener(((text, 0.0),), block)
         speech = Speech(id="speech1", text=SpeechText(parts=(text,)))
         return self.block(Block(id=block, children=(speech,)))
+
+    def texts(self, text: str) -> Iterator[Block]:
+        """The same in blocks that documents can hold, each after the one before, cut between sentences."""
+        for number, piece in enumerate(_pieces(text, self.language), 1):
+            block = self.text(piece, f"bml{number}")
+            yield replace(block, composition="APPEND") if number > 1 else block
 
     def block(self, block: Block) -> Block:
         """A speaker's block with expressions at its words, and with company for the expressions it has.
@@ -131,6 +140,29 @@ class Enricher:
             if start is not None:
                 other = self._expression(company.other, start, company.says, names, end)
                 yield replace(other, intensity=node.intensity)
+
+
+def _pieces(text: str, language: str) -> Iterator[str]:
+    """The text in pieces of at most LONGEST characters, cut before a sentence, or a word, if there is one."""
+    begin = 0
+    if len(text) > LONGEST:
+        said = sentences(text, language)
+        starts = [sentence.words[0].place for sentence in said]
+        words = [word.place for sentence in said for word in sentence.words]
+        while len(text) - begin > LONGEST:
+            most = begin + LONGEST
+            cut = next((at for at in (_last(starts, most), _last(words, most)) if at > begin), most)
+            while cut - 1 > begin and text[cut - 1] in OPENING:
+                cut -= 1
+            yield text[begin:cut]
+            begin = cut
+    yield text[begin:]
+
+
+def _last(rising: Sequence[int], most: int) -> int:
+    """The last that is at most `most`; 0 if none is."""
+    found = bisect_right(rising, most)
+    return rising[found - 1] if found else 0
 
 
 class _Names:

@@ -81,3 +81,55 @@ def test_an_unknown_mood_names_those_that_are_near() -> None:
     assert "wanted a word such as happy, happiness; got 'happi'" in str(
         enrich("Hi.", "--mood", "happi").exception
     )
+
+
+def test_a_name_of_a_file_that_is_not_there_is_not_spoken(tmp_path: Path) -> None:
+    for name in ("nofile.bml", "talk.TXT", str(tmp_path)):
+        assert "wanted a text, or a file that is there" in str(enrich(name).exception)
+    assert starts(enrich("Did you read talk.txt?").stdout)
+
+
+def test_a_text_that_is_not_utf8_says_at_which_byte(tmp_path: Path) -> None:
+    path = tmp_path / "latin.txt"
+    path.write_bytes(b"Das gef\xe4llt mir!")
+    assert "latin.txt: wanted a text in UTF-8, got byte 0xE4 at 7" in str(enrich(str(path)).exception)
+    path.write_bytes(b"\xef\xbb\xbfReally?")
+    assert starts(enrich(str(path)).stdout) == {"bml1:surprise1": "speech1:w1"}
+
+
+def test_a_document_is_read_in_the_encoding_that_it_names(tmp_path: Path) -> None:
+    path = tmp_path / "wide.bml"
+    path.write_bytes(('<?xml version="1.0" encoding="UTF-16"?>' + DOCUMENT.format("a", "")).encode("utf-16"))
+    assert starts(enrich(str(path)).stdout) == {"a:surprise1": "s:w1"}
+
+
+def test_characters_that_xml_cannot_hold_become_blanks_and_are_told() -> None:
+    done = enrich("-", stdin="Are\x00you\x0csure?")
+    assert starts(done.stdout) == {"bml1:surprise1": "speech1:w1"}
+    assert "2 characters that XML cannot hold" in done.stderr
+
+
+def test_a_speech_that_an_engine_reads_from_a_description_is_told_and_left() -> None:
+    spoken = '<description priority="1" type="application/ssml+xml"><speak>Really?</speak></description>'
+    done = enrich("-", stdin=DOCUMENT.format("a", spoken))
+    assert starts(done.stdout) == {}
+    assert "a:s: a description may be spoken instead of its text" in done.stderr
+
+
+def test_a_listener_hears_a_speech_when_it_is_spoken() -> None:
+    late = DOCUMENT.format("a", "").replace('id="s"', 'id="s" start="5"')
+    assert starts(enrich("-", "--role", "listener", stdin=late).stdout) == {"a-listener:sadness1": "5"}
+
+
+def test_what_was_placed_before_is_not_counted_again(tmp_path: Path) -> None:
+    first, second = tmp_path / "1.bml", tmp_path / "2.bml"
+    enrich("Really? Nonsense!", "-o", str(first))
+    assert "0 expressions placed" in enrich(str(first), "-o", str(second)).stderr
+    assert first.read_text() == second.read_text()
+
+
+def test_a_wrong_list_of_words_is_wrong_usage(tmp_path: Path) -> None:
+    words = tmp_path / "w.csv"
+    words.write_text("word,category,origin\n")
+    assert "wanted a leading line" in str(enrich("Hi.", "--words", str(words)).exception)
+    assert getattr(enrich("Hi.", "--words", str(words)).exception, "exit_code", None) == 2

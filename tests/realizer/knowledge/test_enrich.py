@@ -135,3 +135,14 @@ WORDS = [
 def test_doing_it_twice_adds_nothing(text: str) -> None:
     block = parse(write(Enricher().text(text)))
     assert Enricher().block(block) == block
+
+
+def test_a_long_text_becomes_several_documents_that_are_each_small_enough_to_be_read() -> None:
+    text = 'Are you sure? What a horror, he said; "nonsense!" ' * 2000
+    blocks = list(Enricher().texts(text))
+    assert "".join(str(block["speech1"].text) for block in blocks) == text
+    assert len({block.id for block in blocks}) == len(blocks) > 3
+    assert [block.composition for block in blocks] == ["MERGE"] + ["APPEND"] * (len(blocks) - 1)
+    assert all(not parse(write(block)).problems for block in blocks)
+    assert all(str(block["speech1"].text).startswith(("Are", "What", '"')) for block in blocks)
+    assert [len(list(Enricher().texts(short))) for short in ("Hi.", "x" * 20_000, "x" * 20_001)] == [1, 1, 2]
