@@ -9,9 +9,12 @@ import argparse
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from realizer.face import list_faces, load_face
+from realizer.face.load import folder_of
 from realizer.face.mpeg4 import PEERS, Truth, face_truth, mean_score
+from realizer.face.mpeg4.build import copy_with_zones
 from realizer.tables import read_csv
 
 BY_EYE = Path(__file__).with_name("fap_scores_by_eye.csv")
@@ -39,6 +42,15 @@ def by_eye(name: str, truths: tuple[Truth, ...]) -> str:
     return (
         f"{name + ', weighted mean':30}{mean:6.2f}   (by eye at 512, {len(seen)} of {len(truths)} looked at)"
     )
+
+
+def zones_line(name: str) -> str:
+    """The same mesh moved by zones of influence alone, as a head without shapes would be."""
+    with TemporaryDirectory() as folder:
+        copy_with_zones(folder_of(name), Path(folder) / name)
+        truths = face_truth(load_face(name, Path(folder)))
+    perfect = sum(truth.score == 3 for truth in truths)
+    return f"{name + ', by zones':30}{mean_score(truths):6.2f}   (rules; {perfect} of {len(truths)} at 3)"
 
 
 def line(truth: Truth) -> str:
@@ -70,6 +82,7 @@ def main() -> None:
         print(f"scores {each}")
         print(f"{name + ', weighted mean':30}{mean_score(truths):6.2f}   (rules)")
         print(by_eye(name, truths))
+        print(zones_line(name))
         for peer, score in PEERS.items():
             print(f"{peer:30}{score:6.2f}   (by eye, Paul 2010; FAPs that it lacks count 0)")
 

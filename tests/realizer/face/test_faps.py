@@ -98,6 +98,59 @@ def test_open_jaw_takes_lower_teeth_and_tongue_and_not_the_upper_teeth(face: Fac
 
 
 @pytest.mark.parametrize(
+    ("fap", "value", "way"), [(14, 300, (0, 0, 1)), (15, 200, (-1, 0, 0)), (15, -200, (-1, 0, 0))]
+)
+def test_thrust_and_shift_carry_the_lower_teeth_and_the_tongue_and_nothing_of_the_upper(
+    face: Face, fap: int, value: int, way: tuple[int, int, int]
+) -> None:
+    move = moved(face, {fap: value})
+    asked = value * face.fapu.metres("MNS" if fap == 14 else "MW") * np.array(way)
+    for part in ("lower_teeth", "tongue"):
+        assert np.allclose(move[slice(*face.parts[part])], asked, atol=2e-6)
+    assert np.abs(move[slice(*face.parts["upper_teeth"])]).max() == 0
+
+
+def test_the_jaw_turns_about_its_joint_before_it_slides(face: Face) -> None:
+    first, last = face.parts["lower_teeth"]
+    before = face.vertices[first:last].astype(float)
+    after = before + moved(face, {3: 400})[first:last]
+    # A rigid motion: the best one leaves nothing over, and turns about the axis through both joints.
+    u, _, vt = np.linalg.svd((before - before.mean(axis=0)).T @ (after - after.mean(axis=0)))
+    turn = (u @ vt).T
+    assert np.allclose((before - before.mean(axis=0)) @ turn.T, after - after.mean(axis=0), atol=5e-5)
+    assert np.linalg.det(turn) == pytest.approx(1)
+    assert turn[0, 0] == pytest.approx(1, abs=1e-4)
+    assert 0.02 < np.arcsin(turn[2, 1]) < 0.42
+
+
+def outside(face: Face, at: np.ndarray, cover: str) -> np.ndarray:
+    """(skin,) metres that the skin lies before the nearest triangle of what covers it; -inf far from it."""
+    from scipy.spatial import cKDTree
+
+    first, last = face.parts[cover]
+    corners = at[face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)]]
+    up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-12)
+    skin = at[slice(*face.parts["skin"])]
+    away, nearest = cKDTree(corners.mean(axis=1)).query(skin)
+    depth = ((skin - corners.mean(axis=1)[nearest]) * up[nearest]).sum(axis=1)
+    return np.where(away < 0.012, depth, -np.inf)
+
+
+@pytest.mark.parametrize("fap", [48, 49, 50])
+@pytest.mark.parametrize("cover", ["shirt", "hair"])
+def test_skin_that_is_covered_stays_so_when_the_head_turns_by_30_degrees(
+    face: Face, cover: str, fap: int
+) -> None:
+    rest = outside(face, face.vertices.astype(float), cover)
+    covered = np.isfinite(rest) & (rest < -0.0005)
+    assert covered.any()
+    for value in (52360, -52360):
+        now = outside(face, deform(face, rows({fap: value}))[0].astype(float), cover)
+        assert now[covered].max() < 0
+
+
+@pytest.mark.parametrize(
     ("side", "part", "yaw", "pitch"), [(0, "left_eye", 23, 25), (1, "right_eye", 24, 26)]
 )
 def test_eyeballs_turn_by_the_angle(face: Face, side: int, part: str, yaw: int, pitch: int) -> None:
