@@ -125,12 +125,13 @@ def _write(
     for stream in (video, audio):
         stream.codec_context.flags |= av.codec.context.Flags.bitexact
     heard = 0
+    converter = av.video.reformatter.VideoReformatter()  # a new one each frame costs as much as converting
     for k, picture in enumerate(pictures):
         height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
         if k == 0:
             _picture_format(video, width, height, pace)
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
-        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame = converter.reformat(frame, format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
         frame.pts, frame.time_base = k, 1 / pace
         film.mux(video.encode(frame))
         until = round((k + 1) / pace * rate)
