@@ -199,16 +199,16 @@ class Broadcast:
             timeline = group[0][1].timeline
             newest = last_at(now, timeline.fps)
             window = timeline.window(min(s.next for _, s in group), newest)
-            messages: dict[tuple[str, str, str | None, int], str | bytes] = {}
+            messages: dict[tuple[str, str, str | None, bool, int], str | bytes] = {}
             for connection, s in group:
                 if connection.slow:
                     connection.dropped += newest + 1 - s.next
                     s.next = newest + 1
                     continue
                 for number in range(s.next, newest + 1):
-                    key = (s.stream, s.encoding, s.name, number)
+                    key = (s.stream, s.encoding, s.name, s.asked, number)
                     if key not in messages:
-                        messages[key] = encode(window, s.stream, s.encoding, number, s.index, s.name)
+                        messages[key] = encode(window, s, number)
                     effects.append(Send(connection.id, messages[key]))
                 s.next = newest + 1
 

@@ -26,7 +26,7 @@ STUCK = 32 * 2**20
 
 @dataclass(eq=False)
 class FrameSubscription:
-    """fap, au or mesh frames: `next` is the frame to send."""
+    """fap, au or mesh frames: `next` is the frame to send; `asked`: AUs before the rules of co-occurrence."""
 
     stream: str
     encoding: str
@@ -34,6 +34,7 @@ class FrameSubscription:
     index: int
     name: str | None
     next: int
+    asked: bool = False
 
 
 @dataclass(eq=False)

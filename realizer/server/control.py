@@ -150,6 +150,7 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
             told |= _mesh_of(session, index)
         name = message.character
         subscription = session.broadcast.frames(stream, encoding, index, name, fps, t)
+        subscription.asked = message.asked
         if isinstance(old, FrameSubscription) and old.timeline is subscription.timeline:
             subscription.next = max(subscription.next, old.next)  # no frame twice
         told |= {"fps": fps, "frame": subscription.next}

@@ -83,6 +83,7 @@ class Subscribe(Message):
         None, pattern="^#[0-9a-fA-F]{6}$", description="video: a colour; None: the service's, or the light's"
     )
     quality: int = Field(85, ge=1, le=100, description="video: of the JPEG")
+    asked: bool = Field(False, description="au: as asked for, before the rules of co-occurrence")
     elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
     rate: int = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
 

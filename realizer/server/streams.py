@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -75,6 +75,11 @@ class Window:
         return np.ascontiguousarray(self.aus.aus.astype("<f4"))
 
     @cached_property
+    def asked(self) -> Float32:
+        """(n, n_au) float32, 0..1: as asked for, before the rules of co-occurrence."""
+        return np.ascontiguousarray(self.aus.asked.astype("<f4"))
+
+    @cached_property
     def poses(self) -> Float32:
         """(n, k) float32: what the face is drawn by."""
         return poses(self.aus, self._face().takes, self._mapping)
@@ -133,21 +138,29 @@ class Timeline:
         self._window = None
 
 
-def encode(
-    window: Window, stream: str, encoding: str, frame: int, character: int, name: str | None
-) -> str | bytes:
+class Wanted(Protocol):
+    """What a subscription wants of a window."""
+
+    stream: str
+    encoding: str
+    index: int
+    name: str | None
+    asked: bool
+
+
+def encode(window: Window, wanted: Wanted, frame: int) -> str | bytes:
     """Frame `frame` of the window as one WebSocket message."""
-    row, time = frame - window.first, frame / window.fps
-    if encoding == "json":
+    row, time, stream = frame - window.first, frame / window.fps, wanted.stream
+    aus = window.asked if wanted.asked else window.intensities
+    if wanted.encoding == "json":
         if stream == "fap":
-            return json_frame("fap", frame, time, window.integers[row].tolist(), name)
-        rounded = [round(v, 4) for v in window.intensities[row].tolist()]
-        return json_frame("au", frame, time, rounded, name)
+            return json_frame("fap", frame, time, window.integers[row].tolist(), wanted.name)
+        return json_frame("au", frame, time, [round(v, 4) for v in aus[row].tolist()], wanted.name)
     if stream == "fap":
-        return pack(FrameKind.FAP, frame, time, window.integers[row].tobytes(), character=character)
+        return pack(FrameKind.FAP, frame, time, window.integers[row].tobytes(), character=wanted.index)
     if stream == "au":
-        return pack(FrameKind.AU, frame, time, window.intensities[row].tobytes(), character=character)
-    return pack(FrameKind.MESH, frame, time, window.mesh[row].tobytes(), character=character)
+        return pack(FrameKind.AU, frame, time, aus[row].tobytes(), character=wanted.index)
+    return pack(FrameKind.MESH, frame, time, window.mesh[row].tobytes(), character=wanted.index)
 
 
 class Sound:

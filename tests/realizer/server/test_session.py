@@ -271,6 +271,18 @@ def test_idle_frames_come_without_any_document(driver) -> None:
     assert values.max() > 0.5, "an idle face blinks"
 
 
+def test_action_units_come_as_shown_or_as_asked_for(driver) -> None:
+    def jaw_and_lips(asked: bool) -> list[float]:
+        told = driver.send({"type": "subscribe", "stream": "au", "encoding": "json", "asked": asked})
+        names = told.of("subscribed")[-1]["names"]
+        values = driver.run(driver.now + 1.0).of("au")[-1]["values"]
+        return [values[names.index("25")], values[names.index("26")]]
+
+    driver.send({"type": "set", "aus": {"25": 1.0, "26": 1.0}})
+    assert jaw_and_lips(asked=False) == [0.0, 1.0]
+    assert jaw_and_lips(asked=True) == [1.0, 1.0]
+
+
 def test_unsubscribe_ends_a_stream(driver) -> None:
     driver.send(FAP)
     driver.run(0.2)
