@@ -79,6 +79,7 @@ def enrich(text: str, role: Any, mood: Any, language: str, words: Path | None, o
     from bml_schema import write
     from realizer.errors import TableError
     from realizer.knowledge.enrich import Enricher
+    from realizer.speech.utterance import MOST_TEXT
     from realizer.tables.emotional_words import word_list, words_of
 
     said = _read(text)
@@ -98,7 +99,7 @@ def enrich(text: str, role: Any, mood: Any, language: str, words: Path | None, o
     if isinstance(said, bytes) or said.lstrip().startswith("<"):
         blocks, before, faults = _documents(said, enricher)
     else:
-        blocks = list(enricher.texts(_writable(said)))
+        blocks = list(enricher.texts(_writable(said), MOST_TEXT))
     result = "".join(write(block) for block in blocks)
     if output is None:
         sys.stdout.write(result)

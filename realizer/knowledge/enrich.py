@@ -18,7 +18,11 @@ from realizer.tables.timing import gaps
 __all__ = ["Enricher", "template_of"]
 
 PREFIX = "template:"
-LONGEST = 20_000  # characters of a text in one block: with its expressions a fifth of what a document may be
+LEAST = 500  # characters of a long text that are not cut any further
+MARK, ESCAPE = (
+    len('<mark name="w1234"/>'),
+    len("&amp;") - 1,
+)  # what they add to the text that a voice is given
 OPENING = "\"'“‘„«‹([¿¡"
 INTENSITY = 0.7  # of what is placed: people talk with less than a full face
 NEVER = 0.2  # s; what would be shorter than that is not placed
@@ -55,11 +59,23 @@ class Enricher:
         speech = Speech(id="speech1", text=SpeechText(parts=(text,)))
         return self.block(Block(id=block, children=(speech,)))
 
-    def texts(self, text: str) -> Iterator[Block]:
-        """The same in blocks that documents can hold, each after the one before, cut between sentences."""
-        for number, piece in enumerate(_pieces(text, self.language), 1):
-            block = self.text(piece, f"bml{number}")
-            yield replace(block, composition="APPEND") if number > 1 else block
+    def texts(self, text: str, longest: int) -> Iterator[Block]:
+        """The same in blocks that can be played, each after the one before, cut between sentences.
+
+        Args:
+            longest: characters that a voice takes at once, marks included.
+        """
+        for number, block in enumerate(self._short(text, longest, longest // 2), 1):
+            yield replace(block, id=f"bml{number}", composition="APPEND" if number > 1 else "MERGE")
+
+    def _short(self, text: str, longest: int, most: int) -> Iterator[Block]:
+        """Blocks of at most `most` characters; of fewer where so many marks come in that it gets too long."""
+        for piece in _pieces(text, self.language, most):
+            block = self.text(piece)
+            if most > LEAST and any(_length(node) > longest for node in block.behaviours):
+                yield from self._short(piece, longest, most // 2)
+            else:
+                yield block
 
     def block(self, block: Block) -> Block:
         """A speaker's block with expressions at its words, and with company for the expressions it has.
@@ -142,15 +158,24 @@ class Enricher:
                 yield replace(other, intensity=node.intensity)
 
 
-def _pieces(text: str, language: str) -> Iterator[str]:
-    """The text in pieces of at most LONGEST characters, cut before a sentence, or a word, if there is one."""
+def _length(node: object) -> int:
+    """Characters that a voice is given, about; 0 of what is not spoken."""
+    if not isinstance(node, Speech) or node.text is None:
+        return 0
+    text = str(node.text)
+    marks = len(node.text.parts) // 2 + 1
+    return len(text) + MARK * marks + ESCAPE * sum(map(text.count, "&<>"))
+
+
+def _pieces(text: str, language: str, longest: int) -> Iterator[str]:
+    """The text in pieces of at most so many characters, cut before a sentence, or a word, if there is one."""
     begin = 0
-    if len(text) > LONGEST:
+    if len(text) > longest:
         said = sentences(text, language)
         starts = [sentence.words[0].place for sentence in said]
         words = [word.place for sentence in said for word in sentence.words]
-        while len(text) - begin > LONGEST:
-            most = begin + LONGEST
+        while len(text) - begin > longest:
+            most = begin + longest
             cut = next((at for at in (_last(starts, most), _last(words, most)) if at > begin), most)
             while cut - 1 > begin and text[cut - 1] in OPENING:
                 cut -= 1

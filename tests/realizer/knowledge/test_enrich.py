@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 import realizer
 from bml_schema import Block, Expression, Speech, parse, write
 from realizer.knowledge.enrich import Enricher, template_of
+from realizer.speech.utterance import MOST_TEXT
 from realizer.tables.knowledge import knowledge
 
 TEXT = "Are you really sure? This is nonsense! There was a terrible accident. Yes. Go away!"
@@ -137,12 +138,18 @@ def test_doing_it_twice_adds_nothing(text: str) -> None:
     assert Enricher().block(block) == block
 
 
-def test_a_long_text_becomes_several_documents_that_are_each_small_enough_to_be_read() -> None:
-    text = 'Are you sure? What a horror, he said; "nonsense!" ' * 2000
-    blocks = list(Enricher().texts(text))
+@pytest.mark.parametrize(
+    "text", ['Are you sure? What a horror, he said; "nonsense!" ' * 1000, "No! & yes. " * 2000, "x" * 30_000]
+)
+def test_a_long_text_becomes_several_documents_that_can_each_be_played(text: str) -> None:
+    blocks = list(Enricher().texts(text, MOST_TEXT))
     assert "".join(str(block["speech1"].text) for block in blocks) == text
-    assert len({block.id for block in blocks}) == len(blocks) > 3
+    assert len({block.id for block in blocks}) == len(blocks) > 2
     assert [block.composition for block in blocks] == ["MERGE"] + ["APPEND"] * (len(blocks) - 1)
-    assert all(not parse(write(block)).problems for block in blocks)
+    assert not any(realizer.schedule(write(block)).warnings for block in (blocks[0], blocks[-1]))
+
+
+def test_a_long_text_is_cut_before_a_sentence_and_a_short_one_stays_whole() -> None:
+    blocks = list(Enricher().texts('Are you sure? What a horror, he said; "nonsense!" ' * 1000, MOST_TEXT))
     assert all(str(block["speech1"].text).startswith(("Are", "What", '"')) for block in blocks)
-    assert [len(list(Enricher().texts(short))) for short in ("Hi.", "x" * 20_000, "x" * 20_001)] == [1, 1, 2]
+    assert [len(list(Enricher().texts(short, MOST_TEXT))) for short in ("Hi.", "no, " * 2500)] == [1, 1]
