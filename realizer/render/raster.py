@@ -75,7 +75,7 @@ class Raster:
     def over(self, behind: UInt8, out: UInt8) -> UInt8:
         """The last picture over (h, w, 4) opaque pixels, into (h, w, 3); as `realizer.render.backdrop.over`.
 
-        A seventh of its time: nothing is made on the way.
+        Makes nothing on the way, and shares the rows among the threads.
         """
         _, _, lay = _compiled()
 
