@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +21,32 @@ def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
         wanted: name -> number of dimensions.
 
     Raises:
-        FaceError: no such file, a missing array, or one of another shape.
+        FaceError: no such file, one that is damaged or no .npz, a missing array, or one of another shape.
     """
+    again = "copy or build the face again"
     try:
+        # Opened by zipfile: numpy takes what is no archive for a pickle or a single array.
+        with zipfile.ZipFile(path) as archive:
+            broken = archive.testzip()
+        if broken:
+            raise FaceError(f"{path}: {broken} is damaged; {again}")
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise FaceError(f"{path}: wanted this file, found none; build the face again") from None
-    except (OSError, ValueError) as error:
-        raise FaceError(f"{path}: {error}; build the face again") from None
+    except OSError as error:
+        raise FaceError(f"{path}: wanted an .npz file, got {error.strerror or error}; {again}") from None
+    except (zipfile.BadZipFile, EOFError, zlib.error, NotImplementedError):
+        raise FaceError(
+            f"{path}: wanted an .npz file, got one that is cut short or no archive; {again}"
+        ) from None
+    except ValueError:
+        raise FaceError(f"{path}: wanted arrays of numbers, got something else; {again}") from None
     for name, dimensions in wanted.items():
         if name not in arrays:
             raise FaceError(f"{path}: wanted an array {name!r}, found {', '.join(sorted(arrays))}")
         if arrays[name].ndim != dimensions:
             raise FaceError(f"{path}: {name}: wanted {dimensions} dimensions, got {arrays[name].shape}")
+        if arrays[name].dtype.kind not in "biuf":
+            raise FaceError(f"{path}: {name}: wanted numbers, got {arrays[name].dtype}; {again}")
     return arrays

@@ -55,6 +55,9 @@ def read_features(path: Path) -> dict[str, Point]:
         rows = read_csv(path.read_text("utf-8"), Point, str(path))
     except FileNotFoundError:
         raise FaceError(f"{path}: wanted this file with the 84 feature points, found none") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "bytes that are no UTF-8"
+        raise FaceError(f"{path}: wanted a CSV file with the 84 feature points, got {reason}") from None
     except TableError as error:
         raise FaceError(str(error)) from None
     points: dict[str, Point] = {}

@@ -121,12 +121,25 @@ def read_head(folder: Path) -> dict[str, Any]:
         raise FaceError(
             f"{path}: wanted this file with name, source, licence and parts, found none"
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise FaceError(f"{path}: wanted TOML, got bytes that are no UTF-8") from None
+    except OSError as error:
+        raise FaceError(f"{path}: wanted a TOML file, got {error.strerror}") from None
+    except tomllib.TOMLDecodeError as error:
         raise FaceError(f"{path}: {error}") from None
-    for key, kind in {"name": str, "source": str, "licence": str, "parts": dict}.items():
-        if not isinstance(head.get(key), kind):
-            raise FaceError(f"{path}: wanted {key} = a {kind.__name__}, got {head.get(key)!r}")
+    for key in ("name", "source", "licence"):
+        if not isinstance(head.get(key), str):
+            raise FaceError(f'{path}: wanted {key} = "...", got {_told(head, key)}')
+    for key, wanted in {"parts": "[parts]", "cameras": "tables [cameras.NAME]"}.items():
+        if not isinstance(head.get(key, None if key == "parts" else {}), dict):
+            raise FaceError(f"{path}: wanted {wanted}, got {_told(head, key)}")
+    if not isinstance(head.get("says", ""), str):
+        raise FaceError(f'{path}: wanted says = "...", got {_told(head, "says")}')
     return head
+
+
+def _told(head: dict[str, Any], key: str) -> str:
+    return repr(head[key]) if key in head else "none"
 
 
 def _places(directory: Path | str | None) -> Iterator[Path]:

@@ -42,6 +42,12 @@ def skin_of(folder: Path) -> slice:
     return slice(*load_face(folder.name, folder.parent).parts["skin"])
 
 
+def changed(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+
+
 def turned(triangles: np.ndarray) -> np.ndarray:
     triangles[40] = triangles[40, ::-1]
     return triangles
@@ -115,6 +121,42 @@ BROKEN: dict[str, tuple[Callable[[Path], None], tuple[str, ...]]] = {
     "shapes of another kind": (
         lambda f: rewrite(f / "au_shapes.npz", moves=lambda a: a[:, :-1]),
         ("au_shapes.npz: wanted moves",),
+    ),
+    "an archive cut short": (
+        lambda f: (f / "fields.npz").write_bytes((f / "fields.npz").read_bytes()[:20000]) and None,
+        ("fields.npz: wanted an .npz file, got one that is cut short",),
+    ),
+    "an empty archive": (
+        lambda f: (f / "mesh.npz").write_bytes(b"") and None,
+        ("mesh.npz: wanted an .npz file",),
+    ),
+    "an archive with a byte changed": (
+        lambda f: changed(f / "fields.npz"),
+        ("fields.npz: ", "is damaged"),
+    ),
+    "an array that is no archive": (
+        lambda f: (f / "au_shapes.npz").write_bytes(b"\x93NUMPY\x01\x00" + bytes(64)) and None,
+        ("au_shapes.npz: wanted an .npz file",),
+    ),
+    "vertices that are words": (
+        lambda f: rewrite(f / "mesh.npz", vertices=lambda a: a.astype(str)),
+        ("mesh.npz: vertices: wanted numbers, got",),
+    ),
+    "feature points that are no text": (
+        lambda f: (f / "features.csv").write_bytes(bytes(range(256))) and None,
+        ("features.csv: wanted a CSV file with the 84 feature points, got bytes that are no UTF-8",),
+    ),
+    "a folder where a file should be": (
+        lambda f: shutil.move(f / "features.csv", f / "au_shapes") and (f / "features.csv").mkdir(),
+        ("features.csv: wanted a CSV file with the 84 feature points, got Is a directory",),
+    ),
+    "a licence that is missing": (
+        lambda f: edit(f / "face.toml", "licence =", "says2 ="),
+        ('face.toml: wanted licence = "...", got none',),
+    ),
+    "a line for the list that is a number": (
+        lambda f: edit(f / "face.toml", "says =", "says = 3\nsays2 ="),
+        ('face.toml: wanted says = "...", got 3',),
     ),
 }
 
