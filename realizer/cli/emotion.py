@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +37,7 @@ WRITES = (".png", ".txt")
 )
 @click.option("--valence", type=options.Number(-1, 1), help="With --arousal, instead of an angle: -1 to 1.")
 @click.option("--arousal", type=options.Number(-1, 1), help="-1 to 1.")
-@click.option("--seed", type=int, help="Draw within the ranges instead of their middle.")
+@click.option("--seed", type=click.IntRange(0), help="Draw within the ranges instead of their middle.")
 @click.option(
     "-o",
     "--output",
@@ -81,7 +83,7 @@ def emotion(
         options.check_camera(face, camera)
     profile = _asked(word, profiles, angle, activation, valence, arousal, bool(chart))
     if profile is not None:
-        _tell(profile, seed, as_json)
+        _tell(profile, _mixed(profiles, angle, valence, arousal), seed, as_json)
         if output is not None:
             _write(profile, seed, output, face, camera)
     elif output is not None or as_json or seed is not None:
@@ -120,19 +122,37 @@ def _asked(
         raise click.UsageError(str(error)) from None
 
 
-def _tell(profile: Profile, seed: int | None, as_json: bool) -> None:
+def _mixed(
+    profiles: str, angle: float | None, valence: float | None, arousal: float | None
+) -> Mapping[str, float]:
+    """How much of which archetype is at a place; nothing of a word, whose name says what it is."""
+    from realizer.emotion import shares
+
+    if angle is not None:
+        return shares(angle, profiles)
+    if valence is not None and arousal is not None:
+        return shares(math.degrees(math.atan2(arousal, valence)), profiles, "affect")
+    return {}
+
+
+def _tell(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_json: bool) -> None:
     from realizer.tables import faps
 
     values = profile.frame() if seed is None else profile.draw(seed)
     names = {row.fap: row.name for row in faps()}
     if as_json:
         ranges = {names[fap]: list(ends) for fap, ends in profile.ranges.items()}
-        said = {"emotion": profile.name, "profiles": profile.source, "ranges": ranges}
+        said = {"emotion": " and ".join(mixed) or profile.name, "profiles": profile.source, "ranges": ranges}
+        if mixed:
+            said["shares"] = {name: round(share, 4) for name, share in mixed.items()}
         click.echo(json.dumps(said | {"values": [round(float(value), 3) for value in values]}))
         return
-    click.echo(f"{profile.name or 'neutral'} ({profile.source})")
-    for fap, (low, high) in profile.ranges.items():
-        click.echo(f"F{fap:<3} {names[fap]:<22} {low:8.1f} .. {high:7.1f}   {values[fap - 1]:8.1f}")
+    parts = " and ".join(f"{name} {share:.0%}" for name, share in mixed.items())
+    click.echo(f"{parts or profile.name or 'neutral'} ({profile.source})")
+    for fap, ends in profile.ranges.items():
+        # + 0.0: no minus before a zero
+        low, high, value = (round(float(number), 1) + 0.0 for number in (*ends, values[fap - 1]))
+        click.echo(f"F{fap:<3} {names[fap]:<22} {low:8.1f} .. {high:7.1f}   {value:8.1f}")
 
 
 def _write(profile: Profile, seed: int | None, path: Path, face: str, camera: str) -> None:

@@ -52,6 +52,16 @@ def test_places_go_by_angle_and_by_valence_and_arousal() -> None:
     assert np.allclose(by_affect["values"], affect(-0.6, 0.4).frame(), atol=1e-2)
 
 
+def test_a_place_says_how_much_of_which_emotion_is_there_and_no_minus_before_a_zero() -> None:
+    assert run("--angle", "-700").stdout.splitlines()[0] == "trust 56% and fear 44% (own)"
+    assert run("--angle", "45").stdout.splitlines()[0] == "fear 100% (own)"
+    assert json.loads(run("--angle", "20", "--json").stdout)["shares"] == {"trust": 0.5556, "fear": 0.4444}
+    middle = run("--valence", "0", "--arousal", "0").stdout
+    assert "joy" in middle
+    assert "-0.0" not in middle
+    assert run("--angle", "1e308").exit_code == 0
+
+
 def test_a_profile_is_written_as_a_file_of_pauls(tmp_path: Path) -> None:
     assert run("fear 3", "--profiles", "raw", "-o", str(tmp_path / "fear.txt")).exit_code == 0
     (back,) = read_profiles((tmp_path / "fear.txt").read_text())
@@ -85,6 +95,7 @@ def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path
         (["accepting"], "accepting: nobody rated how activated it is"),
         (["joy", "--angle", "3"], "wanted one of WORD, --angle, or --valence with --arousal"),
         ([], "wanted one of WORD"),
+        (["joy", "--seed", "-1"], "-1 is not in the range x>=0"),
         (["--valence", "0.3"], "wanted --valence and --arousal together"),
         (["--activation", "3"], "wanted --angle with --activation"),
         (["--angle", "3", "--activation", "40"], "40.0 is not in the range 0<=x<=7"),
