@@ -17,7 +17,9 @@ __all__ = ["Rule", "Rules", "Unit", "chosen", "parse_rule", "read_rules", "rules
 FILE = "cooccurrence.toml"
 Kind = Literal["domination", "exclusion", "inclusion", "opposition"]
 SIGNS: Mapping[str, str] = {"domination": "<", "exclusion": "@", "inclusion": "@", "opposition": "@"}
-UNIT = re.compile(r"(\d+)([A-Za-z]?)")
+SMALL = "X"  # the set that exclusion and inclusion go by
+MOST = 2  # units that dominate another together
+UNIT = re.compile(r"([0-9]+)([A-Za-z]?)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,15 +96,18 @@ def read_rules(text: str, name: str) -> Rules:
     table = tables.read_toml(text, name)
     faults = [f"{name}: wanted sections sets, {', '.join(SIGNS)}; got [{key}]" for key in _strange(table)]
     sets = {
-        key: _set(values, f"{name}, [sets] {key}", faults) for key, values in table.get("sets", {}).items()
+        key: _set(values, f"{name}, [sets] {key}", faults)
+        for key, values in _section(table, "sets", name, faults).items()
     }
     found: list[Rule] = []
     for kind in get_args(Kind):
-        for line in table.get(kind, {}).get("rules", ()):
+        for line in _lines(_section(table, kind, name, faults), f"{name}, [{kind}]", faults):
             try:
                 found.append(parse_rule(line, kind, sets))
             except TableError as error:
                 faults.append(f"{name}, [{kind}] {line!r}: {error}")
+    if SMALL not in sets and any(rule.kind in ("exclusion", "inclusion") for rule in found):
+        faults.append(f"{name}, [sets]: wanted {SMALL} = [1, 0, 0], or how else a unit is small, got none")
     faults += [f"{name}, {fault}" for fault in _contradictions(found)]
     if faults:
         raise TableError("\n".join(faults))
@@ -121,6 +126,8 @@ def parse_rule(text: str, kind: Kind, sets: Mapping[str, Any]) -> Rule:
         example = "16<12+18" if sign == "<" else "27@25"
         raise TableError(f"wanted two sides with {sign!r} between them, as {example}")
     names = right.split("+") if kind == "domination" else [right]
+    if len(names) > MOST:
+        raise TableError(f"wanted one unit or {MOST} together on the right, got {len(names)}")
     first = _unit(left, {})
     others = tuple(_unit(other, sets if kind == "domination" else {}) for other in names)
     if first.au in [other.au for other in others]:
@@ -145,6 +152,24 @@ def _unit(text: str, sets: Mapping[str, Any]) -> Unit:
 
 def _strange(table: Mapping[str, Any]) -> list[str]:
     return [key for key in table if key != "sets" and key not in SIGNS]
+
+
+def _section(table: Mapping[str, Any], key: str, name: str, faults: list[str]) -> Mapping[str, Any]:
+    section = table.get(key, {})
+    if isinstance(section, Mapping):
+        return section
+    faults.append(f"{name}: wanted a section [{key}], got {key} = {section!r}")
+    return {}
+
+
+def _lines(section: Mapping[str, Any], where: str, faults: list[str]) -> list[Any]:
+    """The rules of a section, which has nothing else."""
+    faults += [f"{where}: wanted rules = [...] alone, got {key}" for key in section if key != "rules"]
+    lines = section.get("rules", [])
+    if isinstance(lines, list):
+        return lines
+    faults.append(f'{where}: wanted rules = ["..."], got {lines!r}')
+    return []
 
 
 def _set(values: object, where: str, faults: list[str]) -> tuple[float, float, float]:

@@ -35,6 +35,7 @@ def test_a_dominated_unit_stands_left_and_an_excluded_one_right() -> None:
         ("domination", "5<99", "wanted an action unit that a face shows, got AU99"),
         ("domination", "12<15Q", "wanted X or Z after the number, got '15Q'"),
         ("domination", "12<12Z", "AU12 stands on both sides"),
+        ("domination", "5<6+7+9", "wanted one unit or 2 together on the right, got 3"),
         ("exclusion", "12@15Z", "wanted no letter here after the number, got '15Z'"),
         ("opposition", "51<52", "wanted two sides with '@' between them, as 27@25"),
     ],
@@ -61,3 +62,20 @@ def test_all_faults_of_a_file_are_said_at_once() -> None:
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"none\.toml: wanted a file of co-occurrence rules"):
         rules(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("sets = 3\n", "wanted a section [sets], got sets = 3"),
+        ("domination = 3\n", "wanted a section [domination], got domination = 3"),
+        ('[domination]\nrules = "5<63"\n', "[domination]: wanted rules = [\"...\"], got '5<63'"),
+        ('[domination]\nrule = ["5<63"]\n', "[domination]: wanted rules = [...] alone, got rule"),
+        ('[exclusion]\nrules = ["1@2"]\n', "[sets]: wanted X = [1, 0, 0], or how else a unit is small"),
+    ],
+)
+def test_a_file_of_another_shape_says_what_was_wanted(text: str, says: str) -> None:
+    with pytest.raises(TableError) as caught:
+        read_rules(f"# source: test\n# units: none\n# licence: MIT\n{text}", "mine.toml")
+    (line,) = str(caught.value).splitlines()
+    assert says in line
