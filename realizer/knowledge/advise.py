@@ -16,6 +16,7 @@ from realizer.tables.templates import templates
 __all__ = ["Advice", "Seen", "advise", "lasting"]
 
 NEAR = 1.0  # s; what is nearer than that is "in the neighbourhood" (6.3.3)
+FRAME = 0.04  # s; she counted frames
 FEW = 3  # expressions; of fewer no pace can be told
 RATIO = 2.0  # a pace that differs from the mood's by more than that is another mood's
 
@@ -62,7 +63,7 @@ def advise(
     """
     seen = sorted(seen, key=lambda one: one.start)
     for one in seen:
-        yield from _length(one)
+        yield from _length(one, mood)
         yield from _apart(one, seen)
         for company in knowledge().companies:
             if company.of == one.template and (company.keep or company.offered):
@@ -76,12 +77,20 @@ def advise(
     yield from _pace(seen, role, mood)
 
 
-def _length(one: Seen) -> Iterator[Advice]:
+def _length(one: Seen, mood: Mood | None) -> Iterator[Advice]:
+    """What nobody was seen to show so long, and what is unusual, for the mood too.
+
+    Of some templates the mean is beyond what table 6.15 calls probable; the mean is not unusual.
+    """
     template = templates()[one.template.upper()]
     source = "Wojdel 2005, table 6.15"
-    yield from lasting(
-        one.id, one.template, one.end - one.start, template.possible, template.probable, source
-    )
+    lasts, probable = one.end - one.start, template.probable
+    if probable is not None:
+        usual = mood.length if mood is not None else 1.0
+        most = max(probable[1], template.evident + FRAME) * max(usual, 1.0)
+        if probable[0] * min(usual, 1.0) <= lasts <= most:
+            probable = None
+    yield from lasting(one.id, one.template, lasts, template.possible, probable, source)
 
 
 def lasting(

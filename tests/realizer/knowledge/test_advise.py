@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import Block, Speech
+import realizer
+from bml_schema import Block, Speech, write
 from bml_schema.behaviours import SpeechText
 from realizer.knowledge.advise import Seen, advise
+from realizer.knowledge.enrich import Enricher, template_of
 from realizer.tables.knowledge import Role, knowledge
 
 EMPTY = Block(id="b")
@@ -33,6 +35,27 @@ def series(count: int, every: float, template: str = "surprise") -> list[Seen]:
 )
 def test_how_long_an_expression_lasts(lasts: float, says: list[str]) -> None:
     assert said(Seen("a", "anger", 1.0, 1.0 + lasts)) == says
+
+
+def test_what_a_sad_speaker_shows_longer_is_not_unusual_for_that_mood() -> None:
+    assert said(Seen("a", "anger", 1.0, 3.5), mood="sad") == []
+    assert said(Seen("a", "anger", 1.0, 3.5), mood="confused") != []
+    assert said(Seen("a", "anger", 1.0, 6.0), mood="sad") != []
+
+
+@pytest.mark.parametrize("mood", ["sad", "happy", "confused", "irritated", ""])
+def test_what_enrich_places_for_a_mood_is_usual_for_it(mood: str) -> None:
+    asked = knowledge().mood(mood) if mood else None
+    block = Enricher(mood=asked).text("Nonsense, he said. What a horror! Are you sure? Yes.")
+    times = realizer.schedule(write(block)).times
+    seen = [
+        Seen(node.id, template, (start + peak) / 2, (relax + end) / 2)
+        for node in block.behaviours
+        if (template := template_of(node))
+        for start, peak, relax, end in [times[node.id].tolist()]
+    ]
+    assert seen
+    assert not [one for one in said(*seen, mood=mood) if "can be seen for" in one]
 
 
 def test_sadness_keeps_away_from_what_ends_before_it() -> None:
