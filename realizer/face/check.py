@@ -13,16 +13,16 @@ from realizer.errors import FaceError, TableError
 from realizer.face.archive import read_arrays
 from realizer.face.basis import ARRAYS, ROWS
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
-from realizer.face.load import MESH, folder_of, load_face, read_head
+from realizer.face.load import MESH, folder_of, load_folder, read_head
 from realizer.face.model import Face
-from realizer.face.soundness import surface_faults, value_faults
+from realizer.face.soundness import NEEDED, range_faults, surface_faults, value_faults
 from realizer.tables import faps
 from realizer.tables.mappings import own_file, read_mapping
 
 __all__ = ["check_face"]
 
+FARTHEST = 20  # FAPU a FAP unit; no skin goes further than its feature point by that much
 OFF = 0.004  # m; a feature point further than this from its vertex is off the mesh
-NEEDED = ("skin", "left_eye", "right_eye")
 PARTS = (
     *NEEDED, "upper_teeth", "lower_teeth", "tongue", "brows", "lashes", "hair", "beard", "shirt", "other",
 )  # fmt: skip
@@ -76,7 +76,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
         found = surface_faults(np.asarray(mesh["vertices"], float), mesh["triangles"], ranges, mouth)
         faults += [f"{folder / 'mesh.npz'}: {fault}" for fault in found]
     if not faults:
-        face = tried(lambda: load_face(folder.name, folder.parent))
+        face = tried(lambda: load_folder(folder, None))
         faults += _field_faults(folder, face) if face else []
     return tuple(dict.fromkeys(faults))
 
@@ -108,24 +108,20 @@ def _key_faults(folder: Path, head: dict[str, Any]) -> list[str]:
 
 def _part_faults(folder: Path, parts: dict[str, Any], n: int | None) -> list[str]:
     path = folder / "face.toml"
-    faults = [f"{path}: parts: wanted {name!r}, got none" for name in NEEDED if name not in parts]
-    ranges = {}
-    for name, ends in parts.items():
-        if name not in PARTS:
-            faults.append(f"{path}: parts: {name!r}: there is no such part{_nearest(name, PARTS)}")
-        whole = isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, int) for end in ends)
-        if not whole or not 0 <= ends[0] < ends[1] or (n is not None and ends[1] > n):
-            most = "the number of vertices" if n is None else n
-            faults.append(f"{path}: parts: {name}: wanted [first, last + 1] in 0..{most}, got {ends}")
-        else:
-            ranges[name] = ends
-    ordered = sorted(ranges, key=lambda name: ranges[name])
-    faults += [
-        f"{path}: parts: {one} {ranges[one]} and {other} {ranges[other]} overlap: a vertex is of one part"
-        for one, other in pairwise(ordered)
-        if ranges[one][1] > ranges[other][0]
+    faults = [
+        f"parts: {name!r}: there is no such part{_nearest(name, PARTS)}"
+        for name in parts
+        if name not in PARTS
     ]
-    return faults
+    faults += (wrong := range_faults(parts, n))
+    if not wrong:
+        ordered = sorted(parts, key=lambda name: parts[name])
+        faults += [
+            f"parts: {one} {parts[one]} and {other} {parts[other]} overlap: a vertex is of one part"
+            for one, other in pairwise(ordered)
+            if parts[one][1] > parts[other][0]
+        ]
+    return [f"{path}: {fault}" for fault in faults]
 
 
 def _point_faults(folder: Path, points: dict[str, Point], vertices: Any, triangles: Any) -> list[str]:
@@ -166,6 +162,18 @@ def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
     for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
         if not np.isfinite(stored[name]).all():
             faults.append(f"{path}: {name}: wanted finite numbers, got NaN or infinity; {again}")
+    sides = stored["lid_eye"]
+    if len(sides) != len(stored["lid"]) or len(stored["lid_radius"]) != len(sides):
+        faults.append(f"{path}: lid, lid_eye, lid_radius: wanted as many of each; {again}")
+    if len(sides) and (sides.min() < 0 or sides.max() > 1):
+        faults.append(f"{path}: lid_eye: wanted 0 or 1, got {sides.min()}..{sides.max()}; {again}")
+    if stored["eye_centre"].shape != (2, 3) or stored["eye_centre"][0, 0] <= stored["eye_centre"][1, 0]:
+        faults.append(f"{path}: eye_centre: wanted the left eye's middle, then the right's; {again}")
+    farthest = np.abs(stored["move"]).max(initial=0)
+    if farthest > FARTHEST:
+        faults.append(
+            f"{path}: move: wanted at most {FARTHEST} times its point's way, got {farthest:g}; {again}"
+        )
     row, start = stored["row"], stored["start"]
     if len(row) and (row.min() < 3 or row.max() > ROWS or (np.diff(row) <= 0).any()):
         faults.append(

@@ -18,6 +18,7 @@ from realizer.face.archive import read_arrays
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.model import Face
+from realizer.face.soundness import range_faults, value_faults
 from realizer.tables import faps
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def load_face(
     """
     folder, chosen = folder_of(name, directory), _asked(deformer)
     try:
-        return _load(folder, chosen)
+        return load_folder(folder, chosen)
     except FaceError as error:
         raise FaceError(f"{error}; run realizer faces check {folder.name}") from None
 
@@ -180,8 +181,11 @@ def _model(folder: Path, deformer: str | None) -> Model | None:
             f"make it by `realizer faces fit {folder.name}`"
         )
     from realizer.face.au.file import read_model
+    from realizer.face.au.units import units
 
     model = read_model(folder / file)
+    if strange := sorted({*model.units, *model.degrees} - set(units())):
+        raise FaceError(f"{folder / file}: [AU{strange[0]}]: there is no such unit in the model")
     drawn = chosen.get("aus", list(model.units))
     if not isinstance(drawn, list) or not set(drawn) <= set(model.units):
         known = ", ".join(map(str, sorted(model.units)))
@@ -199,10 +203,15 @@ def _taken(model: Model | None) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=16)
-def _load(folder: Path, deformer: str | None) -> Face:
+def load_folder(folder: Path, deformer: str | None) -> Face:
+    """The face in that folder. Errors as `load_face`, without its advice."""
     head = read_head(folder)
     model = _model(folder, deformer)
     mesh = read_arrays(folder / "mesh.npz", MESH)
+    if values := value_faults(mesh):
+        raise FaceError(f"{folder / 'mesh.npz'}: {values[0]}")
+    if bad := range_faults(head["parts"], len(mesh["vertices"])):
+        raise FaceError(f"{folder / 'face.toml'}: {bad[0]}")
     points = read_features(folder / "features.csv")
     vertices = np.ascontiguousarray(mesh["vertices"], np.float32)
     feature_points = {name: point.vertex for name, point in points.items()}

@@ -11,6 +11,7 @@ from realizer.arrays import Float64, Int32
 
 __all__: list[str] = []
 
+NEEDED = ("skin", "left_eye", "right_eye")  # parts that every face has
 COLLAR = 1  # the clean cut at the bust's end is the hole that every head may have
 AT_EYE = 0.024  # m from an eyeball's middle; there skin may end at the lids
 AT_MOUTH = 0.045  # m from the lips' middle; there skin may end behind the lips
@@ -41,6 +42,17 @@ def value_faults(mesh: Mapping[str, Any]) -> list[str]:
             faults.append(f"{name}: wanted 0..255, got {array.min():g}..{array.max():g}; scale it")
         elif array.dtype != np.uint8:
             faults.append(f"{name}: wanted bytes (uint8) 0..255, got {array.dtype}; store it as uint8")
+    return faults
+
+
+def range_faults(parts: Mapping[str, Any], n: int | None) -> list[str]:
+    """Parts of face.toml that are missing, or no ranges of the mesh's n vertices (None: not known)."""
+    faults = [f"parts: wanted {name!r}, got none" for name in NEEDED if name not in parts]
+    for name, ends in parts.items():
+        whole = isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, int) for end in ends)
+        if not whole or not 0 <= ends[0] < ends[1] or (n is not None and ends[1] > n):
+            most = "the number of vertices" if n is None else n
+            faults.append(f"parts: {name}: wanted [first, last + 1] in 0..{most}, got {ends}")
     return faults
 
 

@@ -48,6 +48,11 @@ def changed(path: Path) -> None:
     path.write_bytes(data)
 
 
+def hollow(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
 def turned(triangles: np.ndarray) -> np.ndarray:
     triangles[40] = triangles[40, ::-1]
     return triangles
@@ -64,7 +69,7 @@ def masked(folder: Path) -> None:
     edit(path, line, f'{key}= "999990-999999"')
 
 
-BROKEN: dict[str, tuple[Callable[[Path], None], tuple[str, ...]]] = {
+BROKEN: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
     "an unknown key": (
         lambda f: edit(f / "face.toml", "licence =", 'lisence = "x"\nlicence ='),
         ("face.toml: 'lisence'", "did you mean 'licence'?"),
@@ -147,8 +152,24 @@ BROKEN: dict[str, tuple[Callable[[Path], None], tuple[str, ...]]] = {
         ("features.csv: wanted a CSV file with the 84 feature points, got bytes that are no UTF-8",),
     ),
     "a folder where a file should be": (
-        lambda f: shutil.move(f / "features.csv", f / "au_shapes") and (f / "features.csv").mkdir(),
+        lambda f: hollow(f / "features.csv"),
         ("features.csv: wanted a CSV file with the 84 feature points, got Is a directory",),
+    ),
+    "lids over a third eye": (
+        lambda f: rewrite(f / "fields.npz", lid_eye=lambda a: a + 7),
+        ("fields.npz: lid_eye: wanted 0 or 1, got 7..8",),
+    ),
+    "eyes that are exchanged": (
+        lambda f: rewrite(f / "fields.npz", eye_centre=lambda a: a[::-1]),
+        ("fields.npz: eye_centre: wanted the left eye's middle, then the right's",),
+    ),
+    "a field that throws a vertex off": (
+        lambda f: rewrite(f / "fields.npz", move=lambda a: np.where(a == a.max(), 600, a)),
+        ("fields.npz: move: wanted at most", "got 600"),
+    ),
+    "a deformer that there is not": (
+        lambda f: edit(f / "face.toml", "[parts]", 'deformer = "muscle"\n\n[parts]'),
+        ("face.toml: deformer: wanted mpeg4 or au, got 'muscle'",),
     ),
     "a licence that is missing": (
         lambda f: edit(f / "face.toml", "licence =", "says2 ="),
@@ -195,6 +216,49 @@ def test_loading_says_the_first_fault_and_how_to_see_all(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     with pytest.raises(FaceError, match=r"mesh\.npz.*run realizer faces check broken"):
         load_face("broken", folder.parent)
+
+
+UNUSABLE: dict[str, tuple[Callable[[Path], object], str]] = {
+    "a vertex that is NaN": (
+        lambda f: rewrite(f / "mesh.npz", vertices=lambda a: np.where(a == a.max(), np.nan, a)),
+        r"mesh\.npz: vertices: 1 are not finite",
+    ),
+    "flat vertices": (
+        lambda f: rewrite(f / "mesh.npz", vertices=lambda a: a[:, :2]),
+        r"mesh\.npz: vertices: wanted 3 columns, got 2",
+    ),
+    "a triangle of no vertex": (
+        lambda f: rewrite(f / "mesh.npz", triangles=lambda a: a - 1),
+        r"mesh\.npz: triangles: wanted indices",
+    ),
+    "half a part": (
+        lambda f: edit(f / "face.toml", "skin = [0,", "skin = ["),
+        r"face\.toml: parts: skin: wanted \[first, last \+ 1\]",
+    ),
+    "no left eye": (
+        lambda f: edit(f / "face.toml", "left_eye =", "other ="),
+        r"face\.toml: parts: wanted 'left_eye', got none",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", UNUSABLE)
+def test_a_face_that_cannot_be_drawn_is_refused_in_words_when_it_is_loaded(folder: Path, name: str) -> None:
+    spoil, words = UNUSABLE[name]
+    spoil(folder)
+    with pytest.raises(FaceError, match=words):
+        load_face("broken", folder.parent)
+
+
+def test_a_model_with_an_unknown_unit_does_not_draw_a_face(folder: Path) -> None:
+    edit(folder / "au_extended.toml", "[degrees]", "[degrees]\nAU99 = 3.0")
+    with pytest.raises(FaceError, match=r"au_extended\.toml: \[AU99\]: there is no such unit"):
+        load_face("broken", folder.parent, "au")
+
+
+def test_a_fault_that_the_check_found_does_not_say_to_check(folder: Path) -> None:
+    BROKEN["a deformer that there is not"][0](folder)
+    assert not any("run realizer faces check" in fault for fault in faults(folder))
 
 
 def test_without_a_name_every_face_is_checked(folder: Path) -> None:
