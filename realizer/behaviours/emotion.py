@@ -14,11 +14,10 @@ from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
 from realizer.emotion import emotion as profile_of
-from realizer.emotion import known_words, place_of, shares, wheel
+from realizer.emotion import known_words, place_of, shares, strength_of, wheel
 from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
-from realizer.tables.feelings import ring
 
 __all__ = ["KINDS", "values_of", "values_of_affect"]
 
@@ -101,9 +100,8 @@ def _shown(parts: Mapping[str, float], strength: float, intensity: float) -> dic
 def _mix(node: Emotion | Mood) -> tuple[Mapping[str, float], float]:
     """{archetype: its share}, and how strongly they show: 1 as drawn; ({}, 0) for the neutral face.
 
-    A place is as strong as its activation beside the rim's. A word is a kind of face, and `intensity` how
-    much of it shows: what Whissell rated counts beside its neighbours on Plutchik's ring, so that terrified
-    is more than afraid, and afraid as much as fear.
+    A place is as strong as its activation beside the rim's. A word is a kind of face, as strong as
+    `strength_of` has it, and `intensity` how much of it shows.
     """
     if node.angle is not None:
         most = emotion_model().most
@@ -111,11 +109,7 @@ def _mix(node: Emotion | Mood) -> tuple[Mapping[str, float], float]:
     place = place_of(node.name or "")
     if place is None:
         return {}, 0.0
-    parts = shares(place.angle, "own", place.ring)
-    if place.activation is None:
-        return parts, 1.0
-    usual = sum(share * (ring(place.ring)[name].activation or 0.0) for name, share in parts.items())
-    return parts, place.activation / usual
+    return shares(place.angle, "own", place.ring), strength_of(place)
 
 
 KINDS = (

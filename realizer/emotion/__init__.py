@@ -14,7 +14,7 @@ from realizer.emotion.profile_file import read_profiles, write_profiles
 from realizer.emotion.recognise import Recogniser, Recognition, recogniser
 from realizer.emotion.statistics import from_faces, from_statistics, published_statistics
 from realizer.emotion.wheel import affect, shares, wheel
-from realizer.emotion.words import UnknownWordError, WordPlace, emotion, known_words, place_of
+from realizer.emotion.words import UnknownWordError, WordPlace, emotion, known_words, place_of, strength_of
 
 __all__ = [
     "Anchor",
@@ -41,6 +41,7 @@ __all__ = [
     "recogniser",
     "same_category",
     "shares",
+    "strength_of",
     "wheel",
     "write_profiles",
 ]

@@ -12,10 +12,10 @@ from typing import NamedTuple
 from realizer.emotion.archetypes import archetypes
 from realizer.emotion.intermediate import between
 from realizer.emotion.profile import Profile
-from realizer.emotion.wheel import NEUTRAL, neighbours, wheel
+from realizer.emotion.wheel import NEUTRAL, neighbours, shares, wheel
 from realizer.tables.feelings import own_words, ring, whissell_words
 
-__all__ = ["UnknownWordError", "WordPlace", "emotion", "known_words", "place_of"]
+__all__ = ["UnknownWordError", "WordPlace", "emotion", "known_words", "place_of", "strength_of"]
 
 
 class WordPlace(NamedTuple):
@@ -41,7 +41,8 @@ def emotion(word: str, profiles: str = "own") -> Profile:
     - An emotion of the wheel of Paul 2010 ("anger", "remorse"), and "neutral": as its archetypes themselves.
     - A word that Whissell rated ("terrified", "guilty"): of the kind of an archetype, as their activations
       are to each other; else what lies between two archetypes at its angle. There the published sets go by
-      the published rules, our own by the wheel, which has no jumps.
+      the published rules, our own by the wheel, which has no jumps. Ours is as strong beside its archetypes
+      as the word is beside theirs (`strength_of`).
     - A word of our own list: as the one that it is like.
     - An archetype and a number ("fear 8"): that profile itself.
 
@@ -64,7 +65,24 @@ def emotion(word: str, profiles: str = "own") -> Profile:
     if place.between and profiles != "own" and place.activation is not None:
         (one, _), (two, _) = neighbours(place.angle, profiles, place.ring)
         return between(one, two, place.angle, place.activation, asked)
+    if profiles == "own":
+        full = wheel(place.angle, None, profiles, place.ring)
+        return full.scaled(strength_of(place), asked)
     return replace(wheel(place.angle, place.activation, profiles, place.ring), name=asked)
+
+
+def strength_of(place: WordPlace) -> float:
+    """How strongly our own archetypes show for a word: 1 as they are drawn.
+
+    A word is a kind of face: what Whissell rated counts beside its neighbours on Plutchik's ring, so that
+    terrified is more than afraid, and afraid as much as fear.
+    """
+    if place.activation is None:
+        return 1.0
+    parts = shares(place.angle, "own", place.ring)
+    return place.activation / sum(
+        share * (ring(place.ring)[name].activation or 0.0) for name, share in parts.items()
+    )
 
 
 def place_of(word: str) -> WordPlace | None:

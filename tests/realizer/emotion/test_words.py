@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion import UnknownWordError, archetypes, emotion, known_words, wheel
+from realizer.emotion import (
+    UnknownWordError,
+    WordPlace,
+    archetypes,
+    emotion,
+    known_words,
+    place_of,
+    strength_of,
+    wheel,
+)
 
 
 @pytest.mark.parametrize("profiles", ["own", "published", "raw"])
@@ -24,10 +33,10 @@ def test_words_tell_where_they_come_from() -> None:
     assert emotion("scared").ranges == emotion("afraid").ranges
 
 
-def test_an_emotion_of_the_wheel_is_its_archetype_and_a_rated_word_as_much_as_it_is_activated() -> None:
+def test_an_emotion_of_the_wheel_is_its_archetype_and_so_is_a_word_that_was_rated_as_it_was() -> None:
     anger = archetypes("own")["anger"][0]
     assert emotion("Anger").ranges == anger.ranges
-    assert emotion(" ANGRY ").ranges[31] == pytest.approx([end * 4.2 / 7 for end in anger.ranges[31]])
+    assert emotion(" ANGRY ").ranges[31] == pytest.approx(anger.ranges[31])
     assert emotion("anger", "published").ranges == archetypes("published")["anger"][3].ranges
     assert emotion("angry", "published").ranges == archetypes("published")["anger"][3].ranges
 
@@ -38,6 +47,22 @@ def test_a_word_of_a_category_goes_by_activation_and_not_by_angle() -> None:
     assert np.allclose(terrified * 4.9, afraid * 6.3, atol=1e-2)
 
 
+@pytest.mark.parametrize("word", ["terrified", "sad", "guilty", "delighted", "bashful", "anger", "remorse"])
+def test_our_own_word_is_its_place_on_the_ring_at_the_strength_that_documents_use(word: str) -> None:
+    place = place_of(word)
+    assert place is not None
+    wanted = wheel(place.angle, None, "own", place.ring).scaled(strength_of(place))
+    assert np.allclose(emotion(word).frame(), wanted.frame())
+    assert strength_of(place) == pytest.approx(1.0, abs=0.6)
+    assert strength_of(WordPlace("paul", 45.0)) == 1.0
+
+
+def test_terrified_is_more_than_fear_and_worried_less() -> None:
+    fear = emotion("fear").frame()
+    assert np.allclose(emotion("terrified").frame(), fear * 6.3 / 4.9, atol=1e-2)
+    assert np.allclose(emotion("worried").frame(), fear * 3.9 / 4.9, atol=1e-2)
+
+
 def test_an_archetype_and_a_number_is_that_profile() -> None:
     assert emotion("fear 3", "raw") is archetypes("raw")["fear"][3]
     with pytest.raises(UnknownWordError):
@@ -45,7 +70,10 @@ def test_an_archetype_and_a_number_is_that_profile() -> None:
 
 
 def test_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
-    assert emotion("guilty").ranges == wheel(102.3, 4, "own", "plutchik").ranges
+    guilty, place = emotion("guilty").ranges, wheel(102.3, None, "own", "plutchik").ranges
+    near_sad = (102.3 - 70.3) / (108.5 - 70.3)
+    strength = 4 / (near_sad * 3.9 + (1 - near_sad) * 4.9)
+    assert guilty[31] == pytest.approx([end * strength for end in place[31]])
     assert set(emotion("guilty", "published").ranges) < {3, 5, *range(19, 23), *range(31, 37)}
 
 
