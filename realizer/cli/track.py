@@ -58,9 +58,14 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
         raise click.UsageError(f"{output}: wanted a name that ends in .fap")
     (content,) = options.read_documents([points])
     try:
-        moving, rest = read_points(content.decode("utf-8"), points)
+        text = content.decode("utf-8-sig")  # spreadsheets write the mark
+    except UnicodeDecodeError as error:
+        byte = f"0x{content[error.start]:02X} at {error.start}"
+        raise click.UsageError(f"{points}: wanted a table in UTF-8, got byte {byte}") from None
+    try:
+        moving, rest = read_points(text, points)
         values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, points))
-    except (ValueError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise click.UsageError(str(error)) from None
     times = np.arange(len(values)) / fps
     output.write_text(encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), "utf-8")

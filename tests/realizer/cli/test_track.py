@@ -71,3 +71,14 @@ def test_a_table_of_something_else_is_said_with_its_line(tmp_path: Path) -> None
     done = run(str(tmp_path / "x.csv"), "-o", str(tmp_path / "x.fap"))
     assert done.exit_code == 2
     assert "wanted a first line frame,point,x,y,z, got 'a,b'" in " ".join(done.stderr.split())
+
+
+def test_a_table_in_another_encoding_is_named_and_a_mark_of_utf8_is_no_cell(tmp_path: Path) -> None:
+    table = tmp_path / "actor.csv"
+    table.write_bytes(b"frame,point,x,y,z\n0,\xe4,0,0,0\n")
+    done = run(str(table), "-o", str(tmp_path / "a.fap"))
+    assert done.exit_code == 2
+    assert "actor.csv: wanted a table in UTF-8, got byte 0xE4 at 20" in " ".join(done.output.split())
+    acted(table)
+    table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes())
+    assert run(str(table), "-o", str(tmp_path / "a.fap")).exit_code == 0
