@@ -100,6 +100,10 @@ def _matrix(node: dict[str, Any]) -> Float64:
     return out
 
 
+def _name(item: dict[str, Any]) -> str:
+    return str(item.get("name", ""))
+
+
 def _piece(
     gltf: Gltf, node: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any], world: Float64,
     worlds: dict[int, Float64], where: str,
@@ -109,6 +113,8 @@ def _piece(
         raise FaceError(f"{where}: wanted POSITION, got {', '.join(attributes) or 'no attribute'}")
     at = gltf.accessor(attributes["POSITION"])
     n = len(at)
+    if at.shape[1:] != (3,) or not np.isfinite(at).all() or not np.isfinite(world).all():
+        raise FaceError(f"{where}: POSITION: wanted finite x, y, z of each vertex; export the head again")
     if "indices" in primitive:
         corners = gltf.accessor(primitive["indices"]).ravel().astype(np.int64)
     else:
@@ -129,9 +135,11 @@ def _piece(
             move = gltf.accessor(target["POSITION"])
             if len(move) != n:
                 raise FaceError(f"{where}: shape {name!r}: wanted {n} moves, one a vertex, got {len(move)}")
+            if move.shape != at.shape or not np.isfinite(move).all():
+                raise FaceError(f"{where}: shape {name!r}: wanted finite x, y, z of each move; export again")
             moves[name] = np.einsum("nij,nj->ni", matrices[:, :3, :3], move)
     return Piece(
-        names=(material.get("name", ""), mesh.get("name", ""), node.get("name", "")),
+        names=(_name(material), _name(mesh), _name(node)),
         vertices=np.einsum("nij,nj->ni", matrices[:, :3, :3], at) + matrices[:, :3, 3],
         triangles=triangles.astype(np.int32),
         colours=colours,

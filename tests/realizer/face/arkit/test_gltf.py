@@ -35,6 +35,16 @@ def split(path: Path) -> tuple[dict[str, Any], bytes]:
     return json.loads(raw[20 : 20 + size]), raw[28 + size :]
 
 
+def written(path: Path, document: dict[str, Any], data: bytes) -> Path:
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = (
+        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    )
+    path.write_bytes(struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks)
+    return path
+
+
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (10.0, "decimetres"), (100.0, "centimetres")])
 def test_unit_and_facing_are_told_by_the_shapes(
@@ -109,6 +119,35 @@ def test_a_broken_document_is_refused_with_the_file(
     path.write_text(json.dumps(document), "utf-8")
     with pytest.raises(FaceError, match=r"head\.gltf"):
         look_at(path)
+
+
+SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "flat places": (
+        lambda j: j["accessors"][j["meshes"][0]["primitives"][0]["attributes"]["POSITION"]].update(
+            type="VEC2"
+        ),
+        "POSITION: wanted finite x, y, z",
+    ),
+    "a node that is nowhere": (
+        lambda j: j["nodes"][0].update(translation=[float("nan"), 0, 0]),
+        "POSITION: wanted finite x, y, z",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_places_that_are_none_are_refused_as_such(ada_glb: Path, tmp_path: Path, name: str) -> None:
+    document, data = split(ada_glb)
+    spoil, words = SPOILT[name]
+    spoil(document)
+    with pytest.raises(FaceError, match=words):
+        look_at(written(tmp_path / "odd.glb", document, data))
+
+
+def test_a_name_that_is_a_number_is_a_name(ada_glb: Path, tmp_path: Path) -> None:
+    document, data = split(ada_glb)
+    document["meshes"][0]["name"] = 3
+    assert look_at(written(tmp_path / "odd.glb", document, data)).lines
 
 
 def test_a_gltf_with_its_data_inside_or_beside_is_read(ada_glb: Path, tmp_path: Path) -> None:
