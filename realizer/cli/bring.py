@@ -36,10 +36,11 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
 @click.argument("names", nargs=-1, metavar="[NAME | HEAD.glb]...")
 def check(names: tuple[str, ...]) -> int:
     """Say every fault of face folders, of all without a name; of a GLB head, what an import would find."""
-    from realizer.face import check_face, list_faces
+    from realizer.face import check_face
+    from realizer.face.load import face_folders
 
     status = 0
-    for name in names or [face.name for face in list_faces()]:
+    for name in names or face_folders():
         head = Path(name)
         faults = _head_faults(head) if head.suffix.lower() in HEADS else check_face(name)
         for fault in faults:

@@ -29,10 +29,13 @@ faces.add_command(sheet)
 @faces.command("list")
 def list_() -> None:
     """A line for each face, its name first."""
-    from realizer.face import list_faces
+    from realizer.face.load import face_folders, list_faces
 
-    for face in list_faces():
+    found = list_faces()
+    for face in found:
         click.echo(f"{face.name:<12} {face.says}  [{face.licence}]")
+    for name in face_folders().keys() - {face.name for face in found}:
+        click.echo(f"{name}: cannot be read; run realizer faces check {name}", err=True)
 
 
 @faces.command()

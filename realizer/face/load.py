@@ -80,16 +80,25 @@ def takes(
 
 
 def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
-    """Every face folder that `load_face` would find, by name; the first place that has a name wins."""
-    found: dict[str, FaceInfo] = {}
+    """Every face that `load_face` would find, by name; not those whose face.toml cannot be read."""
+    found = []
+    for name, folder in face_folders(directory).items():
+        try:
+            head = read_head(folder)
+        except FaceError:
+            continue  # one that is damaged hides no other; check_face says its faults
+        found.append(FaceInfo(name, folder, head["source"], head["licence"], head.get("says", "")))
+    return tuple(found)
+
+
+def face_folders(directory: Path | str | None = None) -> dict[str, Path]:
+    """Every folder with a face.toml, by name, damaged or not; the first place that has a name wins."""
+    found: dict[str, Path] = {}
     for place in _places(directory):
-        for folder in sorted(place.iterdir()) if place.is_dir() else ():
-            if (folder / "face.toml").is_file() and folder.name not in found:
-                head = read_head(folder)
-                found[folder.name] = FaceInfo(
-                    folder.name, folder, head["source"], head["licence"], head.get("says", "")
-                )
-    return tuple(found[name] for name in sorted(found))
+        for folder in place.iterdir() if place.is_dir() else ():
+            if (folder / "face.toml").is_file():
+                found.setdefault(folder.name, folder)
+    return dict(sorted(found.items()))
 
 
 def folder_of(name: str, directory: Path | str | None = None) -> Path:

@@ -261,6 +261,18 @@ def test_a_fault_that_the_check_found_does_not_say_to_check(folder: Path) -> Non
     assert not any("run realizer faces check" in fault for fault in faults(folder))
 
 
+def test_a_damaged_face_hides_no_other_from_the_list(folder: Path) -> None:
+    (folder / "face.toml").write_text("name = 3\n")
+    ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)})
+    listed = ran.invoke(faces, ["list"])
+    assert listed.exit_code == 0
+    assert "Ada, a woman" in listed.output
+    assert "broken: cannot be read; run realizer faces check broken" in listed.output
+    checked = ran.invoke(faces, ["check"], standalone_mode=False)
+    assert checked.return_value == 1
+    assert 'face.toml: wanted name = "...", got 3' in checked.output
+
+
 def test_without_a_name_every_face_is_checked(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)}).invoke(
