@@ -33,7 +33,7 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
 
 
 @click.command()
-@click.argument("names", nargs=-1, metavar="[NAME | HEAD.glb]...")
+@click.argument("names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...")
 def check(names: tuple[str, ...]) -> int:
     """Say every fault of face folders, of all without a name; of a GLB head, what an import would find."""
     from realizer.face import check_face
@@ -42,7 +42,13 @@ def check(names: tuple[str, ...]) -> int:
     status = 0
     for name in names or face_folders():
         head = Path(name)
-        faults = _head_faults(head) if head.suffix.lower() in HEADS else check_face(name)
+        if head.suffix.lower() in HEADS:
+            faults = _head_faults(head)
+        elif head.name != name and head.is_dir():
+            folder = head.resolve()
+            faults = check_face(folder.name, folder.parent)
+        else:
+            faults = check_face(name)
         for fault in faults:
             click.echo(fault)
         if not faults:

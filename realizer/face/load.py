@@ -109,7 +109,9 @@ def folder_of(name: str, directory: Path | str | None = None) -> Path:
     """
     name = face_name(name)
     if not name or Path(name).name != name:
-        raise FaceError(f"face: wanted a face's name, got {name!r}")
+        raise FaceError(
+            f"face: wanted a face's name, not a path, got {name!r}; {VARIABLE} says where else faces lie"
+        )
     places = list(_places(directory))
     for place in places:
         if (place / name).is_dir():

@@ -273,6 +273,15 @@ def test_a_damaged_face_hides_no_other_from_the_list(folder: Path) -> None:
     assert 'face.toml: wanted name = "...", got 3' in checked.output
 
 
+def test_a_folder_that_an_import_wrote_is_checked_by_its_path(folder: Path) -> None:
+    (folder / "mesh.npz").unlink()
+    checked = CliRunner().invoke(faces, ["check", str(folder)], standalone_mode=False)
+    assert checked.return_value == 1
+    assert "mesh.npz: wanted this file, found none" in checked.output
+    with pytest.raises(FaceError, match="REALIZER_FACES says where else faces lie"):
+        load_face(str(folder))
+
+
 def test_without_a_name_every_face_is_checked(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)}).invoke(
