@@ -10,7 +10,7 @@ from bml_schema.values import integer, number, one_of, string, word
 __all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood", "Timeline"]
 
 _ANGLE = number(-360, 360)  # degrees on the wheel of emotions
-_ACTIVATION = number(1, 7)  # on Whissel's scale
+_ACTIVATION = number(0, 7)  # 7 is all of an emotion, as Paul scales Whissel
 _FAPU = number(-1e5, 1e5)
 
 
@@ -20,7 +20,7 @@ class Feeling(Behaviour):
 
     Attributes:
         name: its word.
-        angle, activation: instead of a word, its place on the wheel; activation 1..7, None the angle's own.
+        angle, activation: instead of a word, its place on the wheel; activation 0..7, None the angle's own.
         intensity: 0.5 moderate, 1 maximal.
         profile: which of several ways to show it; None the usual one.
     """

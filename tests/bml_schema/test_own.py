@@ -36,7 +36,7 @@ def test_an_emotion_has_a_word_or_a_place_on_the_wheel() -> None:
         ("", "wanted a name, or an angle on the wheel, got neither"),
         ("name='joy' angle='10'", "wanted a name, or an angle on the wheel, got both"),
         ("name='joy' activation='2'", "activation: wanted an angle with it, got none"),
-        ("angle='10' activation='8'", "activation: wanted 1..7, got 8"),
+        ("angle='10' activation='8'", "activation: wanted 0..7, got 8"),
         ("name='joy' intensity='1.5'", "intensity: wanted 0..1, got 1.5"),
     ],
 )
