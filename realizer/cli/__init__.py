@@ -20,7 +20,7 @@ from realizer.cli.play import realize, schedule
 from realizer.cli.serve import serve
 from realizer.cli.timeline import timeline
 from realizer.cli.track import track
-from realizer.errors import RealizerError
+from realizer.errors import RealizerError, TableError
 
 __all__ = ["main"]
 
@@ -79,6 +79,9 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
+    except TableError as error:  # a file of the user's own: rules, a mapping, words
+        click.echo(f"realizer: {error}", err=True)
+        sys.exit(2)
     except RealizerError as error:
         click.echo(f"realizer: {error}", err=True)
         sys.exit(3)

@@ -192,3 +192,10 @@ def test_a_target_that_is_not_there_is_no_dropped_behaviour(tmp_path: Path) -> N
     done = run("schedule", "-", "--strict", "--scene", str(scene), stdin=gaze)
     assert done.returncode == 0
     assert "NO_SUCH_TARGET" in done.stderr
+
+
+def test_a_file_of_rules_that_cannot_be_read_is_wrong_usage(tmp_path: Path) -> None:
+    (tmp_path / "rules.toml").write_text("[domination]\nrules = ['5<99']\n")
+    done = run("realize", "-", "--cooccurrence", str(tmp_path / "rules.toml"), stdin=GOOD)
+    assert done.returncode == 2
+    assert "rules.toml" in done.stderr
