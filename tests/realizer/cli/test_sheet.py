@@ -21,7 +21,7 @@ def test_the_archetypes_from_two_sides_stand_beside_what_changed(tmp_path: Path)
     path = tmp_path / "x.png"
     done = sheet("-o", str(path), "--emotions", "--size", "60x80", "--camera", "front", "--camera", "profile")
     assert done.exit_code == 0
-    assert "7 poses" in done.stderr
+    assert "75 poses" in done.stderr  # neutral, six archetypes, 17 angles at 4 activations
     pixels = np.asarray(Image.open(path))
     assert pixels.shape[1] > 2 * 4 * 60
     # Differences are drawn in hues that no face has: violet, where they are small.
