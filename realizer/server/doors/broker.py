@@ -16,6 +16,7 @@ from realizer.server.doors.dialect import Message
 __all__ = ["Link", "check_installed"]
 
 HEARTBEAT = 10_000  # ms, both ways: what else would tell that the broker's machine is gone
+REASON = 0.1  # s between the loss of a connection and its telling, so that the reason is known by then
 # Messages that have come in and are not handled: so a session keeps step, and the broker waits with more.
 AHEAD = 1
 
@@ -143,7 +144,8 @@ class Link:
 
     def on_disconnected(self) -> None:
         self._in_loop(self._settle, False, "")
-        self._in_loop(self.lost.set)
+        # stomp.py closes the socket of a silent broker before it says so; the reading thread may be first.
+        self._in_loop(self._loop.call_later, REASON, self.lost.set)
         self._in_loop(self.reading.set)
 
     def on_heartbeat_timeout(self) -> None:
