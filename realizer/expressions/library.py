@@ -14,7 +14,7 @@ from realizer.expressions.expression import Expression, key
 from realizer.expressions.own import read_folder
 from realizer.tables.expression_words import expression_words
 from realizer.tables.lexemes import face_lexemes
-from realizer.tables.templates import Template, templates
+from realizer.tables.templates import Template, apex, templates
 from realizer.tables.timing import Gap, gaps
 
 __all__ = ["Library", "library_of", "shipped"]
@@ -114,7 +114,6 @@ def _of_template(template: Template) -> Expression:
     evident = template.evident
     if template.probable is not None:
         evident = float(np.clip(evident, *template.probable))
-    held = max(evident - onset.preferred / 2 - offset.preferred / 2, 0.0)
     stiffness = hold.stiffness if template.deviation is None else template.deviation**-2
     name = PREFIX + template.name.lower()
     return Expression(
@@ -122,7 +121,7 @@ def _of_template(template: Template) -> Expression:
         template.features,
         expression_words()[name].words,
         template.aus,
-        (onset, Gap("hold", held, 0.0, stiffness, "Wojdel 2005 tables 6.4 and 6.15"), offset),
+        (onset, Gap("hold", apex(evident), 0.0, stiffness, "Wojdel 2005 tables 6.4 and 6.15"), offset),
         template.possible,
         template.probable,
         "Wojdel 2005 table 6.2; action units ours, from its words",

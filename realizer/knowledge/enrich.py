@@ -12,8 +12,7 @@ from realizer.knowledge.placing import Placement, place
 from realizer.knowledge.sentences import sentences
 from realizer.tables.emotional_words import WordList, word_list
 from realizer.tables.knowledge import Company, Knowledge, Mood, Role, knowledge
-from realizer.tables.templates import Template, templates
-from realizer.tables.timing import gaps
+from realizer.tables.templates import Template, apex, templates
 
 __all__ = ["Enricher", "template_of"]
 
@@ -141,7 +140,7 @@ class Enricher:
         if end is not None:
             syncs["end"] = end
         elif self.mood is not None:
-            held = _evident(templates()[name.upper()], self.mood.length)
+            held = _held(templates()[name.upper()], self.mood.length)
             syncs["relax"] = SyncRef(behaviour=id, sync="attackPeak", offset=round(held, 3))
         return Expression(id=id, name=PREFIX + name, intensity=INTENSITY, because=because, syncs=syncs)
 
@@ -235,13 +234,12 @@ def _refers(node: Expression, id: str) -> bool:
     return any(ref.behaviour == id for ref in node.syncs.values())
 
 
-def _evident(template: Template, length: float) -> float:
+def _held(template: Template, length: float) -> float:
     """Seconds from attackPeak to relax, so that it can be seen `length` times as long as usual."""
-    attack, _, relax = gaps("face").gaps
     seen = template.evident * length
     if template.possible is not None:
         seen = min(max(seen, template.possible[0]), template.possible[1])
-    return max(seen - attack.preferred / 2 - relax.preferred / 2, 0.0)
+    return apex(seen)
 
 
 def _marks(parts: Sequence[str | Sync]) -> dict[int, str]:

@@ -9,8 +9,9 @@ from functools import cache
 from realizer import tables
 from realizer.errors import TableError
 from realizer.tables.lexemes import read_aus
+from realizer.tables.timing import gaps
 
-__all__ = ["Template", "templates"]
+__all__ = ["Template", "apex", "templates"]
 
 FILE = "templates.toml"
 FRAME = 1 / 25  # s; she labelled films of 25 frames a second
@@ -35,6 +36,12 @@ class Template:
     deviation: float | None = None
     possible: tuple[float, float] | None = None
     probable: tuple[float, float] | None = None
+
+
+def apex(seen: float) -> float:
+    """Seconds from attackPeak to relax of what can be seen for `seen`: half of rising and going counts."""
+    onset, _, offset = gaps("face").gaps
+    return max(seen - onset.preferred / 2 - offset.preferred / 2, 0.0)
 
 
 @cache

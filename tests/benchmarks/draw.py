@@ -8,17 +8,16 @@ from __future__ import annotations
 import argparse
 import os
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
 
 import numpy as np
+from stopwatch import median
 
 from realizer.face import deform, load_face, normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
@@ -30,18 +29,6 @@ from realizer.render.offscreen import Canvas
 from realizer.render.onboard import OnboardCanvas
 from realizer.render.ways import WAYS
 from realizer.render.worker import encode_jpeg
-
-
-def median(work: Callable[[], object], repeats: int) -> float:
-    """Milliseconds; the first run, which fills caches, does not count."""
-    work()
-    spent = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        work()
-        spent.append(time.perf_counter() - began)
-    return 1000 * statistics.median(spent)
-
 
 # Spoken by the silent voice in about ten seconds.
 TEXT = (

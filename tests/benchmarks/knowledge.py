@@ -6,11 +6,9 @@ python tests/benchmarks/knowledge.py
 from __future__ import annotations
 
 import random
-import statistics
-import time
-from collections.abc import Callable
 
 import numpy as np
+from stopwatch import median
 
 from realizer.animation.cooccurrence import cooccur
 from realizer.animation.targets import AU_NAMES
@@ -22,17 +20,6 @@ SENTENCES = (
     "Yes.", "I am not afraid of you, but of what comes after you.", "Go away!",
     "The train leaves at nine and arrives at noon.",
 )  # fmt: skip
-
-
-def median(work: Callable[[], object], repeats: int = 15) -> float:
-    """Milliseconds; the first run, which fills caches, does not count."""
-    work()
-    spent = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        work()
-        spent.append(time.perf_counter() - began)
-    return 1000 * statistics.median(spent)
 
 
 def main() -> None:
