@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from bml_schema import Behaviour, Block
     from realizer.player import Player
     from realizer.scheduling.timing import Schedule, Warning
+    from realizer.speech.utterance import Utterance
     from realizer.tables.knowledge import Mood, Role
 
 __all__: list[str] = []
@@ -96,10 +97,12 @@ def check(
         )
         source = Source(text)
         blocks = found = 0
+        voice = SilentVoice()
         for item in read(text, VOCABULARY):
             if isinstance(item, Block):
                 blocks += 1
-                schedule, warnings = examine(item, player)
+                said = speak(player.wants(item), voice)
+                schedule, warnings = examine(item, player, said)
             else:
                 schedule, warnings = None, [warning_of(item)]
             found += len(warnings)
@@ -107,7 +110,6 @@ def check(
             for finding in sorted(findings, key=lambda finding: finding.spot or (0,)):
                 show(finding, source)
             if isinstance(item, Block) and schedule is not None and not context.obj["quiet"]:
-                said = speak(player.wants(item), SilentVoice())
                 slips = advice(name, source, item, schedule, player)
                 unusual = habits(name, source, item, schedule, said, role, mood)
                 for finding in islice(chain(slips, unusual), MOST_ADVICE):
@@ -135,17 +137,20 @@ def _check_timeline(
     return len(faults)
 
 
-def examine(block: Block, player: Player) -> tuple[Schedule, list[Warning]]:
-    """The schedule of a block, and everything that is wrong with it, also where one fault ends it all."""
+def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tuple[Schedule, list[Warning]]:
+    """The schedule of a block, and everything that is wrong with it, also where one fault ends it all.
+
+    Args:
+        said: what the silent voice made of its speeches.
+    """
     from dataclasses import replace
 
-    from realizer.pipeline import speak, submitted
+    from realizer.pipeline import submitted
     from realizer.scheduling.timing import Warning
     from realizer.speech import SilentVoice
 
     warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
-    voice = SilentVoice()
-    world = replace(player.world, utterances=speak(player.wants(block), voice))
+    world = replace(player.world, utterances=dict(said))
     bad: set[str] = set()
     for node in block.behaviours:
         kind = player.kinds.get(node.tag)
@@ -157,7 +162,7 @@ def examine(block: Block, player: Player) -> tuple[Schedule, list[Warning]]:
             bad.add(node.id)
     # What was told must not end the block before its constraints are looked at.
     whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
-    schedule = submitted(player, whole, voice)
+    schedule = submitted(player, whole, SilentVoice())
     told = {(warning.id, warning.text) for warning in warnings}
     return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
 
