@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import importlib.util
 import threading
-from collections import OrderedDict
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from realizer.errors import VoiceError
+from realizer.speech.engine_process import Engine, EngineProcess
 from realizer.speech.espeak_events import timeline, write_document
-from realizer.speech.espeak_process import EspeakProcess, missing
+from realizer.speech.kept import Kept
 from realizer.speech.ssml import Break, read_script
 from realizer.speech.utterance import STRETCH, Say, Utterance
 
@@ -19,9 +21,20 @@ __all__ = ["EspeakVoice", "choose_voice", "missing"]
 
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
 SLOWEST, FASTEST = 80, 450  # words a minute; what it accepts
-KEPT = 64  # utterances
-KEPT_SAMPLES = 30_000_000  # about 60 MB
 KEPT_WORDS = 4096
+INSTALL = "no voice with sound: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
+
+
+def missing() -> str | None:
+    """None where espeak-ng is installed; otherwise the sentence that says what to install."""
+    if importlib.util.find_spec("espeakng_loader") is not None:
+        return None
+    import ctypes.util  # slow, and only needed without the package
+
+    return None if ctypes.util.find_library("espeak-ng") else INSTALL
+
+
+ENGINE = Engine("espeak-ng", Path(__file__).with_name("espeak_worker.py"), missing)
 
 
 class EspeakVoice:
@@ -33,7 +46,7 @@ class EspeakVoice:
     Args:
         voice: a voice of espeak-ng ("nl", "en-gb+f3", "+m3" for the language's own with a variant), or None.
         limit: seconds that one request may take.
-        options: for the worker process.
+        options: for the worker process ("--data", PATH; "--no-fork").
     """
 
     def __init__(
@@ -41,9 +54,9 @@ class EspeakVoice:
     ) -> None:
         self.name = f"espeak:{voice}" if voice else "espeak"
         self._voice = voice
-        self._process = EspeakProcess(options, limit)
+        self._process = EngineProcess(ENGINE, options, limit)
         self._lock = threading.Lock()
-        self._kept: OrderedDict[Say, Utterance] = OrderedDict()
+        self._kept = Kept()
         self._alone: dict[tuple[str, str], tuple[str, ...]] = {}
 
     def say(self, request: Say) -> Utterance:
@@ -55,16 +68,7 @@ class EspeakVoice:
         Raises:
             VoiceError: the text is too long, or the engine is missing, died or hung.
         """
-        with self._lock:
-            kept = self._kept.get(request)
-            if kept is not None:
-                self._kept.move_to_end(request)
-                return kept
-        utterance = self._spoken(request)
-        with self._lock:
-            self._kept[request] = utterance
-            self._forget()
-        return utterance
+        return self._kept.get(request, self._spoken)
 
     def close(self) -> None:
         """End the process; may be called twice. A later request starts it again."""
@@ -122,12 +126,6 @@ class EspeakVoice:
             with self._lock:
                 self._alone = known if len(known) <= KEPT_WORDS else {}
         return [known[voice, word] for word in words]
-
-    def _forget(self) -> None:
-        samples = sum(0 if u.pcm is None else len(u.pcm) for u in self._kept.values())
-        while len(self._kept) > KEPT or (samples > KEPT_SAMPLES and self._kept):
-            _, oldest = self._kept.popitem(last=False)
-            samples -= 0 if oldest.pcm is None else len(oldest.pcm)
 
 
 def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tuple[str, tuple[str, ...]]:

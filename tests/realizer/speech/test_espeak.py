@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from realizer.errors import VoiceError
-from realizer.speech.espeak import KEPT, EspeakVoice, choose_voice
+from realizer.speech.espeak import ENGINE, EspeakVoice, choose_voice
 from realizer.speech.espeak_worker import Event, label
+from realizer.speech.kept import MOST
 from realizer.speech.utterance import Say, Utterance
 
 pytestmark = pytest.mark.espeak
@@ -187,7 +188,7 @@ def test_only_so_many_utterances_are_kept() -> None:
     lone = EspeakVoice()
     try:
         first = lone.say(Say("0"))
-        for k in range(1, KEPT + 1):
+        for k in range(1, MOST + 1):
             lone.say(Say(str(k)))
         assert lone.say(Say("0")) is not first
         assert same(lone.say(Say("0")), first)
@@ -261,10 +262,8 @@ def test_the_engine_ends_with_its_parent() -> None:
     import subprocess
     import sys
 
-    from realizer.speech.espeak_process import WORKER
-
     worker = subprocess.Popen(
-        [sys.executable, "-P", str(WORKER)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-P", str(ENGINE.worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert worker.stdin is not None
     assert worker.stdout is not None

@@ -1,49 +1,55 @@
-"""The client's end of the espeak-ng process: a request in, an answer out, a dead or hung process replaced."""
+"""The client's end of an engine's process: a request in, an answer out, a dead or hung process replaced."""
 
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import json
 import os
 import subprocess
 import sys
 import threading
 import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 from realizer.errors import VoiceError
 
-__all__ = ["EspeakProcess", "missing"]
-
-INSTALL = "no voice with sound: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
-WORKER = Path(__file__).with_name("espeak_worker.py")
+__all__ = ["Engine", "EngineProcess"]
 
 
-def missing() -> str | None:
-    """None where espeak-ng is installed; otherwise the sentence that says what to install."""
-    if importlib.util.find_spec("espeakng_loader") is not None:
-        return None
-    import ctypes.util  # slow, and only needed without the package
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """What runs in a process of its own.
 
-    return None if ctypes.util.find_library("espeak-ng") else INSTALL
+    Attributes:
+        name: what messages call it.
+        worker: a program that answers as `espeak_worker` describes.
+        missing: None where it is installed, otherwise the sentence that says what to install.
+    """
+
+    name: str
+    worker: Path
+    missing: Callable[[], str | None]
 
 
-class EspeakProcess:
+class EngineProcess:
     """One process, started at the first request; one request at a time, from any thread.
 
     Args:
-        options: more arguments for the worker ("--data", PATH; "--no-fork").
+        engine: what to run.
+        options: more arguments for its worker.
         limit: seconds after which a request counts as hung and the process is replaced.
     """
 
-    def __init__(self, options: tuple[str, ...] = (), limit: float = 30.0) -> None:
+    def __init__(self, engine: Engine, options: tuple[str, ...] = (), limit: float = 30.0) -> None:
+        self._engine = engine
         self._options = options
         self._limit = limit
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
-        self._end: weakref.finalize[..., EspeakProcess] | None = None
+        self._end: weakref.finalize[..., EngineProcess] | None = None
         self._owner = os.getpid()
         self._hello: dict[str, Any] = {}
 
@@ -80,7 +86,7 @@ class EspeakProcess:
             except (OSError, ValueError) as error:
                 self._stop()
                 raise VoiceError(
-                    f"espeak-ng ended or did not answer within {self._limit:g} s ({error}); "
+                    f"{self._engine.name} ended or did not answer within {self._limit:g} s ({error}); "
                     "the next text starts it again"
                 ) from None
             finally:
@@ -88,7 +94,7 @@ class EspeakProcess:
             if head["last"]:
                 self._stop()
         if "error" in head:
-            raise VoiceError(f"espeak-ng: {head['error']}")
+            raise VoiceError(f"{self._engine.name}: {head['error']}")
         return head, body
 
     def close(self) -> None:
@@ -104,12 +110,12 @@ class EspeakProcess:
             self._process, self._end, self._owner = None, None, os.getpid()
         if self._process is not None:
             return self._process
-        fix = missing()
+        fix = self._engine.missing()
         if fix:
             raise VoiceError(fix)
         process = subprocess.Popen(
             # By path and without the current folder, so that it starts alone wherever the package lies.
-            [sys.executable, "-P", str(WORKER), *self._options],
+            [sys.executable, "-P", str(self._engine.worker), *self._options],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -127,7 +133,7 @@ class EspeakProcess:
             watchdog.cancel()
         if "error" in hello:
             self._stop()
-            raise VoiceError(f"espeak-ng does not start: {hello['error']}")
+            raise VoiceError(f"{self._engine.name} does not start: {hello['error']}")
         self._hello = hello
         return process
 

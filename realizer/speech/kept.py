@@ -1,0 +1,40 @@
+"""Requests in, what a voice made of the latest of them out, so that the same is not spoken twice."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+
+from realizer.speech.utterance import Say, Utterance
+
+__all__ = ["MOST", "Kept"]
+
+MOST = 64  # utterances
+MOST_SAMPLES = 30_000_000  # about 60 MB
+
+
+class Kept:
+    """The latest utterances by request; callable from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._said: OrderedDict[Say, Utterance] = OrderedDict()
+
+    def get(self, request: Say, speak: Callable[[Say], Utterance]) -> Utterance:
+        """What was said before, or what `speak` says now, which is then kept."""
+        with self._lock:
+            if request in self._said:
+                self._said.move_to_end(request)
+                return self._said[request]
+        utterance = speak(request)
+        with self._lock:
+            self._said[request] = utterance
+            samples = sum(_samples(said) for said in self._said.values())
+            while self._said and (len(self._said) > MOST or samples > MOST_SAMPLES):
+                samples -= _samples(self._said.popitem(last=False)[1])
+        return utterance
+
+
+def _samples(utterance: Utterance) -> int:
+    return 0 if utterance.pcm is None else len(utterance.pcm)
