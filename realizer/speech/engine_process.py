@@ -16,7 +16,9 @@ from typing import IO, Any
 
 from realizer.errors import VoiceError
 
-__all__ = ["Engine", "EngineProcess"]
+__all__ = ["RUN", "Engine", "EngineProcess"]
+
+RUN = Path(__file__).with_name("engine_worker.py")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +27,7 @@ class Engine:
 
     Attributes:
         name: what messages call it.
-        worker: a program that answers as `espeak_worker` describes.
+        worker: its file, as `engine_worker` takes it.
         missing: None where it is installed, otherwise the sentence that says what to install.
     """
 
@@ -39,7 +41,7 @@ class EngineProcess:
 
     Args:
         engine: what to run.
-        options: more arguments for its worker.
+        options: more arguments for it.
         limit: seconds after which a request counts as hung and the process is replaced.
     """
 
@@ -115,7 +117,7 @@ class EngineProcess:
             raise VoiceError(fix)
         process = subprocess.Popen(
             # By path and without the current folder, so that it starts alone wherever the package lies.
-            [sys.executable, "-P", str(self._engine.worker), *self._options],
+            [sys.executable, "-P", str(RUN), str(self._engine.worker), *self._options],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -9,31 +9,21 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from realizer.arrays import Int16
+from realizer.speech.merged import bare, cuts, is_vowel
 from realizer.speech.ssml import Break, Mark, Script, write_tag
 from realizer.speech.utterance import Phoneme, Word
-from realizer.speech.words import words_in
+from realizer.speech.words import PlacedMark, words_in
 
 __all__ = ["Document", "Timeline", "timeline", "write_document"]
 
 WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
 STRESS = {"ˈ": 1, "ˌ": 2}
-VOWELS = set("aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ")
 SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
 LEAST_CLOSURE = 0.01  # s
 KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
-MOST_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
 
 Event = tuple[int, int, int, str]
 Spoken = Callable[[Sequence[str]], Sequence[Sequence[str]]]
-
-
-@dataclass(frozen=True, slots=True)
-class PlacedMark:
-    """A mark: `word` is the index of the next word; `paused` whether a <break> lies between."""
-
-    name: str
-    word: int
-    paused: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,13 +169,13 @@ def _words(
     for k, group in enumerate(groups):
         stop = groups[k + 1].first if k + 1 < len(groups) else len(sounds)
         own = [i for i in range(group.first, stop) if sounds[i]]  # without pauses
-        cuts = [0]
+        places = [0]
         if len(group.words) > 1:
             hints = {n for n, i in enumerate(own) if i in inner}
-            cuts = _cuts([alone[w] for w in group.words], [sounds[i] for i in own], hints)
-        cuts.append(len(own))
+            places = cuts([alone[w] for w in group.words], [sounds[i] for i in own], hints)
+        places.append(len(own))
         for n in range(len(group.words)):
-            mine = own[cuts[n] : cuts[n + 1]]
+            mine = own[places[n] : places[n + 1]]
             if n == 0:
                 first = group.sample
             elif mine:
@@ -199,60 +189,6 @@ def _words(
         (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last, sure)
         for k, (first, last, sure) in enumerate(found)
     ]
-
-
-def _cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: set[int]) -> list[int]:
-    """Where each word begins among the phonemes heard: the cheapest alignment of the words spoken alone.
-
-    Args:
-        expected: phonemes of each word alone.
-        heard: phonemes of the group.
-        hints: indices where espeak-ng reports a word that it gives no usable place.
-    """
-    flat = [(_bare(sound), n == 0) for word in expected for n, sound in enumerate(word)]
-    if not flat or len(flat) * len(heard) > MOST_CELLS:
-        counts = np.array([max(len(word), 1) for word in expected], float)
-        shares = np.concatenate(([0.0], np.cumsum(counts)[:-1])) / counts.sum()
-        return [round(share * len(heard)) for share in shares]
-    bare = [_bare(sound) for sound in heard]
-    # Plain lists: the groups are small, and indexing arrays one number at a time is slow.
-    cost = [0.7 * j for j in range(len(bare) + 1)]
-    steps = [[2] * (len(bare) + 1)]  # 0 both, 1 expected alone, 2 heard alone
-    for sound, opens in flat:
-        above, cost, step = cost, [cost[0] + 0.7], [1]
-        for j, other in enumerate(bare):
-            hint = -0.5 if opens and j in hints else 0.0
-            ways = (above[j] + _difference(sound, other) + hint, above[j + 1] + 0.7, cost[j] + 0.7)
-            cost.append(min(ways))
-            step.append(ways.index(cost[-1]))
-        steps.append(step)
-    at = [0] * len(flat)  # for each expected phoneme, the first one heard from there on
-    i, j = len(flat), len(bare)
-    while i:
-        if steps[i][j] == 2:
-            j -= 1
-            continue
-        j -= steps[i][j] == 0
-        i -= 1
-        at[i] = j
-    cuts, passed = [], 0
-    for word in expected:
-        cuts.append(at[passed] if passed < len(at) else len(bare))
-        passed += len(word)
-    cuts[0] = 0
-    return cuts
-
-
-def _bare(ipa: str) -> str:
-    return ipa.strip("ˈˌː_").replace("ː", "")
-
-
-def _difference(a: str, b: str) -> float:
-    if a == b:
-        return 0.0
-    if not a or not b:
-        return 1.2
-    return 0.4 if (a[0] in VOWELS) == (b[0] in VOWELS) else 1.2
 
 
 def _marks(
@@ -287,7 +223,7 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
     begins = list(begins)
     for k in range(1, len(begins)):
         before, here = begins[k - 1], begins[k]
-        if not sounds[k] or not sounds[k - 1] or _bare(sounds[k])[:1] in VOWELS:
+        if not sounds[k] or not sounds[k - 1] or is_vowel(bare(sounds[k])):
             continue
         loud = np.flatnonzero(np.abs(pcm[before:here].astype(np.int32)) > SILENCE)
         quiet = before + (int(loud[-1]) + 1 if len(loud) else 0)

@@ -1,13 +1,11 @@
-"""A process that speaks with espeak-ng: JSON requests on stdin, JSON heads and PCM on stdout.
+"""espeak-ng as `engine_worker` runs it: text and a voice in, PCM and the engine's own events out.
 
-espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said before; here it is loaded in
-a process of its own, made ready once, and each request is served by a fork of that (or, where there is no
-fork, by a fresh process). Nothing of the realizer is imported, so that it starts at once.
+espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said before: it is only ever
+loaded in a process of its own.
 
-    first line out   {"rate", "variants": [name], "voices": [{"name", "id", "languages": [[priority, tag]]}]}
-    line in          {"op": "say", "text", "voice", "wpm"} | {"op": "phonemes", "voice", "words"}
-    line out         {"bytes": n, "events": [[type, sample, place, text], ...]} and n bytes of int16 PCM
-                     {"phonemes": [[ipa, ...], ...]} | {"error": text}
+    hello     {"rate", "variants": [name], "voices": [{"name", "id", "languages": [[priority, tag]]}]}
+    say       {"text", "voice", "wpm"} -> {"events": [[type, sample, place, text], ...]} and int16 PCM
+    phonemes  {"voice", "words"} -> {"phonemes": [[ipa, ...], ...]}
 """
 
 from __future__ import annotations
@@ -15,11 +13,7 @@ from __future__ import annotations
 import argparse
 import ctypes
 import ctypes.util
-import json
 import os
-import select
-import signal
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +26,6 @@ UTF8, SSML, END_PAUSE = 1, 0x10, 0x1000
 RATE = 1  # parameter number: words a minute
 WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
 KEPT = (WORD, SENTENCE, MARK, END, PHONEME)
-PARENT_DEATH_SIGNAL = 1  # prctl
 
 
 class EventId(ctypes.Union):
@@ -74,9 +67,14 @@ SynthCallback = ctypes.CFUNCTYPE(
 class Engine:
     """espeak-ng, loaded and ready.
 
+    Args:
+        data: folder of its data, or None for what came with the library.
+
     Raises:
         RuntimeError: the library or its data cannot be loaded.
     """
+
+    drifts = True
 
     def __init__(self, data: str | None) -> None:
         path, own_data = find_library()
@@ -104,6 +102,11 @@ class Engine:
         self.rate = lib.espeak_Initialize(SYNCHRONOUS, 0, None if data is None else os.fsencode(data), flags)
         if self.rate <= 0:
             raise RuntimeError(f"espeak-ng found no data in {data!r}")
+
+        self.operations = {"say": self.say, "phonemes": self.phonemes}
+
+    def hello(self) -> dict[str, Any]:
+        return {"rate": self.rate, "voices": self.voices(), "variants": self.variants}
 
     def voices(self) -> list[dict[str, Any]]:
         found = []
@@ -147,7 +150,7 @@ class Engine:
         self.lib.espeak_Synth(document, len(document), 0, 1, 0, UTF8 | SSML | END_PAUSE, None, None)
         if heard > LONGEST_SOUND * self.rate:
             raise RuntimeError(f"the text lasts longer than {LONGEST_SOUND} s")
-        return {"events": events, "bytes": 2 * heard}, b"".join(sound)
+        return {"events": events}, b"".join(sound)
 
     def phonemes(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         self._choose(request["voice"])
@@ -195,74 +198,7 @@ def label(event: Any) -> str:
     return ""
 
 
-def answer(engine: Engine, line: bytes, out: int, last: bool = False) -> None:
-    """Serve one request and write the whole answer."""
-    try:
-        request = json.loads(line)
-        head, body = {"say": engine.say, "phonemes": engine.phonemes}[request["op"]](request)
-    except Exception as error:
-        head, body = {"error": str(error)}, b""
-    write(out, {"bytes": 0, **head, "last": last}, body)
-
-
-def write(out: int, head: dict[str, Any], body: bytes = b"") -> None:
-    data = memoryview(json.dumps(head).encode() + b"\n" + body)
-    while data:
-        data = data[os.write(out, data) :]
-
-
-def serve_in_forks(engine: Engine, out: int) -> None:
-    """One fork a request, so that each starts from the same state; ends with its parent."""
-    parent = os.getppid()
-    libc = ctypes.CDLL(None) if sys.platform == "linux" else None
-    pending = b""
-    while os.getppid() == parent:
-        if b"\n" not in pending:
-            # End of file is not enough: another child of our parent may hold the other end of the pipe.
-            if not select.select([0], [], [], 5.0)[0]:
-                continue
-            read = os.read(0, 1 << 16)
-            if not read:
-                return
-            pending += read
-            continue
-        line, _, pending = pending.partition(b"\n")
-        child = os.fork()
-        if child == 0:
-            if libc is not None:
-                libc.prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
-            try:
-                answer(engine, line, out)
-            finally:
-                os._exit(0)
-        status = os.waitpid(child, 0)[1]
-        if status:
-            write(out, {"bytes": 0, "error": f"espeak-ng crashed (status {status})", "last": False})
-
-
-def main() -> None:
+def load(arguments: list[str]) -> Engine:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", help="folder of espeak-ng's data")
-    parser.add_argument("--no-fork", action="store_true", help="serve one request, then end")
-    options = parser.parse_args()
-    # Ctrl-C is for our parent. A library may print to stdout: the answers go elsewhere.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    out = os.dup(1)
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 1)
-    try:
-        engine = Engine(options.data)
-    except (RuntimeError, OSError) as error:
-        write(out, {"error": str(error)})
-        return
-    write(out, {"rate": engine.rate, "voices": engine.voices(), "variants": engine.variants})
-    if options.no_fork or not hasattr(os, "fork"):
-        line = sys.stdin.buffer.readline()
-        if line:
-            answer(engine, line, out, last=True)
-        return
-    serve_in_forks(engine, out)
-
-
-if __name__ == "__main__":
-    main()
+    return Engine(parser.parse_args(arguments).data)

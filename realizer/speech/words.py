@@ -7,9 +7,10 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from realizer.speech.prosody import PLAIN
 from realizer.speech.ssml import Break, Mark, Script
 
-__all__ = ["Item", "Pause", "Spelled", "items", "words_in"]
+__all__ = ["Item", "Pause", "PlacedMark", "Spelled", "items", "words_in"]
 
 # Ideographs and kana are words of their own (there are no blanks between words to go by).
 SINGLE = r"[\u3040-\u30ff\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
@@ -37,6 +38,15 @@ class Pause:
     seconds: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class PlacedMark:
+    """A mark: `word` is the index of the next word; `paused` whether a <break> lies between."""
+
+    name: str
+    word: int
+    paused: bool
+
+
 Item = Spelled | Pause | Mark
 
 
@@ -56,45 +66,28 @@ def items(script: Script, phrase: str) -> tuple[Item, ...]:
         phrase: the characters that make a pause; a run of them is one.
     """
     found: list[Item] = []
-    rates = [1.0]
-    open_tags: list[bool] = []  # for each open tag, whether it pushed a rate
+    manners = [PLAIN]  # of the open tags, outermost first
     hidden = 0  # depth inside <sub>
     place = 0
     for part in script.parts:
         if isinstance(part, str):
             if not hidden:
-                found += _spelled(part, place, rates[-1], phrase)
+                found += _spelled(part, place, manners[-1].rate, phrase)
             place += len(part)
         elif isinstance(part, Mark):
             found.append(part)
         elif isinstance(part, Break):
             found.append(Pause("", part.seconds))
         elif part.attributes is None:
-            if open_tags.pop():
-                rates.pop()
+            manners.pop()
             hidden -= part.name == "sub"
         else:
             values = dict(part.attributes)
-            rate = prosody_rate(values.get("rate", "")) if part.name == "prosody" else None
-            open_tags.append(rate is not None)
-            if rate is not None:
-                rates.append(rates[-1] * rate)
+            manners.append(manners[-1].within(values) if part.name == "prosody" else manners[-1])
             if part.name == "sub":
-                found += _spelled(values.get("alias", ""), place, rates[-1], phrase)
+                found += _spelled(values.get("alias", ""), place, manners[-1].rate, phrase)
                 hidden += 1
     return tuple(found)
-
-
-def prosody_rate(text: str) -> float | None:
-    """SSML's `rate`: a word or a percentage, as a factor; None if it is neither."""
-    named = {"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.4, "x-fast": 1.8}
-    if text in named:
-        return named[text]
-    percent = re.fullmatch(r"\s*([+-]?)(\d+(?:\.\d+)?)%\s*", text)
-    if not percent:
-        return None
-    value = float(percent[2]) / 100
-    return min(4.0, max(0.25, {"+": 1 + value, "-": 1 - value, "": value}[percent[1]]))
 
 
 def _spelled(text: str, place: int, rate: float, phrase: str) -> Iterator[Item]:

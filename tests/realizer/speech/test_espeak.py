@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from realizer.errors import VoiceError
+from realizer.speech.engine_process import RUN
 from realizer.speech.espeak import ENGINE, EspeakVoice, choose_voice
 from realizer.speech.espeak_worker import Event, label
 from realizer.speech.kept import MOST
@@ -263,7 +264,7 @@ def test_the_engine_ends_with_its_parent() -> None:
     import sys
 
     worker = subprocess.Popen(
-        [sys.executable, "-P", str(ENGINE.worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-P", str(RUN), str(ENGINE.worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert worker.stdin is not None
     assert worker.stdout is not None

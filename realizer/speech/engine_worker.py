@@ -1,0 +1,116 @@
+"""A process around one engine: JSON requests on stdin, JSON heads and bodies (PCM) on stdout.
+
+    arguments        the engine's file, [--no-fork], and what is the engine's own
+    first line out   what the engine says of itself, or {"error": text}
+    line in          {"op": one of the engine's operations, ...}
+    line out         {"bytes": n, "last": whether the process ends now, ...} and n bytes; or {"error": text}
+
+The engine's file has `load(arguments)`, which gives an object with `hello()`, `operations` (name -> function
+of the request, giving head and body) and `drifts`: whether what it says depends on what it said before. One
+that drifts is made ready once and each request is served by a fork of that (or, where there is no fork, by a
+fresh process). Nothing of the realizer is imported, so that it starts at once and no licence spreads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import json
+import os
+import select
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+__all__: list[str] = []
+
+PARENT_DEATH_SIGNAL = 1  # prctl
+PATIENCE = 5.0  # s between looks at whether the parent is still there
+
+
+def answer(engine: Any, line: bytes, out: int, last: bool = False) -> None:
+    """Serve one request and write the whole answer."""
+    try:
+        request = json.loads(line)
+        head, body = engine.operations[request["op"]](request)
+    except Exception as error:
+        head, body = {"error": str(error) or type(error).__name__}, b""
+    write(out, {"bytes": len(body), **head, "last": last}, body)
+
+
+def write(out: int, head: dict[str, Any], body: bytes = b"") -> None:
+    data = memoryview(json.dumps(head).encode() + b"\n" + body)
+    while data:
+        data = data[os.write(out, data) :]
+
+
+def requests() -> Iterator[bytes]:
+    """Lines of stdin, until it ends or the parent does."""
+    parent = os.getppid()
+    pending = b""
+    while os.getppid() == parent:
+        if b"\n" in pending:
+            line, _, pending = pending.partition(b"\n")
+            yield line
+        # End of file is not enough: another child of our parent may hold the other end of the pipe.
+        elif not hasattr(os, "fork") or select.select([0], [], [], PATIENCE)[0]:
+            read = os.read(0, 1 << 16)
+            if not read:
+                return
+            pending += read
+
+
+def serve_in_forks(engine: Any, out: int) -> None:
+    """One fork a request, so that each starts from the same state."""
+    libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+    for line in requests():
+        child = os.fork()
+        if child == 0:
+            if libc is not None:
+                libc.prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
+            try:
+                answer(engine, line, out)
+            finally:
+                os._exit(0)
+        status = os.waitpid(child, 0)[1]
+        if status:
+            write(out, {"bytes": 0, "error": f"it crashed (status {status})", "last": False})
+
+
+def loaded(arguments: list[str]) -> Any:
+    """The engine whose file is the first argument."""
+    spec = importlib.util.spec_from_file_location("engine", Path(arguments[0]))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.load(arguments[1:])
+
+
+def main(arguments: list[str]) -> None:
+    forks = hasattr(os, "fork") and "--no-fork" not in arguments
+    # Ctrl-C is for our parent. A library may print to stdout: the answers go elsewhere.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    out = os.dup(1)
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 1)
+    try:
+        engine = loaded([argument for argument in arguments if argument != "--no-fork"])
+        hello = engine.hello()
+    except Exception as error:
+        write(out, {"error": str(error) or type(error).__name__})
+        return
+    write(out, hello)
+    if engine.drifts and forks:
+        serve_in_forks(engine, out)
+        return
+    for line in requests():
+        answer(engine, line, out, last=engine.drifts)
+        if engine.drifts:
+            return
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,73 @@
+"""Words that an engine says as one in, where each begins among their phonemes out."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+__all__ = ["bare", "cuts", "is_vowel"]
+
+VOWELS = set("aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ")
+MOST_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
+SKIP, UNLIKE, ALIKE, HINT = 0.7, 1.2, 0.4, -0.5  # costs of the alignment, ours
+
+
+def cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collection[int] = ()) -> list[int]:
+    """For each word the index of its first phoneme: the cheapest alignment of the words spoken alone.
+
+    Args:
+        expected: phonemes of each word alone.
+        heard: phonemes of all of them together.
+        hints: indices where the engine reports some word.
+    """
+    flat = [(bare(sound), n == 0) for word in expected for n, sound in enumerate(word)]
+    if not flat or len(flat) * len(heard) > MOST_CELLS:
+        counts = np.array([max(len(word), 1) for word in expected], float)
+        shares = np.concatenate(([0.0], np.cumsum(counts)[:-1])) / counts.sum()
+        return [round(share * len(heard)) for share in shares]
+    plain = [bare(sound) for sound in heard]
+    # Plain lists: the groups are small, and indexing arrays one number at a time is slow.
+    cost = [SKIP * j for j in range(len(plain) + 1)]
+    steps = [[2] * (len(plain) + 1)]  # 0 both, 1 expected alone, 2 heard alone
+    for sound, opens in flat:
+        above, cost, step = cost, [cost[0] + SKIP], [1]
+        for j, other in enumerate(plain):
+            hint = HINT if opens and j in hints else 0.0
+            ways = (above[j] + _difference(sound, other) + hint, above[j + 1] + SKIP, cost[j] + SKIP)
+            cost.append(min(ways))
+            step.append(ways.index(cost[-1]))
+        steps.append(step)
+    at = [0] * len(flat)  # for each expected phoneme, the first one heard from there on
+    i, j = len(flat), len(plain)
+    while i:
+        if steps[i][j] == 2:
+            j -= 1
+            continue
+        j -= steps[i][j] == 0
+        i -= 1
+        at[i] = j
+    found, passed = [], 0
+    for word in expected:
+        found.append(at[passed] if passed < len(at) else len(plain))
+        passed += len(word)
+    found[0] = 0
+    return found
+
+
+def bare(ipa: str) -> str:
+    """A phoneme without stress and length."""
+    return ipa.strip("ˈˌː_").replace("ː", "")
+
+
+def is_vowel(ipa: str) -> bool:
+    """Whether a bare phoneme begins as a vowel."""
+    return ipa[:1] in VOWELS
+
+
+def _difference(a: str, b: str) -> float:
+    if a == b:
+        return 0.0
+    if not a or not b:
+        return UNLIKE
+    return ALIKE if is_vowel(a) == is_vowel(b) else UNLIKE

@@ -1,0 +1,75 @@
+"""Attributes of SSML's <prosody> in, factors on rate, pitch and loudness out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+__all__ = ["PLAIN", "Prosody"]
+
+# SSML 1.1 leaves the size of the named steps to the engine: these are ours.
+RATES = {"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.4, "x-fast": 1.8}
+PITCHES = {"x-low": 0.75, "low": 0.87, "medium": 1.0, "default": 1.0, "high": 1.15, "x-high": 1.33}
+VOLUMES = {
+    "silent": 0.0,
+    "x-soft": 0.25,
+    "soft": 0.5,
+    "medium": 1.0,
+    "default": 1.0,
+    "loud": 1.4,
+    "x-loud": 2.0,
+}
+LEAST_RATE, MOST_RATE = 0.25, 4.0
+LEAST_PITCH, MOST_PITCH = 0.5, 2.0
+MOST_VOLUME = 4.0
+NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|)\s*", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Prosody:
+    """How some text is spoken, as parts of the voice's own way; 1 is no change.
+
+    Attributes:
+        rate: 2 is twice as fast.
+        pitch: 2 is an octave higher.
+        volume: on the amplitude; 0 is silent.
+    """
+
+    rate: float = 1.0
+    pitch: float = 1.0
+    volume: float = 1.0
+
+    def within(self, attributes: Mapping[str, str]) -> Prosody:
+        """How the text of a <prosody> inside this one is spoken; what is not understood changes nothing."""
+        return Prosody(
+            self.rate * _bounded(_factor(attributes.get("rate", ""), RATES), LEAST_RATE, MOST_RATE),
+            self.pitch * _bounded(_factor(attributes.get("pitch", ""), PITCHES), LEAST_PITCH, MOST_PITCH),
+            self.volume * _bounded(_factor(attributes.get("volume", ""), VOLUMES), 0.0, MOST_VOLUME),
+        )
+
+
+PLAIN = Prosody()
+
+
+def _factor(text: str, names: Mapping[str, float]) -> float:
+    """A name, a percentage ("80%", "+10%"), semitones ("-2st") or decibels ("+6dB") as a factor."""
+    number = NUMBER.fullmatch(text)
+    if not number:
+        return names.get(text.strip(), 1.0)
+    sign, digits, unit = number[1], float(number[2]), number[3].lower()
+    signed = -digits if sign == "-" else digits
+    if unit == "st":
+        return float(2 ** (signed / 12))
+    if unit == "db":
+        return float(10 ** (signed / 20))
+    if unit == "%":
+        return 1.0 + signed / 100 if sign else digits / 100
+    # A bare number: of a rate a factor, of a volume 0..100 where 100 is the voice's own (SSML 1.0).
+    if names is VOLUMES and not sign:
+        return digits / 100
+    return digits if names is RATES and not sign else 1.0
+
+
+def _bounded(value: float, least: float, most: float) -> float:
+    return min(most, max(least, value))
