@@ -6,7 +6,7 @@ decides what goes with it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any, cast
 
@@ -14,7 +14,7 @@ from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.canonical import MOST_ATTRIBUTES, attributes, canonical
-from bml_schema.errors import Fault, shown
+from bml_schema.errors import Fault, did_you_mean, shown
 from bml_schema.escape import escape
 from bml_schema.nodes import (
     BMLA,
@@ -34,6 +34,7 @@ from bml_schema.nodes import (
     extension,
 )
 from bml_schema.shape import Attribute, Shape, local, shape_of
+from bml_schema.strays import stray
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
 from bml_schema.values import unwanted
 
@@ -67,13 +68,15 @@ class Elements:
     Attributes:
         vocabulary: Clark tag -> node class.
         names: what references may name; None looks nothing up.
+        strays: what is to be said of attributes that nobody knows, with the element; who tells it clears it.
     """
 
-    __slots__ = ("names", "vocabulary")
+    __slots__ = ("names", "strays", "vocabulary")
 
     def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
         self.vocabulary = vocabulary
         self.names = names
+        self.strays: list[tuple[str, etree._Element]] = []
 
     def tag(self, element: etree._Element) -> str:
         """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
@@ -136,12 +139,21 @@ class Elements:
                 values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
             missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
             faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
+        said = self.stray(shape, element, foreign, timed) if foreign else ""
         if faults:
+            faults += (said,) if said else ()
             raise Fault("; ".join(faults), element)
+        if said:
+            self.strays.append((said, element))
         if shape.timed:
             values["syncs"] = syncs
             values["foreign"] = foreign
         return values
+
+    def stray(self, shape: Shape, element: etree._Element, foreign: Iterable[str], timed: bool) -> str:
+        """What is to be said of the attributes that a shape does not know; "" for nothing."""
+        suggest = did_you_mean if self.names is None else self.names.suggest
+        return stray(shape, element, foreign, timed, suggest)
 
     def children(self, shape: Shape, element: etree._Element, values: dict[str, Any]) -> None:
         """Child elements into the fields of `values`."""

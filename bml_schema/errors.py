@@ -21,6 +21,7 @@ __all__ = ["BMLError", "BMLSyntaxError", "Place", "Problem"]
 PARSING_FAILURE = "PARSING_FAILURE"
 BEHAVIOR_TYPE_NOT_SUPPORTED = "BEHAVIOR_TYPE_NOT_SUPPORTED"
 CUSTOM_BEHAVIOR_NOT_SUPPORTED = "CUSTOM_BEHAVIOR_NOT_SUPPORTED"
+CUSTOM_ATTRIBUTE_NOT_SUPPORTED = "CUSTOM_ATTRIBUTE_NOT_SUPPORTED"
 
 
 class Place(NamedTuple):
@@ -74,7 +75,7 @@ class BMLSyntaxError(BMLError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """A part of a document that was dropped while parsing; becomes one BML warning.
+    """A part of a document that was left out while parsing; becomes one BML warning.
 
     Attributes:
         id: "block:behaviour" ("block:path" for a behaviour without id), a constraint's id, or the block's.
@@ -83,6 +84,7 @@ class Problem:
         line, path: where.
         lost: what vanished with it: "behaviour:sync" for a reference, a constraint's id or path.
         fatal: the whole block goes, because it was inside <required>.
+        dropped: a behaviour or constraint went; otherwise attributes only, and what they stand on plays.
     """
 
     id: str
@@ -92,6 +94,7 @@ class Problem:
     path: str
     lost: tuple[str, ...] = ()
     fatal: bool = False
+    dropped: bool = True
 
     def __str__(self) -> str:
         return at(self.line, self.path, self.text)

@@ -1,6 +1,7 @@
 """One parsed <bml> element in, a Block out.
 
 Faults stay where they are: a behaviour or constraint with a fault is left out and told of in one Problem.
+Attributes that nobody knows are told of too, and cost nothing else.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from bml_schema.canonical import attributes
 from bml_schema.elements import Elements, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
+    CUSTOM_ATTRIBUTE_NOT_SUPPORTED,
     CUSTOM_BEHAVIOR_NOT_SUPPORTED,
     BMLError,
     Fault,
@@ -80,7 +82,9 @@ def read_block(
         said = f"wanted at most {most_behaviours} behaviours and constraints in a block, got {len(entries)}"
         raise BMLError(said, line=line, path="/bml", block=names.block)
     if wrong_attributes:
-        reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root)
+        reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
+    if stray := elements.stray(shape_of(Block), root, values["foreign"], False):
+        reader.stray(names.block, stray, "/bml", root, root)
     for text, parent, path in outline.loose:
         # Nobody's text, so the block's problem.
         reader.problem(
@@ -196,10 +200,13 @@ class _Reader:
                 raise Fault(said, element)
             node: Behaviour = self.elements.node(cls, element, timed=True)
         except Fault as fault:
+            self.elements.strays.clear()  # it goes, whatever else is to be said of it
             id = entry.id if 0 < len(entry.id) <= _MOST_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
         self.places[node.id] = made(Place, (self.line(element), entry.path))
+        if self.elements.strays:
+            self.take_strays(f"{self.names.block}:{node.id}", entry)
         return node
 
     def unknown(self, entry: Entry) -> Fault:
@@ -217,15 +224,23 @@ class _Reader:
             )
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
+    def take_strays(self, id: str, entry: Entry) -> None:
+        """Tell of the attributes that nobody knows, element by element."""
+        for said, element in self.elements.strays:
+            self.stray(id, said, entry.path, element, entry.element)
+        self.elements.strays.clear()
+
     def constraint(self, entry: Entry) -> Constraint | None:
         """The node of an entry; None, and a Problem, if it is dropped."""
         element = entry.element
         try:
             values = self.elements.constraint(element)
         except Fault as fault:
+            self.elements.strays.clear()
             id = entry.id if 0 < len(entry.id) <= _MOST_ID else self.names.block
             self.problem(id, fault, entry.path, element, entry.required)
             return None
+        self.take_strays(values.get("id") or self.names.block, entry)
         place = Place(self.line(element), entry.path)
         return Constraint(**values, required=entry.required, place=place)
 
@@ -254,13 +269,31 @@ class _Reader:
                 fatal = problem.fatal or id in losses.fatal
                 self.problems[n] = replace(problem, text=text, lost=lost, fatal=fatal)
 
+    def stray(self, id: str, said: str, path: str, element: etree._Element, top: etree._Element) -> None:
+        fault = Fault(said, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
+        self.problem(id, fault, path, top, dropped=False)
+
     def problem(
-        self, id: str, fault: Fault, path: str, element: etree._Element, required: bool = False
+        self,
+        id: str,
+        fault: Fault,
+        path: str,
+        element: etree._Element,
+        required: bool = False,
+        dropped: bool = True,
     ) -> None:
         where = _path_below(fault.element, element, path)
         line = self.line(fault.element)
         self.problems.append(
-            Problem(id=id, type=fault.type, text=fault.text, line=line, path=where, fatal=required)
+            Problem(
+                id=id,
+                type=fault.type,
+                text=fault.text,
+                line=line,
+                path=where,
+                fatal=required,
+                dropped=dropped,
+            )
         )
 
 

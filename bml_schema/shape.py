@@ -71,7 +71,7 @@ class Shape:
         names: names of all fields.
         name: local name of its element.
         timed: it has sync points, and may hold descriptions and what is not ours.
-        points: its sync points; `strokes`: it may have several strokes, "stroke:n".
+        sync_points: in order; `points`: the same; `strokes`: it may have several strokes, "stroke:n".
         checked: its class has a `fault` of its own to ask.
         needed: the fields of `required`.
     """
@@ -87,6 +87,7 @@ class Shape:
     names: frozenset[str] = frozenset()
     name: str = ""
     timed: bool = False
+    sync_points: tuple[str, ...] = ()
     points: frozenset[str] = frozenset()
     strokes: bool = False
     checked: bool = False
@@ -220,7 +221,8 @@ def _shape(cls: type[Any]) -> Shape:
             kinds.append(Child(f.name, what, kind != "child", int(more)))
     by_tag = {c.tag: (k, c) for k in kinds for c in k.classes}
     timed = hasattr(cls, "sync_points")
-    points = frozenset(cls.sync_points) if timed else frozenset()
+    sync_points = cls.sync_points if timed else ()
+    points = frozenset(sync_points)
     needed = tuple(a for a in attributes.values() if a.required)
     return Shape(
         attributes=attributes,
@@ -235,6 +237,7 @@ def _shape(cls: type[Any]) -> Shape:
         needed=frozenset(a.field for a in needed),
         name=local(getattr(cls, "tag", "")),
         timed=timed,
+        sync_points=sync_points,
         points=points,
         strokes="stroke" in points and "repetition" in attributes,
         checked=timed and "fault" in {name for base in cls.__mro__[:-2] for name in vars(base)},

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bml_schema import (
     BMLA,
-    CORE,
+    BMLT,
     VOCABULARY,
     After,
     Before,
@@ -160,7 +160,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     """Valid blocks: any behaviours, references that lead somewhere, constraints, required parts.
 
     Args:
-        foreign: also attributes and elements nobody knows.
+        foreign: also attributes and elements of other languages.
     """
     ids = draw(st.lists(names, max_size=6, unique=True))
     kinds = {id: draw(st.sampled_from(sorted(VOCABULARY.values(), key=lambda c: c.tag))) for id in ids}
@@ -178,7 +178,7 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
             points[id] += [("stroke", n) for n in range(1, min(times, 4) + 1)]
     refs = _references(points) if points else numbers.map(lambda t: SyncRef(offset=t))
     others = st.dictionaries(
-        st.sampled_from(["zz", "{urn:a}b", f"{{{BMLA}}}unheardOf", f"{{{CORE}}}id"]),
+        st.sampled_from(["{urn:z}z", "{urn:a}b", f"{{{BMLA}}}unheardOf", f"{{{BMLT}}}id"]),
         xml_text(),
         max_size=2,
     )

@@ -103,7 +103,7 @@ def _dropped(warning: Warning, block: Block, schedule: Schedule) -> Dropped | No
     prefix = f"{block.id}:"
     id = warning.id.removeprefix(prefix) if warning.id.startswith(prefix) else ""
     problem = next((p for p in block.problems if (p.id, p.type) == (warning.id, warning.type)), None)
-    if id in schedule.times and problem is None:
+    if id in schedule.times if problem is None else not problem.dropped:
         return None
     place = Place(problem.line, problem.path) if problem is not None else block.places.get(id or warning.id)
     element = None

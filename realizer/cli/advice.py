@@ -55,14 +55,16 @@ class _Advisor:
         self.file, self.source, self.block = file, source, block
 
     def attributes(self, node: Any, path: str, line: int | None) -> Iterator[Finding]:
-        """Attributes that nobody knows, in no or in a known namespace, and that are nearly a known one."""
-        known = {*shape_of(type(node)).attributes, *getattr(node, "sync_points", ())}
-        free = known - set(getattr(node, "syncs", ()))
+        """Attributes of BMLA and BMLT that nobody knows, and that are nearly a known one.
+
+        They have more than are known here; what BML itself has not is a fault, and told as one.
+        """
+        known = shape_of(type(node)).attributes
         for name in node.foreign:
             space = name.rpartition("}")[0]
-            if space and space[1:] not in KNOWN_SPACES:
+            if space[1:] not in (BMLA, BMLT):
                 continue
-            choices = [local(other) for other in free if other.rpartition("}")[0] == space]
+            choices = [local(other) for other in known if other.rpartition("}")[0] == space]
             meant = near(local(name), choices, 0.75)
             element = self.source.find(path, line=line, block=self.block.id) if meant else None
             if element is None or meant is None or self.source.value_span(element, meant):

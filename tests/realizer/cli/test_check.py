@@ -62,7 +62,9 @@ CASES = {
     "lexeme": ('<faceLexeme id="f" lexeme="RAISE_BROW"/>', ["RAISE_BROW"], "mean RAISE_BROWS or"),
     "side": ('<faceFacs id="f" au="1" side="LEF"/>', ["LEF"], 'mean "LEFT"?'),
     "element": ('<hed id="h"/>', ["hed"], 'mean "head"?'),
-    "attribute": ('<head id="n" lexem="NOD"/>', ["lexem"], 'mean lexeme where it says "lexem"?'),
+    "attribute": ('<head id="n" lexem="NOD"/>', ["lexem", "NOD"], 'mean lexeme where it says "lexem"?'),
+    "unknown": ('<head id="n" lexeme="NOD" amont="0.7"/>', ["0.7"], 'did you mean "amount"?'),
+    "unknown point": ('<head id="h" lexeme="NOD" strt="1"/>', ["1"], 'mean "start"?'),
     "missing": ('<head id="n"/>', ["head"], ""),
     "duplicate": ('<wait id="w"/>\n<wait id="w"/>', ["w", "w"], ""),
     "constraint": (
@@ -237,8 +239,6 @@ def test_bytes_that_are_no_text_are_marked(tmp_path: Path) -> None:
 
 
 ADVICE = {
-    "start": ('<head id="h" lexeme="NOD" strt="1"/>', "strt", 'mean "start"?'),
-    "amount": ('<head id="h" lexeme="NOD" amont="0.7"/>', "amont", 'mean "amount"?'),
     "bmla": (
         '<head xmlns:a="http://www.asap-project.org/bmla" id="h" lexeme="NOD" a:piority="1"/>',
         "piority",
@@ -268,8 +268,8 @@ def test_what_looks_like_a_slip_is_advice_and_no_fault(case: str, tmp_path: Path
 @pytest.mark.parametrize(
     "text",
     [
-        '<head id="h" lexeme="NOD" xmlns:o="urn:o" o:amont="1" style="x" start="60"/>',
-        '<gaze id="g" target="cup" type="x"/><speech id="s"><text>Hello</text></speech>',
+        '<head id="h" lexeme="NOD" xmlns:o="urn:o" o:amont="1" start="60"/>',
+        '<gaze id="g" target="cup" xmlns:a="http://www.asap-project.org/bmla" a:x="1"/><speech id="s"><text>Hello</text></speech>',
         '<head id="h" lexeme="NOD" stroke="1"/><face id="f" start="0" end="4"><faceFacs au="1"/></face>',
     ],
 )
@@ -278,7 +278,7 @@ def test_what_is_merely_unknown_gets_no_advice(text: str, tmp_path: Path) -> Non
 
 
 def test_advice_on_one_block_is_not_endless(tmp_path: Path) -> None:
-    heads = "".join(f'<head id="h{n}" lexeme="NOD" strt="1"/>' for n in range(50))
+    heads = "".join(f'<head id="h{n}" lexeme="NOD" start="1500"/>' for n in range(50))
     assert check(tmp_path, f"{HEAD}{heads}</bml>").stderr.count("ADVICE") == 20
 
 
@@ -292,7 +292,7 @@ def test_faults_far_apart_in_one_line_are_each_shown(tmp_path: Path) -> None:
 
 def test_quiet_holds_advice_back(tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
-    document.write_text(f'{HEAD}<head id="h" lexeme="NOD" strt="1"/></bml>')
+    document.write_text(f'{HEAD}<head id="h" lexeme="NOD" start="1500"/></bml>')
     done = CliRunner().invoke(cli, ["-q", "check", str(document)], standalone_mode=False)
     assert (done.return_value, done.output) == (0, "")
 
