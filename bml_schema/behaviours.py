@@ -7,7 +7,7 @@ from typing import Final
 from bml_schema.nodes import Behaviour, Part, core, extension
 from bml_schema.shape import attribute, child, children, mixed, node, sync_ref
 from bml_schema.sync_refs import SyncRef
-from bml_schema.values import integer, name, number, one_of, word
+from bml_schema.values import integer, name, number, one_of, string, word
 
 __all__ = [
     "Face",
@@ -145,10 +145,11 @@ class Sync(Part):
 
 @node
 class SpeechText(Part):
-    """What is said: strings and Syncs in order, blanks kept, neighbouring strings joined."""
+    """What is said: strings and Syncs in order, blanks kept, neighbouring strings joined; its xml:lang."""
 
     tag = core("text")
     parts: tuple[str | Sync, ...] = mixed(Sync, default=())
+    language: str = attribute(string, default="", name="{http://www.w3.org/XML/1998/namespace}lang")
 
     def __str__(self) -> str:
         return "".join(p for p in self.parts if isinstance(p, str))

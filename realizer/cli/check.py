@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.enrich import mood, role
+from realizer.cli.enrich import language, languages_in, mood, role, tell_unknown, words, words_for
 from realizer.cli.timeline import advice_on, faults_in, is_timeline
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ MOST_ADVICE = 20  # on one block: one slip is often made all over a document
 @options.expressions
 @role
 @mood
+@language
+@words
 @click.option(
     "--long/--short",
     "long",
@@ -51,6 +53,8 @@ def check(
     expressions: Path | None,
     role: Role,
     mood: Mood | None,
+    language: str | None,
+    words: Path | None,
     long: bool | None,
 ) -> int:
     """Explain every fault of documents, with line, column and path.
@@ -76,14 +80,16 @@ def check(
 
     def show(finding: Finding, source: Source, *, err: bool = False) -> None:
         stream = sys.stderr if err else sys.stdout
-        words = render(finding, source, width=width) + "\n" if long else one_line(finding)
-        click.echo(words, err=err, color=_coloured(stream))
+        said = render(finding, source, width=width) + "\n" if long else one_line(finding)
+        click.echo(said, err=err, color=_coloured(stream))
 
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a document may hold what the terminal's encoding does not
             stream.reconfigure(errors="backslashreplace")
     chosen = options.settings(media=media, expressions=expressions)
+    lists = words_for(language, words)
     faults = 0
+    told_languages: set[str] = set()
     for name, text in zip(documents, options.read_documents(documents), strict=True):
         if is_timeline(name):
             faults += _check_timeline(name, text, chosen.expressions, role, mood, context.obj["quiet"])
@@ -94,6 +100,7 @@ def check(
             idle=False,
             media=chosen.media,
             expressions=chosen.expressions,
+            language=lists.language,
         )
         source = Source(text)
         blocks = found = 0
@@ -111,7 +118,9 @@ def check(
                 show(finding, source)
             if isinstance(item, Block) and schedule is not None and not context.obj["quiet"]:
                 slips = advice(name, source, item, schedule, player)
-                unusual = habits(name, source, item, schedule, said, role, mood)
+                unusual = habits(name, source, item, schedule, said, role, mood, lists)
+                if context.obj["verbose"]:
+                    tell_unknown(lists, languages_in(item, lists), told_languages)
                 for finding in islice(chain(slips, unusual), MOST_ADVICE):
                     show(finding, source, err=True)
         if not found and not context.obj["quiet"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,8 @@ from realizer.cli import options
 
 if TYPE_CHECKING:
     from bml_schema import Block
-    from realizer.knowledge.enrich import Enricher
+    from realizer.knowledge.enrich import Enricher, Heard
+    from realizer.knowledge.languages import Words
 
 __all__: list[str] = []
 
@@ -52,21 +54,73 @@ mood = click.option(
 )
 
 
+language = click.option(
+    "--language", metavar="BCP-47", help="Of what is said, where no xml:lang says it.  [default: en-US]"
+)
+words = click.option(
+    "--words",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE.csv",
+    help="Emotional words of your own: word, category, origin. For texts in --language, or for all.",
+)
+
+
+def words_for(language: str | None, file: Path | None) -> Words:
+    """The words that count.
+
+    Raises:
+        click.UsageError: a file that is no list of words.
+    """
+    from realizer.errors import TableError
+    from realizer.knowledge.languages import Words
+    from realizer.tables.emotional_words import words_of
+
+    try:
+        own = words_of(file) if file is not None else None
+    except TableError as error:
+        raise click.UsageError(str(error)) from None
+    return Words(options.settings(language=language).language, own, everywhere=language is None)
+
+
+def tell_unknown(words: Words, languages: Iterable[str], told: set[str]) -> None:
+    """A word on standard error for each language without a list of words that is not told yet."""
+    for language in languages:
+        if language not in told and words.of(language) is None:
+            told.add(language)
+            click.echo(
+                f"no emotional words for language {language!r}: none of its words counts; see --words",
+                err=True,
+            )
+
+
+def languages_in(block: Block, words: Words) -> list[str]:
+    """The languages of what is said in a block, each once."""
+    from bml_schema import Speech
+    from realizer.knowledge.languages import language_of
+
+    said = [node for node in block.behaviours if isinstance(node, Speech)]
+    return list(dict.fromkeys(language_of(node, block, words.language) for node in said))
+
+
 @click.command()
 @click.argument("text", metavar="TEXT|FILE|-")
 @role
 @mood
-@click.option("--language", default="en", show_default=True, metavar="BCP-47", help="Of the text.")
-@click.option(
-    "--words",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE.csv",
-    help="Emotional words of your own, or of another language: word, category, origin.",
-)
+@language
+@words
 @click.option(
     "-o", "--output", metavar="OUT.bml", type=click.Path(path_type=Path), help="Default: standard output."
 )
-def enrich(text: str, role: Any, mood: Any, language: str, words: Path | None, output: Path | None) -> int:
+@click.pass_context
+def enrich(
+    context: click.Context,
+    text: str,
+    role: Any,
+    mood: Any,
+    language: str | None,
+    words: Path | None,
+    output: Path | None,
+) -> int:
     """Give a text the face of who says it: BML with expressions at its words (Wojdel 2005, 6.5).
 
     TEXT is what is said, a file of it, or a BML document, whose speeches and expressions get what goes with
@@ -77,29 +131,23 @@ def enrich(text: str, role: Any, mood: Any, language: str, words: Path | None, o
     realizer realize sure.bml -o sure.mp4
     """
     from bml_schema import write
-    from realizer.errors import TableError
     from realizer.knowledge.enrich import Enricher
     from realizer.speech.utterance import MOST_TEXT
-    from realizer.tables.emotional_words import word_list, words_of
 
     said = _read(text)
     if not said.strip():
         raise click.UsageError("wanted a text or a BML document, got nothing but blanks")
-    try:
-        own = words_of(words) if words is not None else None
-    except TableError as error:
-        raise click.UsageError(str(error)) from None
-    if own is None and word_list(language) is None:
-        click.echo(
-            f"no emotional words for language {language!r}: only punctuation counts; see --words", err=True
-        )
-    enricher = Enricher(role, mood, language, own)
+    lists = words_for(language, words)
+    enricher = Enricher(role, mood, lists)
     faults = 0
     before = 0
     if isinstance(said, bytes) or said.lstrip().startswith("<"):
-        blocks, before, faults = _documents(said, enricher)
+        blocks, before, faults, languages = _documents(said, enricher)
     else:
         blocks = list(enricher.texts(_writable(said), MOST_TEXT))
+        languages = [lists.language]
+    if not context.obj["quiet"]:
+        tell_unknown(lists, languages, set())
     result = "".join(write(block) for block in blocks)
     if output is None:
         sys.stdout.write(result)
@@ -150,8 +198,8 @@ def _writable(text: str) -> str:
     return clean
 
 
-def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int, int]:
-    """Blocks of documents, enriched; how many expressions they had before; how many faults were told.
+def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int, int, list[str]]:
+    """Blocks of documents, enriched; how many expressions they had before; faults told; languages.
 
     A broken document is left out.
     """
@@ -159,6 +207,7 @@ def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int,
     from realizer.behaviours import VOCABULARY
 
     blocks: list[Block] = []
+    languages: list[str] = []
     before = faults = 0
     for item in read(text, VOCABULARY):
         problems = item.problems if isinstance(item, Block) else (item,)
@@ -167,6 +216,7 @@ def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int,
             faults += 1
         if not isinstance(item, Block):
             continue
+        languages += languages_in(item, enricher.words)
         if enricher.role == "speaker":
             for node in item.behaviours:
                 if isinstance(node, Speech) and node.text is not None and node.descriptions:
@@ -178,21 +228,24 @@ def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int,
             before += _placed(item)
             blocks.append(enricher.block(item))
         else:
-            blocks.append(enricher.listener(_heard(item), f"{item.id}-listener"))
-    return blocks, before, faults
+            heard = _heard(item, enricher.words.language)
+            blocks.append(enricher.listener(heard, f"{item.id}-listener"))
+    return blocks, before, faults, languages
 
 
-def _heard(block: Block) -> list[tuple[str, float]]:
-    """The texts of a block, and the second at which each begins, as the block is scheduled."""
+def _heard(block: Block, language: str) -> list[Heard]:
+    """The texts of a block, each when it begins as the block is scheduled."""
     from bml_schema import Speech
+    from realizer.knowledge.enrich import Heard
+    from realizer.knowledge.languages import language_of
     from realizer.pipeline import submitted
     from realizer.player import Player
     from realizer.speech import SilentVoice
 
-    times = submitted(Player(), block, SilentVoice()).times
+    times = submitted(Player(language=language), block, SilentVoice()).times
     said = [
-        (str(node.text), float(times[node.id][0]))
+        Heard(str(node.text), float(times[node.id][0]), language_of(node, block, language))
         for node in block.behaviours
         if isinstance(node, Speech) and node.text is not None and node.id in times
     ]
-    return sorted(said, key=lambda one: one[1])
+    return sorted(said, key=lambda one: one.begin)

@@ -14,6 +14,7 @@ from realizer.knowledge.enrich import template_of
 from realizer.speech.words import words_in
 
 if TYPE_CHECKING:
+    from realizer.knowledge.languages import Words
     from realizer.scheduling.timing import Schedule
     from realizer.speech.utterance import Utterance
     from realizer.tables.knowledge import Mood, Role
@@ -29,12 +30,14 @@ def habits(
     utterances: Mapping[str, Utterance],
     role: Role,
     mood: Mood | None,
+    lists: Words,
 ) -> Iterator[Finding]:
     """Expressions that last, follow each other or accompany words otherwise than people's do.
 
     Args:
         schedule: of the block.
         utterances: what a voice made of its speeches.
+        lists: the words that count.
     """
     seen = [
         Seen(node.id, template, (start + peak) / 2, (relax + end) / 2)
@@ -42,15 +45,16 @@ def habits(
         if (template := template_of(node)) and node.id in schedule.times
         for start, peak, relax, end in [schedule.times[node.id].tolist()]
     ]
-    words = {
-        node.id: [
-            (place, float(schedule.times[node.id][0]) + word.start)
-            for (_, place), word in zip(words_in(str(node.text)), utterances[node.id].words, strict=False)
-        ]
-        for node in block.behaviours
-        if isinstance(node, Speech) and node.id in schedule.times and node.id in utterances
-    }
-    for one in advise(block, seen, words, role, mood):
+    words = {}
+    for node in block.behaviours:
+        if isinstance(node, Speech) and node.id in schedule.times and node.id in utterances:
+            places = [place for _, place in words_in(str(node.text or ""))]
+            spoken = utterances[node.id].words
+            # A description may say something else than the text; when which word of that comes nobody knows.
+            if len(places) == len(spoken):
+                begin = float(schedule.times[node.id][0])
+                words[node.id] = [(p, begin + w.start) for p, w in zip(places, spoken, strict=True)]
+    for one in advise(block, seen, words, role, mood, lists):
         where = block.places.get(one.id)
         path, line = (where.path, where.line) if where is not None else ("/bml", None)
         spot = source.locate(path, line=line, block=block.id)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from bml_schema import Block, Speech
+from realizer.knowledge.languages import ENGLISH, Words, language_of
 from realizer.knowledge.placing import place
-from realizer.knowledge.sentences import sentences
-from realizer.tables.emotional_words import word_list
+from realizer.knowledge.sentences import Sentence, sentences
+from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import Company, Mood, Placing, Role, knowledge
 from realizer.tables.templates import templates
 
@@ -52,7 +53,7 @@ def advise(
     words: Mapping[str, Sequence[tuple[int, float]]],
     role: Role = "speaker",
     mood: Mood | None = None,
-    language: str = "en",
+    lists: Words = ENGLISH,
 ) -> Iterator[Advice]:
     """What the knowledge base has to say about a block; behaviours that are no templates are passed over.
 
@@ -60,6 +61,7 @@ def advise(
         seen: the templates of the block, as they are scheduled.
         words: speech id -> (characters before it in the text, seconds) of each word.
         role, mood: of who is animated.
+        lists: the language of a text that names none, and which words count in which.
     """
     seen = sorted(seen, key=lambda one: one.start)
     for one in seen:
@@ -71,7 +73,9 @@ def advise(
     if role == "speaker":
         for node in block.behaviours:
             if isinstance(node, Speech) and node.text is not None:
-                yield from _kept(node, seen, dict(words.get(node.id, ())), language)
+                language = language_of(node, block, lists.language)
+                text = sentences(str(node.text), language)
+                yield from _kept(node.id, text, seen, dict(words.get(node.id, ())), lists.of(language))
     else:
         yield from _listening(seen)
     yield from _pace(seen, role, mood)
@@ -148,17 +152,18 @@ def _company(one: Seen, company: Company, seen: Sequence[Seen]) -> Iterator[Advi
     yield Advice(one.id, f"{one.template} stands alone", company.says + adds)
 
 
-def _kept(speech: Speech, seen: Sequence[Seen], times: dict[int, float], language: str) -> Iterator[Advice]:
+def _kept(
+    id: str, text: Sequence[Sentence], seen: Sequence[Seen], times: dict[int, float], words: WordList | None
+) -> Iterator[Advice]:
     """Words that are said with an expression which is not there."""
-    said = sentences(str(speech.text), language)
-    for placement in place(said, knowledge(), "speaker", None, word_list(language)):
+    for placement in place(text, knowledge(), "speaker", None, words):
         at = times.get(placement.word.place)
         if not placement.rule.keep or at is None:
             continue
         missing = [name for name in placement.rule.show if not _shown(name, at, seen)]
         if missing:
             word = placement.word.text
-            yield Advice(speech.id, f'"{word}" is said without {", ".join(missing)}', placement.rule.says)
+            yield Advice(id, f'"{word}" is said without {", ".join(missing)}', placement.rule.says)
 
 
 def _shown(name: str, at: float, seen: Sequence[Seen]) -> bool:

@@ -5,16 +5,17 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from bml_schema import Block, Expression, Speech, Sync, SyncRef
 from bml_schema.behaviours import SpeechText
+from realizer.knowledge.languages import ENGLISH, Words, language_of
 from realizer.knowledge.placing import Placement, place
 from realizer.knowledge.sentences import sentences
-from realizer.tables.emotional_words import WordList, word_list
 from realizer.tables.knowledge import Company, Knowledge, Mood, Role, knowledge
 from realizer.tables.templates import Template, apex, templates
 
-__all__ = ["Enricher", "template_of"]
+__all__ = ["Enricher", "Heard", "template_of"]
 
 PREFIX = "template:"
 LEAST = 500  # characters of a long text that are not cut any further
@@ -35,6 +36,14 @@ def template_of(node: object) -> str:
     return " ".join(name.removeprefix(PREFIX).replace("-", " ").replace("_", " ").split())
 
 
+class Heard(NamedTuple):
+    """A text, the second at which it begins, and its language (BCP-47)."""
+
+    text: str
+    begin: float
+    language: str
+
+
 @dataclass(frozen=True)
 class Enricher:
     """What is known of who is animated.
@@ -42,20 +51,19 @@ class Enricher:
     Attributes:
         role: who talks, or who listens to what is said.
         mood: how often, and for how long, expressions come; None: as on average.
-        language: BCP-47 of the text.
-        words: a word list of the user's; None: the one of the language, if one ships.
+        words: the language of a text that names none, and which words count in which.
     """
 
     role: Role = "speaker"
     mood: Mood | None = None
-    language: str = "en"
-    words: WordList | None = None
+    words: Words = ENGLISH
 
     def text(self, text: str, block: str = "bml1") -> Block:
         """A block that says `text` with the face of a speaker, or that shows who hears it."""
         if self.role == "listener":
-            return self.listener(((text, 0.0),), block)
-        speech = Speech(id="speech1", text=SpeechText(parts=(text,)))
+            return self.listener((Heard(text, 0.0, self.words.language),), block)
+        named = "" if self.words.everywhere else self.words.language
+        speech = Speech(id="speech1", text=SpeechText(parts=(text,), language=named))
         return self.block(Block(id=block, children=(speech,)))
 
     def texts(self, text: str, longest: int) -> Iterator[Block]:
@@ -69,7 +77,7 @@ class Enricher:
 
     def _short(self, text: str, longest: int, most: int) -> Iterator[Block]:
         """Blocks of at most `most` characters; of fewer where so many marks come in that it gets too long."""
-        for piece in _pieces(text, self.language, most):
+        for piece in _pieces(text, self.words.language, most):
             block = self.text(piece)
             if most > LEAST and any(_length(node) > longest for node in block.behaviours):
                 yield from self._short(piece, longest, most // 2)
@@ -94,12 +102,12 @@ class Enricher:
         children = _replaced(block.children, speeches)
         return replace(block, children=(*children, *placed), places={})
 
-    def listener(self, said: Iterable[tuple[str, float]], block: str) -> Block:
-        """A block of expressions for who hears texts that begin at given seconds."""
+    def listener(self, said: Iterable[Heard], block: str) -> Block:
+        """A block of expressions for who hears these texts."""
         names = _Names(Block(id=block))
         placed: list[Expression] = []
-        for text, begin in said:
-            for placement in self._placements(text):
+        for text, begin, language in said:
+            for placement in self._placements(text, language):
                 for name in placement.rule.show:
                     start = SyncRef(offset=round(begin + placement.word.start, 3))
                     placed.append(self._expression(name, start, placement.rule.says, names))
@@ -107,9 +115,9 @@ class Enricher:
             placed += self._company(node, placed, names)
         return Block(id=block, children=tuple(placed))
 
-    def _placements(self, text: str) -> tuple[Placement, ...]:
-        words = self.words if self.words is not None else word_list(self.language)
-        return place(sentences(text, self.language), self.knowledge, self.role, self.mood, words)
+    def _placements(self, text: str, language: str) -> tuple[Placement, ...]:
+        words = self.words.of(language)
+        return place(sentences(text, language), self.knowledge, self.role, self.mood, words)
 
     @property
     def knowledge(self) -> Knowledge:
@@ -122,7 +130,8 @@ class Enricher:
         begun = {(str(e.syncs.get("start")), template_of(e)) for e in block.behaviours}
         placed = []
         new: dict[int, str] = {}
-        for placement in self._placements(str(node.text)):
+        language = language_of(node, block, self.words.language)
+        for placement in self._placements(str(node.text), language):
             at = placement.word.place
             id = marks.get(at) or new.get(at) or names.mark(node)
             start = SyncRef(behaviour=node.id, sync=id)
@@ -130,7 +139,7 @@ class Enricher:
             placed += [self._expression(name, start, placement.rule.says, names) for name in shown]
             if shown and at not in marks:
                 new[at] = id
-        return replace(node, text=SpeechText(parts=_marked(node.text.parts, new))), placed
+        return replace(node, text=replace(node.text, parts=_marked(node.text.parts, new))), placed
 
     def _expression(
         self, name: str, start: SyncRef, because: str, names: _Names, end: SyncRef | None = None

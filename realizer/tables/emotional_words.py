@@ -10,7 +10,7 @@ from pathlib import Path
 from realizer import tables
 from realizer.errors import TableError
 
-__all__ = ["CATEGORIES", "WordList", "read_words", "word_list"]
+__all__ = ["CATEGORIES", "WordList", "read_words", "word_list", "words_of"]
 
 # The eight of Wojdel's appendix D.2, the approval of her 6.5, and what turns the word after it around.
 CATEGORIES = (
@@ -63,7 +63,10 @@ class WordList:
 @cache
 def word_list(language: str) -> WordList | None:
     """The words of a language ("en-GB" is "en"); None where no list ships."""
-    name = f"emotional_words_{language.partition('-')[0].lower()}.csv"
+    subtag = language.replace("_", "-").partition("-")[0].lower()
+    if not (subtag.isascii() and subtag.isalpha()):
+        return None
+    name = f"emotional_words_{subtag}.csv"
     try:
         text = tables.text_of(name)
     except FileNotFoundError:

@@ -166,6 +166,12 @@ def test_an_empty_text_is_not_no_text() -> None:
     assert parse(write(block)) == block
 
 
+def test_a_text_keeps_its_language() -> None:
+    block = only("<speech id='s'><text xml:lang='nl'>Dag</text></speech>")
+    assert block["s"] == Speech(id="s", text=SpeechText(parts=("Dag",), language="nl"))
+    assert parse(write(block)) == block
+
+
 @pytest.mark.parametrize(
     ("inside", "said"),
     [

@@ -327,3 +327,49 @@ def test_a_terminal_gets_the_source_and_colours_unless_it_wants_none(tmp_path: P
     assert "\x1b[" in shown
     assert "\x1b[" not in plain
     assert "^ wanted 0..1, got 7" in plain
+
+
+DUTCH = (
+    HEAD.replace(">", ' xml:lang="nl">')
+    + '<speech id="s"><text>Die nonsense was quiet.</text></speech>'
+    + '<speech id="t" start="s:end"><text xml:lang="en">Nonsense.</text></speech></bml>'
+)
+
+
+def test_words_are_those_of_the_language_that_the_document_names(tmp_path: Path) -> None:
+    told = check(tmp_path, DUTCH).stderr
+    assert '"Nonsense" is said without anger' in told
+    assert '"nonsense"' not in told
+    assert "no emotional words" not in told
+
+
+def test_a_language_without_words_is_told_once_to_who_asks_for_more(tmp_path: Path) -> None:
+    document = tmp_path / "d.bml"
+    document.write_text(DUTCH + DUTCH)
+    arguments = ["-v", "check", str(document)]
+    told = CliRunner().invoke(cli, arguments, standalone_mode=False).stderr
+    assert told.count("no emotional words for language 'nl'") == 1
+
+
+def test_words_of_another_language_come_from_a_file_for_advice_too(tmp_path: Path) -> None:
+    words = tmp_path / "nl.csv"
+    words.write_text(
+        "# source: own\n# units: none\n# licence: MIT\nword,category,origin\nonzin,disapproval,own\n"
+    )
+    document = HEAD + '<speech id="s"><text>Onzin.</text></speech></bml>'
+    assert "without anger" not in check(tmp_path, document).stderr
+    for options in (("--language", "nl"), ()):
+        assert (
+            '"Onzin" is said without anger'
+            in check(tmp_path, document, "--words", str(words), *options).stderr
+        )
+    assert "without anger" not in check(tmp_path, document, "--language", "nl").stderr
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("nothing\n")
+    assert str(wrong) in str(check(tmp_path, document, "--words", str(wrong)).exception)
+
+
+def test_a_description_that_says_something_else_gets_no_advice_on_words_of_the_text(tmp_path: Path) -> None:
+    ssml = '<description priority="1" type="application/ssml+xml"><speak>Something else</speak></description>'
+    said = HEAD + f'<speech id="s"><text>Nonsense.</text>{ssml}</speech></bml>'
+    assert "without anger" not in check(tmp_path, said).stderr

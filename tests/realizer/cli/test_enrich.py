@@ -133,3 +133,19 @@ def test_a_wrong_list_of_words_is_wrong_usage(tmp_path: Path) -> None:
     words.write_text("word,category,origin\n")
     assert "wanted a leading line" in str(enrich("Hi.", "--words", str(words)).exception)
     assert getattr(enrich("Hi.", "--words", str(words)).exception, "exit_code", None) == 2
+
+
+def test_a_documents_language_says_which_words_count() -> None:
+    dutch = (
+        DOCUMENT.format("a", "").replace("Really?", "Nonsense.").replace("<speech", '<speech xml:lang="nl"')
+    )
+    assert starts(enrich("-", stdin=dutch).stdout) == {}
+    done = enrich("-", "--role", "listener", stdin=dutch + dutch.replace('id="a"', 'id="b"'))
+    assert starts(done.stdout) == {}
+    assert done.stderr.count("no emotional words for language 'nl'") == 1
+    assert starts(enrich("-", "--language", "nl", stdin=dutch.replace("nl", "en")).stdout)
+
+
+def test_a_text_keeps_the_language_that_was_asked_for() -> None:
+    assert '<text xml:lang="de">' in enrich("Gut.", "--language", "de").stdout
+    assert "xml:lang" not in enrich("Good.").stdout
