@@ -1,4 +1,4 @@
-"""The fixed axis of what can be animated: AUs by side, the 68 FAPs, and how far something is taken."""
+"""The fixed axis of what can be animated: AUs by side, 68 FAPs, how far something is taken, AUs' order."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from functools import cache
 
 from realizer import tables
 
-__all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence", "region"]
+__all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence", "rank", "region"]
 
 # How far (0..1) something is taken from what shows it otherwise: speech takes the lips, a temporary gaze
-# takes eyes and head from the base gaze, and a document takes blinks and small movements from the idle face.
-PRESENCES = ("lips", "eyes", "head", "blinks", "motion")
+# takes eyes and head from the base gaze, a document takes blinks and small movements from the idle face, and
+# the successive mixer takes the action units from the additive one.
+PRESENCES = ("lips", "eyes", "head", "blinks", "motion", "successive")
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One column of the axis. `name` is "12L" for an AU, "open_jaw" for a FAP, "lips" for a presence."""
+    """One column of the axis.
+
+    `name` is "12L" for an AU, "open_jaw" for a FAP, "lips" for a presence, "rank 12" for an AU's place among
+    those that follow one another.
+    """
 
     name: str
     column: int
@@ -24,8 +29,10 @@ class Target:
 
 @cache
 def axis() -> dict[str, Target]:
-    """Name -> Target of every column: AUs (one column a side where they have sides), 68 FAPs, presences."""
-    names = [*_au_names(), *(row.name for row in tables.faps()), *PRESENCES]
+    """Name -> Target of every column: AUs (one a side where they have sides), 68 FAPs, presences, ranks."""
+    # What turns is not mixed: turns follow one another as they must.
+    ranks = (f"rank {row.au}" for row in tables.action_units() if not row.degrees)
+    names = [*_au_names(), *(row.name for row in tables.faps()), *PRESENCES, *ranks]
     return {name: Target(name, column) for column, name in enumerate(names)}
 
 
@@ -66,12 +73,23 @@ def presence(region: str) -> Target:
     return axis()[region]
 
 
+def rank(number: int) -> Target:
+    """The column that says how early (0..1) an AU comes where AUs follow one another.
+
+    Raises:
+        KeyError: no such AU, or one that turns something.
+    """
+    return axis()[f"rank {number}"]
+
+
 def region(target: Target) -> str:
     """What a column moves, as base states are replaced: "eyes" (gaze), "head", "face" or "idle".
 
     A presence stands in the region it takes; all FAPs but those of eyeballs and head are of the face.
     """
     name = target.name
+    if name == "successive" or name.startswith("rank "):
+        return "face"
     if name in PRESENCES:
         return {"lips": "face", "blinks": "idle", "motion": "idle"}.get(name, name)
     if not name.rstrip("LR").isdigit():

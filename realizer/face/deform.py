@@ -48,7 +48,7 @@ def deform(face: Face, poses: Any) -> Float32:
     rows, taken = rows[:, :FAPS], rows[:, FAPS:]
     moved: Bool = np.logical_or(rows[:, LIDS].any(axis=1), rows[:, THRUST].any(axis=1))
     if units is not None:
-        shown, lips = units.intensities(taken), taken[:, -1]
+        shown, lips, mixing = units.intensities(taken), taken[:, units.lips], taken[:, units.mixing]
         moved |= units.lids(shown)
         # Lids that a unit closes are closed: what gaze and others ask of them would bring them through.
         rows = rows.copy()
@@ -63,7 +63,7 @@ def deform(face: Face, poses: Any) -> Float32:
         moves = basis["fields"] @ np.ascontiguousarray(weights[part].T)
         here.reshape(len(here), -1)[:, 3 * first : 3 * last] += moves.T
         if units is not None:
-            units(shown[part], lips[part], here)
+            units(shown[part], lips[part], mixing[part], here)
         _turn_eyes(basis, rows[part], here)
         _keep_lids_over_balls(basis, rows[part], moved[part], here)
         _turn_head(basis, rows[part], here)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ from realizer.arrays import Bool, Float32, Float64
 from realizer.face.au.mixers import OPENING, opened
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
-from realizer.face.au.roots import roots
+from realizer.face.au.roots import grown, skin
+from realizer.face.au.succession import LEAST, Succession
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
@@ -19,25 +20,30 @@ from realizer.tables import action_units, faps
 
 __all__ = ["Moves", "columns", "moves_of"]
 
-# Whatever else a face is built from moves with the head alone.
-FACE = ("skin", "brows", "lashes", "hair")
-GROWN = ("brows", "lashes")
 JAW = ("lower_teeth", "tongue")
 CLOSE = 43  # the unit that closes the eyes
 LIDS = (5, 6, 7, 9, CLOSE)  # what moves the lids
-LEAST = 1e-5  # m; what a unit moves less is left out of it
 # FAPs of each side's lids; and the presence that says how far speech has the lips.
 LID_FAPS, LIPS = {"L": (19, 21), "R": (20, 22)}, "lips"
+SUCCESSIVE, RANK = "successive", "rank "
 LID_POINTS = {"L": ("3.1", "3.3"), "R": ("3.2", "3.4")}
 
 
 def columns(model: Model) -> tuple[str, ...]:
-    """What a pose holds beside the FAPs: a column for each unit that moves the face, by side, and "lips".
+    """What a pose holds beside the FAPs: units that move the face, by side; the lips; how units are mixed.
 
     "1L", "1R", ... "17", ...; units that differ in time alone (blink and wink are closed eyes) have columns
     of their own, the strongest shows. "lips" is how far speech has the lips: FAPs move them then.
+    "successive" is how far units follow one another, 0 where they are added up; they do by "rank 1",
+    "rank 2", ..., the highest first, and units of one rank as they are numbered.
     """
-    return (*(name for _, names in _units(model) for name in names), LIPS)
+    names = (name for _, names in _units(model) for name in names)
+    return (*names, LIPS, SUCCESSIVE, *(f"{RANK}{au}" for au in _orderly(model)))
+
+
+def _orderly(model: Model) -> list[int]:
+    """The units that can follow one another in any order: closed eyes take the lids after all others."""
+    return [au for au in sorted(model.units) if au != CLOSE]
 
 
 def _units(model: Model) -> list[tuple[tuple[int, str], tuple[str, ...]]]:
@@ -53,9 +59,15 @@ def _units(model: Model) -> list[tuple[tuple[int, str], tuple[str, ...]]]:
 class Moves:
     """The displacements of a face's model as matrices, made once.
 
-    Displacement units are mixed additively, each of the neutral place (Wojdel 2005, 5.1), but for two things
-    that a sum would get wrong: jaw and lips open as far as the widest of 25, 26 and 27 (`mixers.opened`), and
-    what closes the eyes takes the lids from all others, as far as it does.
+    Displacement units are mixed additively, each of the neutral place, or where a pose asks for it
+    successively (Wojdel 2005, 5.1); but for two things that either would get wrong: jaw and lips open as far
+    as the widest of 25, 26 and 27 (`mixers.opened`), and what closes the eyes takes the lids from all others,
+    as far as it does.
+
+    Attributes:
+        moving: the vertices that units move.
+        lips: the column of a pose, behind its FAPs, that says how far speech has the lips.
+        mixing: the columns that say how units are mixed: "successive" and the ranks.
     """
 
     def __init__(self, face: Face, model: Model) -> None:
@@ -66,6 +78,11 @@ class Moves:
         places = {name: k for k, name in enumerate(columns(model))}
         self._read = [[places[name] for name in names] for _, names in known]
         names = [name for name, _ in known]
+        self.lips, self.mixing = places[LIPS], slice(places[SUCCESSIVE], len(places))
+        self._aus = [
+            (au, *(names.index((au, side)) for side in (("L", "R") if (au, "L") in names else ("", ""))))
+            for au in _orderly(model)
+        ]
         moves = _displacements(face, model, names)
         found = np.flatnonzero(moves.any(axis=(0, 2)))
         first, last = (int(found[0]), int(found[-1]) + 1) if len(found) else (0, 0)
@@ -103,11 +120,19 @@ class Moves:
         """(n,) whether a unit moves the lids."""
         return np.asarray(shown[:, self._lid_columns].any(axis=1))
 
-    def __call__(self, shown: Float32, lips: Float32, vertices: Float32) -> None:
-        """Move vertices (n, n_vertices, 3) by intensities (n, units), in place; speech has `lips` (n,)."""
+    def __call__(self, shown: Float32, lips: Float32, mixing: Float32, vertices: Float32) -> None:
+        """Move vertices in place.
+
+        Args:
+            shown: (n, units) intensities.
+            lips, mixing: (n,) and (n, k), those columns of poses.
+            vertices: (n, n_vertices, 3).
+        """
         if not shown.any():
             return
         moves = (self._move @ np.ascontiguousarray(shown[:, self._rest].T)).T.reshape(len(shown), -1, 3)
+        for k in np.flatnonzero(mixing[:, 0]):
+            moves[k] += mixing[k, 0] * (self._succeeding(shown[k], mixing[k, 1:]) - moves[k])
         closed = self.closed(shown)
         if closed.any():
             index, share = self._lids
@@ -120,6 +145,19 @@ class Moves:
         for angle, frame in zip((shown @ self._jaw) * (1 - lips), vertices, strict=True):
             if angle:
                 self._turn_jaw(float(angle), frame)
+
+    def _succeeding(self, shown: Float32, ranks: Float32) -> Float32:
+        """(n_moving, 3) what units move one after the other, the highest rank first, closed eyes left out."""
+        values = {}
+        for k in np.argsort(-ranks, kind="stable"):
+            au, left, right = self._aus[k]
+            if shown[left] or shown[right]:
+                values[au] = float(shown[left]), float(shown[right])
+        return self._succession(values)[self.moving].astype(np.float32)
+
+    @cached_property
+    def _succession(self) -> Succession:
+        return Succession(self._face, self._model)
 
     def _turn_jaw(self, angle: float, vertices: Float32) -> None:
         """The jaw bone: teeth and tongue turn with what is on them (what is an object's own comes first)."""
@@ -140,20 +178,14 @@ def moves_of(face: Face) -> Moves | None:
 def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Float64:
     """(units, n_vertices, 3) metres with full intensity."""
     at = face.vertices.astype(np.float64)
-    mine = np.zeros(len(at), bool)
-    for part in FACE:
-        if part in face.parts:
-            mine[slice(*face.parts[part])] = True
+    mine = skin(face)
     upper = shares(face, model.mouth)
     moves = np.zeros((len(names), *at.shape))
     for row, (au, side) in zip(moves, names, strict=True):
         row[mine] = model.displacement(au, at[mine], side, upper[mine])
     # Brows and lashes go with the skin that they grow on: off it, functions of the place differ.
-    for part in GROWN:
-        if part in face.parts:
-            first, last = face.parts[part]
-            corners, share = roots(face, part)
-            moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
+    for first, last, corners, share in grown(face):
+        moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
     moves[np.abs(moves).max(axis=2) < LEAST] = 0
     return moves
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 
-__all__ = ["angle", "cubic_terms", "density", "direction"]
+__all__ = ["angle", "cubic_terms", "density", "direction", "heading", "height"]
 
 GAUSSIAN = 10  # parameters of a Gaussian: height, centre (3), the six of the lower triangular root of B
 ANGLE = 19  # parameters of an angle: A1 (6), A2 (3), A3 (6), A4 (3), c
@@ -39,13 +39,7 @@ def density(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
     total = np.zeros(len(at))
     slopes = np.empty((len(at), GAUSSIAN * len(parameters)))
     for k, one in enumerate(np.asarray(parameters, np.float64)):
-        root = np.zeros((3, 3))
-        for value, place in zip(one[4:], LOWER, strict=True):
-            root[place] = value
-        away = at - one[1:4]
-        # A bell is nought 40 widths out: what is further would only overflow.
-        turned = np.clip(away @ root, -40, 40)
-        bell = np.exp(-np.einsum("ij,ij->i", turned, turned) / 2)
+        root, away, turned, bell = _bell(one, at)
         high = one[0] * bell
         total += high
         mine = slopes[:, GAUSSIAN * k : GAUSSIAN * (k + 1)]
@@ -56,6 +50,25 @@ def density(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
     return total, slopes
 
 
+def height(parameters: Any, at: Float64) -> Float64:
+    """(n,) the density alone; arguments as `density`."""
+    total = np.zeros(len(at))
+    for one in np.asarray(parameters, np.float64):
+        total += one[0] * _bell(one, at)[3]
+    return total
+
+
+def _bell(one: Float64, at: Float64) -> tuple[Float64, Float64, Float64, Float64]:
+    """Root of B, (3, 3); the way from the centre, (n, 3), and in widths; the Gaussian of height 1, (n,)."""
+    root = np.zeros((3, 3))
+    for value, place in zip(one[4:], LOWER, strict=True):
+        root[place] = value
+    away = at - one[1:4]
+    # A bell is nought 40 widths out: what is further would only overflow.
+    turned = np.clip(away @ root, -40, 40)
+    return root, away, turned, np.exp(-np.einsum("ij,ij->i", turned, turned) / 2)
+
+
 def angle(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
     """A cubic polynomial of the place: quadratic form times linear form, both again, a constant (4.4, 4.5).
 
@@ -64,12 +77,25 @@ def angle(parameters: Any, at: Float64) -> tuple[Float64, Float64]:
     """
     p = np.asarray(parameters, np.float64)
     squares = cubic_terms(at)
-    form, line = squares @ p[:6], at @ p[6:9]
-    value = form * line + squares @ p[9:15] + at @ p[15:18] + p[18]
+    form, line, value = _cubic(p, squares, at)
     slopes = np.concatenate(
         [squares * line[:, None], at * form[:, None], squares, at, np.ones((len(at), 1))], axis=1
     )
     return value, slopes
+
+
+def heading(alpha: Any, beta: Any, at: Float64) -> Float64:
+    """(n, 3) unit vectors by the angles of places (n, 3): `angle` and `direction` without derivatives."""
+    squares = cubic_terms(at)
+    a, b = (_cubic(np.asarray(p, np.float64), squares, at)[2] for p in (alpha, beta))
+    level = np.cos(b)
+    return np.stack([np.cos(a) * level, np.sin(b), np.sin(a) * level], 1)
+
+
+def _cubic(p: Float64, squares: Float64, at: Float64) -> tuple[Float64, Float64, Float64]:
+    """The forms that are multiplied, and the whole polynomial, (n,) each."""
+    form, line = squares @ p[:6], at @ p[6:9]
+    return form, line, form * line + squares @ p[9:15] + at @ p[15:18] + p[18]
 
 
 def direction(alpha: Float64, beta: Float64) -> tuple[Float64, Float64, Float64]:

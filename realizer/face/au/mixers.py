@@ -33,10 +33,20 @@ def additive(model: Model, at: Float64, values: Mapping[int, float]) -> Float64:
     return np.asarray(at + moves)
 
 
-def successive(model: Model, at: Float64, values: Mapping[int, float]) -> Float64:
-    """Displacement units, each of the place where the one before left it: their order matters."""
+def successive(
+    model: Model, at: Float64, values: Mapping[int, float], upper: Float64 | None = None
+) -> Float64:
+    """Displacement units, each of the place where the one before left it: their order matters.
+
+    `succession.Succession` does it for a whole face, frame by frame.
+
+    Args:
+        at: (n, 3) metres.
+        values: action unit -> intensity 0..1, in this order.
+        upper: (n,) how far each belongs to the upper half of the face; None: as it lies, at every step.
+    """
     for au, value in values.items():
-        at = at + value * model.displacement(au, at)
+        at = at + value * model.displacement(au, at, upper=upper)
     return np.asarray(at)
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from realizer.arrays import Float64
-from realizer.face.au.functions import angle, density, direction
+from realizer.face.au.functions import heading, height
 
-__all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "rotation", "turned"]
+__all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "half", "rotation", "turned"]
 
 CENTIMETRE = 0.01  # m; the unit of the functions' coordinates, in which their parameters are near 1
 BENT = 0.008  # m before and behind the line between the lips; beyond it the mouth's plane is level
@@ -34,18 +34,19 @@ class Motion:
 
     def density(self, at: Float64) -> Float64:
         """(n,) metres that points (n, 3), metres, are moved with full intensity."""
-        return density(self.gaussians, (at - self.origin) / CENTIMETRE)[0]
+        return height(self.gaussians, (at - self.origin) / CENTIMETRE)
 
     def direction(self, at: Float64) -> Float64:
         """(n, 3) unit vectors they are moved along."""
-        near = (at - self.origin) / CENTIMETRE
-        return direction(angle(self.alpha, near)[0], angle(self.beta, near)[0])[0]
+        return heading(self.alpha, self.beta, (at - self.origin) / CENTIMETRE)
 
     def __call__(self, at: Float64) -> Float64:
         """(n, 3) metres: equation 4.1 with full intensity."""
-        moved = self.density(at)
+        far, moves = self.density(at), np.zeros(at.shape)
         # Far off, polynomials are large and mean nothing; the density is nought there.
-        return np.where(np.abs(moved)[:, None] > 1e-7, moved[:, None] * self.direction(at), 0.0)
+        near = np.flatnonzero(np.abs(far) > 1e-7)
+        moves[near] = far[near, None] * self.direction(at[near])
+        return moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +98,12 @@ class UnitModel:
         """
         if "whole" in self.motions:
             return self.motions["whole"](at)
-        share = (mouth.upper(at) if upper is None else upper)[:, None]
-        return np.asarray(share * self.motions["upper"](at) + (1 - share) * self.motions["lower"](at))
+        share = mouth.upper(at) if upper is None else upper
+        moves = np.zeros(at.shape)
+        for half, part in (("upper", share), ("lower", 1 - share)):
+            mine = np.flatnonzero(part)
+            moves[mine] += part[mine, None] * self.motions[half](at[mine])
+        return moves
 
 
 @dataclass(frozen=True)
@@ -152,14 +157,19 @@ class Model:
         moves = self.units[au].displacement(at, self.mouth, upper)
         if not side:
             return moves
-        share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
-        return np.asarray(moves * (share * share * (3 - 2 * share))[:, None])
+        return np.asarray(moves * half(at, side)[:, None])
 
     def gap(self, au: int) -> float:
         """Metres by which a displacement unit parts the lips in the middle, with full intensity."""
         between = np.array([[0.0, self.mouth.y[0], self.mouth.z[0]]])
         upper, lower = (self.displacement(au, between, upper=np.array([half]))[0, 1] for half in (1.0, 0.0))
         return float(upper - lower)
+
+
+def half(at: Float64, side: str) -> Float64:
+    """(n,) 0..1: how far points (n, 3) belong to the character's side "L" or "R"; the two make 1."""
+    share = np.clip((at[:, 0] * (1 if side == "L" else -1) / SIDES + 1) / 2, 0, 1)
+    return np.asarray(share * share * (3 - 2 * share))
 
 
 def rotation(axis: tuple[float, float, float], radians: float) -> Float64:

@@ -1,4 +1,4 @@
-"""A face and a part of it that grows on its skin in; the place in the skin that each vertex goes with out."""
+"""A face in; which of its vertices units move, and where in the skin what grows on it has its roots, out."""
 
 from __future__ import annotations
 
@@ -6,13 +6,29 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float64, Int32
+from realizer.arrays import Bool, Float64, Int32
 from realizer.face.model import Face
 
-__all__ = ["roots"]
+__all__ = ["grown", "roots", "skin"]
 
+# Whatever else a face is built from moves with the head alone, or grows on the skin.
+MOVED, GROWN = ("skin", "hair"), ("brows", "lashes")
 NEAR = 0.0015  # m; what is nearer to the skin than this grows there
 AROUND = 16  # triangles looked at, those whose middles are nearest
+
+
+def skin(face: Face) -> Bool:
+    """(n,) the vertices that units move themselves; what has grown on the skin goes with that."""
+    mine = np.zeros(len(face.vertices), bool)
+    for part in MOVED:
+        if part in face.parts:
+            mine[slice(*face.parts[part])] = True
+    return mine
+
+
+def grown(face: Face) -> list[tuple[int, int, Int32, Float64]]:
+    """The parts that grow on the skin: first and last vertex, and what `roots` says of them."""
+    return [(*face.parts[part], *roots(face, part)) for part in GROWN if part in face.parts]
 
 
 def roots(face: Face, part: str) -> tuple[Int32, Float64]:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import pytest
 
 from realizer import tables
-from realizer.animation.targets import AU_NAMES, PRESENCES, au, axis, fap, presence, region
+from realizer.animation.targets import AU_NAMES, PRESENCES, au, axis, fap, presence, rank, region
 
 
-def test_the_axis_is_aus_then_68_faps_then_presences() -> None:
+def test_the_axis_is_aus_then_68_faps_then_presences_then_ranks() -> None:
     names = list(axis())
-    assert names[: len(AU_NAMES())] == list(AU_NAMES())
-    assert names[len(AU_NAMES()) : -len(PRESENCES)] == [row.name for row in tables.faps()]
-    assert names[-len(PRESENCES) :] == list(PRESENCES)
+    faps = len(AU_NAMES())
+    presences = faps + 68
+    ranks = presences + len(PRESENCES)
+    assert names[:faps] == list(AU_NAMES())
+    assert names[faps:presences] == [row.name for row in tables.faps()]
+    assert names[presences:ranks] == list(PRESENCES)
+    assert all(name.startswith("rank ") for name in names[ranks:])
     assert [target.column for target in axis().values()] == list(range(len(names)))
 
 
@@ -22,6 +26,13 @@ def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
     assert [t.name for t in au(26, "LEFT")] == ["26"]
     with pytest.raises(KeyError):
         au(99)
+
+
+def test_every_au_but_those_that_turn_something_has_a_rank() -> None:
+    assert [rank(number).name for number in (1, 12, 43)] == ["rank 1", "rank 12", "rank 43"]
+    for turn in (51, 63, 99):
+        with pytest.raises(KeyError):
+            rank(turn)
 
 
 @pytest.mark.parametrize(
@@ -40,6 +51,8 @@ def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
         (presence("lips"), "face"),
         (presence("blinks"), "idle"),
         (presence("motion"), "idle"),
+        (presence("successive"), "face"),
+        (rank(12), "face"),
     ],
 )
 def test_a_target_belongs_to_a_region(target: object, wanted: str) -> None:

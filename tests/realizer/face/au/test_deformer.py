@@ -43,10 +43,12 @@ def test_at_rest_the_face_is_neutral_to_the_last_bit(face: Face) -> None:
     assert (deform(face, np.zeros((2, len(face.takes)))) == face.vertices).all()
 
 
-def test_a_pose_is_the_faps_then_each_unit_by_side_then_the_lips(face: Face) -> None:
+def test_a_pose_is_the_faps_then_each_unit_by_side_then_the_lips_and_the_mixing(face: Face) -> None:
     assert face.takes[:68] == load_face(deformer="mpeg4").takes
     assert {"12L", "12R", "17", "45L", "46R"} <= set(face.takes[68:])
-    assert face.takes[-1] == "lips"
+    mixing = face.takes.index("lips")
+    assert face.takes[mixing + 1 : mixing + 4] == ("successive", "rank 1", "rank 2")
+    assert face.takes[-1] == "rank 28"
     assert len(set(face.takes)) == len(face.takes)
     assert takes(deformer="au") == face.takes
 
@@ -102,6 +104,38 @@ def test_a_smile_on_the_left_leaves_the_right_alone(face: Face) -> None:
     left, right = (face.feature_points[key] for key in ("8.3", "8.4"))
     assert np.linalg.norm(moved[left]) > 0.008
     assert np.linalg.norm(moved[right]) < 1e-6
+
+
+def test_units_follow_one_another_where_a_pose_asks_for_it(face: Face) -> None:
+    """By rank, and as they are numbered where ranks do not tell them apart; what is rigid does not care."""
+    summed = shown(face, au12=1, au25=1)
+    chained = shown(face, au12=1, au25=1, successive=1)
+    turned = shown(face, au12=1, au25=1, successive=1, **{"rank 25": 0.5})
+    assert np.linalg.norm(chained - summed, axis=1).max() > 0.001
+    assert np.linalg.norm(chained - turned, axis=1).max() > 0.001
+    assert np.array_equal(chained, shown(face, au12=1, au25=1, successive=1, **{"rank 12": 0.5}))
+    both = {"rank 25": 0.9, "rank 12": 0.8}
+    assert np.array_equal(turned, shown(face, au12=1, au25=1, successive=1, **both))
+    for name in ("upper_teeth", "left_eye", "lower_teeth"):
+        assert np.array_equal(part(face, chained, name), part(face, summed, name)), name
+
+
+def test_one_unit_alone_is_the_same_either_way_and_ranks_alone_change_nothing(face: Face) -> None:
+    smile = shown(face, au12=0.7)
+    assert shown(face, au12=0.7, successive=1) == pytest.approx(smile, abs=2e-5)
+    both = shown(face, au12=1, au25=1)
+    assert np.array_equal(both, shown(face, au12=1, au25=1, **{"rank 25": 1}))
+
+
+def test_half_way_to_the_other_mixer_is_half_way_between_the_faces(face: Face) -> None:
+    ends = [shown(face, au12=1, au25=1, successive=share) for share in (0, 1)]
+    assert shown(face, au12=1, au25=1, successive=0.5) == pytest.approx(np.mean(ends, axis=0), abs=1e-6)
+
+
+def test_closed_lids_meet_however_units_are_mixed(face: Face) -> None:
+    made = shown(face, au43=1, au4=1, au6=1, au7=1, successive=1)
+    apart = made[face.feature_points["3.1"], 1] - made[face.feature_points["3.3"], 1]
+    assert -0.0003 < apart < 0.002
 
 
 def test_closed_eyes_cover_their_balls(face: Face) -> None:
@@ -210,7 +244,8 @@ def test_a_face_may_be_drawn_by_its_model_without_being_asked(mine: Path) -> Non
 def test_a_face_may_leave_some_of_its_units_to_the_faps(mine: Path) -> None:
     say(mine, 'deformer = { name = "au", model = "au_published.toml", aus = [1, 2, 12] }')
     face = load_face("mine", mine.parent)
-    assert face.takes[68:] == ("1L", "1R", "2L", "2R", "12L", "12R", "lips")
+    assert face.takes[68:75] == ("1L", "1R", "2L", "2R", "12L", "12R", "lips")
+    assert face.takes[75:] == ("successive", "rank 1", "rank 2", "rank 12")
     assert face.model is not None
     assert face.model.form == "published"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realizer.face.au.functions import angle, density, direction
+from realizer.face.au.functions import angle, density, direction, heading, height
 
 RANDOM = np.random.default_rng(5)
 AT = RANDOM.normal(size=(40, 3))
@@ -35,6 +35,12 @@ def test_the_density_falls_by_the_form_of_equation_4_6() -> None:
     bell = np.array([[2.0, 0, 0, 0, 0.5, 0.1, 0.6, -0.2, 0.3, 0.4]])
     form = np.einsum("ni,ij,nj->n", AT, root @ root.T, AT)
     assert density(bell, AT)[0] == pytest.approx(2 * np.exp(-form / 2))
+
+
+def test_without_derivatives_the_functions_are_the_same_to_the_last_bit() -> None:
+    assert np.array_equal(height(BELLS, AT), density(BELLS, AT)[0])
+    ways = direction(angle(ANGLE, AT)[0], angle(-ANGLE, AT)[0])[0]
+    assert np.array_equal(heading(ANGLE, -ANGLE, AT), ways)
 
 
 def test_densities_add_up() -> None:
