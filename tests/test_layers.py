@@ -140,6 +140,8 @@ DOORS = {
     "clarabel": ("realizer.scheduling",),
     "click": ("realizer.cli",),
     "espeakng_loader": ("realizer.speech.espeak_worker",),
+    "hibari": ("realizer.speech.hibari", "realizer.speech.hibari_worker"),
+    "onnxruntime": ("realizer.speech.hibari_worker",),
     "stomp": ("realizer.server.doors.broker",),
 }
 

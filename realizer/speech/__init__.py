@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from realizer.speech.catalogue import VoiceInfo, find_voice, voices
     from realizer.speech.espeak import EspeakVoice
+    from realizer.speech.hibari import HibariVoice
     from realizer.speech.silent import SilentVoice
     from realizer.speech.utterance import Phoneme, Say, Utterance, Voice, Word
 
 __all__ = [
     "EspeakVoice",
+    "HibariVoice",
     "Phoneme",
     "Say",
     "SilentVoice",
@@ -29,6 +31,7 @@ __all__ = [
 
 _HOME = {
     "EspeakVoice": "espeak",
+    "HibariVoice": "hibari",
     "SilentVoice": "silent",
     "VoiceInfo": "catalogue",
     "find_voice": "catalogue",

@@ -33,18 +33,25 @@ class VoiceInfo:
 
 def voices() -> tuple[VoiceInfo, ...]:
     """The voices, best first; starts no engine."""
-    from realizer.speech.espeak import missing
+    from realizer.speech import espeak, hibari
 
-    fix = missing()
     spelled = tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
     return (
         VoiceInfo(
             name="espeak",
             engine="espeak-ng",
             languages=(),
-            available=fix is None,
-            says=fix
+            available=espeak.missing() is None,
+            says=espeak.missing()
             or "espeak-ng speaks over 100 languages; a variant is named as in espeak:en-gb+f3 or espeak:nl",
+        ),
+        VoiceInfo(
+            name="hibari",
+            engine="hibari-tts",
+            languages=("en-US", "en-GB"),
+            available=hibari.missing() is None,
+            says=hibari.missing()
+            or "a neural voice, English only; its other voices are named as in hibari:emma",
         ),
         VoiceInfo(
             name="silent",
@@ -60,23 +67,26 @@ def find_voice(name: str | None = None) -> Voice:
     """The voice of that name.
 
     Args:
-        name: "espeak", "espeak:VOICE" (a voice of espeak-ng such as "en-gb+f3"), "silent", or None for the
-            best that is installed.
+        name: "espeak", "espeak:VOICE" (a voice of espeak-ng such as "en-gb+f3"), "hibari", "hibari:VOICE",
+            "silent", or None for the best that is installed.
 
     Raises:
         VoiceError: no such voice, or it is not installed; the text says what to do.
     """
-    from realizer.speech.espeak import EspeakVoice, missing
+    from realizer.speech import espeak, hibari
 
     if name is None:
-        return SilentVoice() if missing() else EspeakVoice()
+        name = next(voice.name for voice in voices() if voice.available)
     engine, _, variant = name.partition(":")
     if engine == "silent" and not variant:
         return SilentVoice()
     if engine in ("espeak", "espeak-ng"):
-        fix = missing()
-        if fix:
+        if fix := espeak.missing():
             raise VoiceError(fix)
-        return EspeakVoice(voice=variant or None)
+        return espeak.EspeakVoice(voice=variant or None)
+    if engine in ("hibari", "hibari-tts"):
+        if fix := hibari.missing() or (hibari.missing_voice(variant) if variant else None):
+            raise VoiceError(fix)
+        return hibari.HibariVoice(voice=variant or None)
     known = ", ".join(v.name for v in voices())
     raise VoiceError(f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to get them")

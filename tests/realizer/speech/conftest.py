@@ -1,4 +1,4 @@
-"""One espeak-ng for all tests; those that need it are skipped, with what to install, where it is absent."""
+"""One engine of each kind for all tests; those that need one are skipped where it is absent, with the fix."""
 
 from __future__ import annotations
 
@@ -6,17 +6,27 @@ from collections.abc import Iterator
 
 import pytest
 
-from realizer.speech.espeak import EspeakVoice, missing
+from realizer.speech import espeak, hibari
+from realizer.speech.espeak import EspeakVoice
+from realizer.speech.hibari import HibariVoice
 
 
 @pytest.fixture(autouse=True)
-def _skip_without_espeak(request: pytest.FixtureRequest) -> None:
-    if request.node.get_closest_marker("espeak") and (fix := missing()):
-        pytest.skip(fix)
+def _skip_without_the_engine(request: pytest.FixtureRequest) -> None:
+    for marker, missing in (("espeak", espeak.missing), ("hibari", hibari.missing)):
+        if request.node.get_closest_marker(marker) and (fix := missing()):
+            pytest.skip(fix)
 
 
 @pytest.fixture(scope="session")
 def voice() -> Iterator[EspeakVoice]:
     voice = EspeakVoice()
+    yield voice
+    voice.close()
+
+
+@pytest.fixture(scope="session")
+def neural() -> Iterator[HibariVoice]:
+    voice = HibariVoice()
     yield voice
     voice.close()

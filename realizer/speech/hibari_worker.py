@@ -1,0 +1,134 @@
+"""hibari as `engine_worker` runs it: text in, readings out; a reading in, PCM and how long each sign is out.
+
+    hello   {"rate", "durations": whether the model tells how long its signs are}
+    read    {"texts"} -> {"texts": [[[[word, phonemes, blank after], ...] a sentence, ...] a text, ...]}
+    say     {"phonemes", "speed", "pitch"} -> {"lead", "signs": [one a character of `phonemes`], "tail"} in
+            samples (null where the model does not tell), and float32 PCM
+
+hibari (Apache-2.0) speaks English. Its model has no output for durations; the tensor is there and is named as
+one. The same request gives the same samples: the noise is drawn from a fixed seed for each sentence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any
+
+__all__: list[str] = []
+
+DURATIONS = "/Round_output_0"  # frames of each sign, in the models of hibari 0.2
+SEED = 0
+LONGEST = 400  # phonemes at once; the time and memory of the model grow with the square
+LINK = re.compile(r"\](?=\()")  # hibari reads [word](/phonemes/); here brackets are brackets
+
+
+class Speaker:
+    """The model and its reader, loaded.
+
+    Args:
+        voice: one of hibari's voices that is on this machine.
+        durations: name of the tensor that holds them.
+    """
+
+    drifts = False
+
+    def __init__(self, voice: str, durations: str) -> None:
+        from hibari import Hibari
+        from hibari.voices import voice_path
+
+        model = Path(voice_path(voice, download_missing=False)).read_bytes()
+        try:
+            self.hibari = Hibari(voice, with_output(model, durations))
+            self.has_durations = True
+        except Exception:  # onnxruntime's own kinds are not public; a model that is damaged fails again
+            self.hibari = Hibari(voice, model)
+            self.has_durations = False
+        self.reader = self.hibari.g2p
+        self.operations = {"read": self.read, "say": self.say}
+
+    def hello(self) -> dict[str, Any]:
+        self.reading("Hello.")  # the first sentence should not wait for what is loaded when it is used
+        self.say({"phonemes": "hi", "speed": 1.0, "pitch": 1.0})
+        return {"rate": self.hibari.sample_rate, "durations": self.has_durations}
+
+    def read(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        return {"texts": [self.reading(text) for text in request["texts"]]}, b""
+
+    def reading(self, text: str) -> list[list[tuple[str, str, bool]]]:
+        from hibari.g2p.normalize import normalize
+
+        sentences = []
+        for sentence in self.hibari.split_sentences(LINK.sub("] ", text)):
+            tokens = self.reader.phonemize_tokens(self.reader.tokenize(normalize(sentence)))
+            words = [(token.text, token.phonemes or "", bool(token.whitespace)) for token in tokens]
+            sentences += split(words)
+        return sentences
+
+    def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        import numpy as np
+        from hibari import dsp
+
+        known = self.hibari.vocab
+        signs = [sign for sign in request["phonemes"] if sign in known]
+        given = {
+            "ids": np.array([[0, *(known[sign] for sign in signs), 0]], np.int64),
+            "speed": np.array([request["speed"]], np.float32),
+        }
+        heights, angles, noise, rest, phase, pitch, *told = self.hibari.sess.run(None, given)
+        random = np.random.default_rng(SEED)
+        sound = dsp.synth(
+            heights[0], angles[0], noise[0], rest[0], phase[0], pitch[0] * request["pitch"], random
+        )
+        head: dict[str, Any] = {"lead": 0, "signs": None, "tail": 0}
+        if told:
+            frames = told[0].ravel()
+            hop = len(sound) / frames.sum()
+            lengths = iter((frames * hop).round().astype(int).tolist())
+            lead = next(lengths)
+            each = [next(lengths) if sign in known else 0 for sign in request["phonemes"]]
+            head = {"lead": lead, "signs": each, "tail": next(lengths)}
+        return head, sound.astype("<f4").tobytes()
+
+
+def split(words: list[tuple[str, str, bool]]) -> list[list[tuple[str, str, bool]]]:
+    """A sentence as pieces of at most `LONGEST` phonemes: at a comma, else at a blank, else anywhere."""
+    pieces: list[list[tuple[str, str, bool]]] = [[]]
+    length = 0
+    for text, phonemes, blank in words:
+        while phonemes or text:
+            if length + len(phonemes) > LONGEST and pieces[-1]:
+                rest = pieces[-1]
+                cut = next(
+                    (k for k in range(len(rest), 0, -1) if rest[k - 1][1][-1:] in (",", ";", ":", "—")), 0
+                )
+                if sum(len(word[1]) for word in rest[:cut]) < LONGEST // 2:
+                    cut = next((k for k in range(len(rest), 0, -1) if rest[k - 1][2]), len(rest))
+                pieces[-1:] = [rest[:cut], rest[cut:]]
+                length = sum(len(word[1]) for word in pieces[-1])
+                continue
+            pieces[-1].append((text, phonemes[:LONGEST], blank and len(phonemes) <= LONGEST))
+            length += len(phonemes[:LONGEST])
+            text, phonemes = "", phonemes[LONGEST:]
+    return [piece for piece in pieces if piece]
+
+
+def with_output(model: bytes, tensor: str) -> bytes:
+    """An ONNX model with one more output.
+
+    Two messages of one kind are read as one, by the rules of protocol buffers: a second ModelProto.graph (7)
+    with nothing but a GraphProto.output (12) that has a ValueInfoProto.name (1) is put behind the model.
+    """
+    message = tensor.encode()
+    for field in (1, 12, 7):
+        message = bytes([field << 3 | 2, len(message)]) + message  # lengths below 128 take one byte
+    return model + message
+
+
+def load(arguments: list[str]) -> Speaker:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--voice", default="heart")
+    parser.add_argument("--durations", default=DURATIONS, help="name of a tensor")
+    options = parser.parse_args(arguments)
+    return Speaker(options.voice, options.durations)
