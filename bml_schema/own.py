@@ -9,7 +9,9 @@ from bml_schema.values import integer, number, one_of, string, word
 
 __all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood", "Timeline"]
 
-_ANGLE = number(-360, 360)  # degrees on the wheel of emotions
+_ANGLE = number(-1e6, 1e6, wanted="degrees")  # on the wheel of emotions; turns do not count
+_AFFECT = number(-1, 1)
+_SEED = integer(0, 2**31 - 1)
 _ACTIVATION = number(0, 7)  # 7 is all of an emotion, as Paul scales Whissel
 _FAPU = number(-1e5, 1e5)
 
@@ -19,22 +21,30 @@ class Feeling(Behaviour):
     """What an emotion and a mood say alike.
 
     Attributes:
-        name: its word.
+        name: its word, or an archetype with the number of one of its profiles ("fear 8").
         angle, activation: instead of a word, its place on the wheel; activation 0..7, None the angle's own.
-        intensity: 0.5 moderate, 1 maximal.
+        valence, arousal: instead of both, its place between pleasant and unpleasant, calm and excited.
+        intensity: how much of it shows; 1 all, as a word is already as strong as it says.
         profile: which of several ways to show it; None the usual one.
+        seed: for a face that is drawn within what the profile allows; None its middle.
     """
 
     name: str | None = attribute(word, default=None)
     angle: float | None = attribute(_ANGLE, default=None)
     activation: float | None = attribute(_ACTIVATION, default=None)
-    intensity: float = attribute(AMOUNT, default=0.5)
+    valence: float | None = attribute(_AFFECT, default=None)
+    arousal: float | None = attribute(_AFFECT, default=None)
+    intensity: float = attribute(AMOUNT, default=1.0)
     profile: str | None = attribute(word, default=None)
+    seed: int | None = attribute(_SEED, default=None)
 
     def fault(self) -> str:
-        if (self.name is None) == (self.angle is None):
-            got = "neither" if self.name is None else "both"
-            return f"wanted a name, or an angle on the wheel, got {got}"
+        affect = {"valence": self.valence, "arousal": self.arousal}
+        ways = {"a name": self.name, "an angle": self.angle, **affect}
+        given = [way for way, value in ways.items() if value is not None]
+        if given not in (["a name"], ["an angle"], [*affect]):
+            got = " and ".join(given) or "none of them"
+            return f"wanted one of a name, an angle, or valence with arousal, got {got}"
         if self.activation is not None and self.angle is None:
             return "activation: wanted an angle with it, got none"
         return ""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
+
+import numpy as np
 
 from bml_schema import Emotion, Mood
 from realizer.animation.channel import Channel
@@ -13,13 +14,23 @@ from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
+from realizer.emotion import (
+    UnknownWordError,
+    affect,
+    known_words,
+    place_of,
+    place_of_affect,
+    shares,
+    strength_at,
+    strength_of,
+    wheel,
+)
 from realizer.emotion import emotion as profile_of
-from realizer.emotion import known_words, place_of, shares, strength_of, wheel
 from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
 
-__all__ = ["KINDS", "values_of", "values_of_affect"]
+__all__ = ["KINDS", "values_of"]
 
 # Ours play as action units, so that speech and blinks find their place in them; the published ones as FAPs.
 OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
@@ -57,9 +68,17 @@ def expand_mood(node: Mood, times: Float64, world: World) -> tuple[Channel, ...]
 
 def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
     """An unknown word, and one without a face, are fatal, an unknown profile is not."""
-    if node.name is not None and node.name.lower() not in known_words():
-        return (poses.unknown("name", node.name, known_words()),)
-    if node.profile not in (*OWN, *PUBLISHED):
+    known = node.profile in (*OWN, *PUBLISHED)
+    if node.name is not None:
+        try:
+            profile_of(node.name, _set(node))
+        except UnknownWordError as wrong:
+            if node.name[-1:].isdecimal():
+                return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)
+            return (poses.unknown("name", node.name, known_words()),)
+        except ValueError as wrong:
+            return (Fault("CANNOT_CREATE_BEHAVIOR", f"name: {wrong}"),)
+    if not known:
         wanted = ", ".join(name for name in (*OWN, *PUBLISHED) if name)
         text = f"profile: wanted one of {wanted}, got {node.profile!r}; shown as usual"
         return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
@@ -72,41 +91,56 @@ def claims_of_mood(node: Mood, world: World) -> frozenset[str]:
 
 
 def values_of(node: Emotion | Mood) -> dict[Target, float]:
-    """Column -> what it shows: AUs 0..1, or FAPs of a published profile."""
+    """Column -> what it shows: AUs 0..1, or FAPs of a published profile; with a seed a draw of them.
+
+    Raises:
+        ValueError: a place off the wheel, or off the plane of valence and arousal.
+    """
     if node.profile in PUBLISHED:
-        found = (
-            wheel(node.angle, node.activation, node.profile)
-            if node.angle is not None
-            else profile_of(node.name or "", node.profile)
-        )
-        return {fap(number): node.intensity * value for number, value in found.midpoint().items()}
-    return _shown(*_mix(node), node.intensity)
-
-
-def values_of_affect(valence: float, arousal: float, intensity: float) -> dict[Target, float]:
-    """Column -> what it shows at a place in the plane of valence and arousal, -1..1 each (Paul 2010, 8.2)."""
-    parts = shares(math.degrees(math.atan2(arousal, valence)), "own", "affect")
-    return _shown(parts, min(math.hypot(valence, arousal), 1.0), intensity)
-
-
-def _shown(parts: Mapping[str, float], strength: float, intensity: float) -> dict[Target, float]:
+        if node.angle is not None:
+            found = wheel(node.angle, node.activation, node.profile)
+        elif node.valence is not None and node.arousal is not None:
+            found = affect(node.valence, node.arousal, node.profile)
+        else:
+            found = profile_of(node.name or "", node.profile)
+        frame = found.frame() if node.seed is None else found.draw(node.seed)
+        return {fap(number): node.intensity * float(frame[number - 1]) for number in found.ranges}
+    parts, strength = _mix(node)
     aus: dict[tuple[int, str], float] = {}
     for name, share in parts.items():
         for cell, value in emotion_faces()[name].aus.items():
             aus[cell] = aus.get(cell, 0.0) + share * strength * value
-    return poses.columns(aus, intensity)
+    return poses.columns(aus if node.seed is None else _drawn(aus, node.seed), node.intensity)
+
+
+def _drawn(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:
+    """Each action unit a little more or less, as far as our own profiles are wide; both sides alike."""
+    numbers = sorted({number for number, _ in aus})
+    spread = emotion_model().spread
+    factors = dict(
+        zip(numbers, np.random.default_rng(seed).uniform(1 - spread, 1 + spread, len(numbers)), strict=True)
+    )
+    return {cell: value * float(factors[cell[0]]) for cell, value in aus.items()}
+
+
+def _set(node: Emotion | Mood) -> str:
+    """The set of profiles that it is shown by."""
+    return node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
 
 
 def _mix(node: Emotion | Mood) -> tuple[Mapping[str, float], float]:
     """{archetype: its share}, and how strongly they show: 1 as drawn; ({}, 0) for the neutral face.
 
-    A place is as strong as its activation beside the rim's. A word is a kind of face, as strong as
-    `strength_of` has it, and `intensity` how much of it shows.
+    A place is as strong as its activation beside the rim's, or as it is far from the middle of valence and
+    arousal. A word is a kind of face, as strong as `strength_of` has it; `intensity` is how much of it shows.
     """
     if node.angle is not None:
-        most = emotion_model().most
-        return shares(node.angle), (most if node.activation is None else node.activation) / most
-    place = place_of(node.name or "")
+        return shares(node.angle), strength_at(node.activation)
+    if node.valence is not None and node.arousal is not None:
+        angle, away = place_of_affect(node.valence, node.arousal)
+        parts = shares(angle, "own", "affect")
+        return {name: share for name, share in parts.items() if name in emotion_faces()}, away
+    place = place_of(node.name or "", _set(node))
     if place is None:
         return {}, 0.0
     return shares(place.angle, "own", place.ring), strength_of(place)

@@ -32,11 +32,9 @@ WRITES = (".png", ".txt")
     help="Ours; those of Raouzaiou et al. 2002, corrected; the same as printed.",
 )
 @click.option("--angle", type=options.Number(), metavar="DEGREES", help="Place on Paul's wheel; any turn.")
-@click.option(
-    "--activation", type=options.Number(0, 7), help="0 the middle to 7 the rim.  [default: as full]"
-)
-@click.option("--valence", type=options.Number(-1, 1), help="With --arousal, instead of an angle: -1 to 1.")
-@click.option("--arousal", type=options.Number(-1, 1), help="-1 to 1.")
+@click.option("--activation", type=options.Number(), help="0 the middle to 7 the rim.  [default: as full]")
+@click.option("--valence", type=options.Number(), help="With --arousal, instead of an angle: -1 to 1.")
+@click.option("--arousal", type=options.Number(), help="-1 to 1.")
 @click.option("--seed", type=click.IntRange(0), help="Draw within the ranges instead of their middle.")
 @click.option(
     "-o",
@@ -110,14 +108,12 @@ def _asked(
         raise click.UsageError("wanted --angle with --activation, got it alone")
     if (ways := sum(way is not None for way in (word, angle, valence))) > 1 or not (ways or other):
         raise click.UsageError("wanted one of WORD, --angle, or --valence with --arousal")
-    if angle is not None:
-        return wheel(angle, activation, profiles)
-    if valence is not None and arousal is not None:
-        return affect(valence, arousal, profiles)
-    if word is None:
-        return None
     try:
-        return profile_of(word, profiles)
+        if angle is not None:
+            return wheel(angle, activation, profiles)
+        if valence is not None and arousal is not None:
+            return affect(valence, arousal, profiles)
+        return None if word is None else profile_of(word, profiles)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 

@@ -13,7 +13,7 @@ from realizer.emotion.profile import Profile
 from realizer.emotion.profile_file import read_profiles, write_profiles
 from realizer.emotion.recognise import Recogniser, Recognition, recogniser
 from realizer.emotion.statistics import from_faces, from_statistics, published_statistics
-from realizer.emotion.wheel import affect, shares, wheel
+from realizer.emotion.wheel import affect, place_of_affect, shares, strength_at, wheel
 from realizer.emotion.words import UnknownWordError, WordPlace, emotion, known_words, place_of, strength_of
 
 __all__ = [
@@ -36,11 +36,13 @@ __all__ = [
     "from_statistics",
     "known_words",
     "place_of",
+    "place_of_affect",
     "published_statistics",
     "read_profiles",
     "recogniser",
     "same_category",
     "shares",
+    "strength_at",
     "strength_of",
     "wheel",
     "write_profiles",

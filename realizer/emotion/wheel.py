@@ -12,7 +12,7 @@ from realizer.emotion.profile import Profile
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.feelings import ring as places
 
-__all__ = ["affect", "shares", "wheel"]
+__all__ = ["affect", "place_of_affect", "shares", "strength_at", "wheel"]
 
 NEUTRAL = "neutral"
 
@@ -39,9 +39,7 @@ def wheel(
 
     Source: Paul 2010, chapter 6; Raouzaiou et al. 2002, 4.
     """
-    most = emotion_model().most
-    if activation is not None and not 0 <= activation <= most:
-        raise ValueError(f"activation: wanted 0..{most:g}, got {activation:g}")
+    strength_at(activation)
     ranges: dict[int, tuple[float, float]] = {}
     parts = []
     for anchor, share in neighbours(angle, profiles, ring):
@@ -53,6 +51,20 @@ def wheel(
             a, b = ranges.get(fap, (0.0, 0.0))
             ranges[fap] = a + weight * low, b + weight * high
     return Profile(" and ".join(parts), profiles, ranges)
+
+
+def strength_at(activation: float | None) -> float:
+    """How strongly our own archetypes show at an activation: 0 in the middle, 1 at the rim; None is the rim.
+
+    Raises:
+        ValueError: an activation off the wheel.
+    """
+    most = emotion_model().most
+    if activation is None:
+        return 1.0
+    if not 0 <= activation <= most:
+        raise ValueError(f"activation: wanted 0..{most:g}, got {activation:g}")
+    return activation / most
 
 
 def shares(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str, float]:
@@ -74,12 +86,20 @@ def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
     Raises:
         ValueError: not numbers in that range.
     """
+    angle, away = place_of_affect(valence, arousal)
+    return wheel(angle, None, profiles, "affect").scaled(away)
+
+
+def place_of_affect(valence: float, arousal: float) -> tuple[float, float]:
+    """Degrees on the ring "affect", and how far from the middle: 0..1.
+
+    Raises:
+        ValueError: not numbers in -1..1.
+    """
     for name, value in (("valence", valence), ("arousal", arousal)):
         if not -1 <= value <= 1:
             raise ValueError(f"{name}: wanted -1..1, got {value:g}")
-    away = min(math.hypot(valence, arousal), 1.0)
-    full = wheel(math.degrees(math.atan2(arousal, valence)), None, profiles, "affect")
-    return full.scaled(away)
+    return math.degrees(math.atan2(arousal, valence)), min(math.hypot(valence, arousal), 1.0)
 
 
 def neighbours(angle: float, profiles: str, ring: str) -> tuple[tuple[Anchor, float], tuple[Anchor, float]]:

@@ -51,14 +51,16 @@ def emotion(word: str, profiles: str = "own") -> Profile:
         profiles: "own", "published" or "raw".
 
     Raises:
-        UnknownWordError: none of those.
+        UnknownWordError: none of those, or a number that the archetype does not have.
         ValueError: another set, or "accepting", which has no activation.
     """
     asked = " ".join(word.split()).lower()
     known = archetypes(profiles)
-    name, _, number = asked.rpartition(" ")
-    if name in known and number.isdecimal() and int(number) in known[name]:
-        return known[name][int(number)]
+    name, number = _numbered(asked)
+    if number is not None:
+        if number in known.get(name, {}):
+            return known[name][number]
+        raise UnknownWordError(_unknown_profile(name, number, profiles))
     place = place_of(asked)
     if place is None:
         return Profile(asked, profiles, {})
@@ -85,13 +87,20 @@ def strength_of(place: WordPlace) -> float:
     )
 
 
-def place_of(word: str) -> WordPlace | None:
+def place_of(word: str, profiles: str = "own") -> WordPlace | None:
     """Where on the wheel a word is; None for the neutral face, which is nowhere on it.
+
+    An archetype and the number of one of its profiles in that set is where the archetype is.
 
     Raises:
         UnknownWordError, ValueError: as `emotion`.
     """
     asked = " ".join(word.split()).lower()
+    name, number = _numbered(asked)
+    if number is not None:
+        if number not in archetypes(profiles).get(name, {}):
+            raise UnknownWordError(_unknown_profile(name, number, profiles))
+        asked = name
     meant = own_words()[asked].like if asked in own_words() else asked
     if meant == NEUTRAL:
         return None
@@ -114,6 +123,28 @@ def known_words() -> Mapping[str, str]:
     found |= {row.word: "whissell" for row in whissell_words().values() if row.activation is not None}
     found |= dict.fromkeys(own_words(), "own")
     return MappingProxyType(found)
+
+
+def _numbered(asked: str) -> tuple[str, int | None]:
+    """ "fear 8" -> "fear", 8; a word without a number -> itself, None."""
+    name, _, number = asked.rpartition(" ")
+    return (name, int(number)) if name and number.isdecimal() and len(number) < 10 else (asked, None)
+
+
+def _unknown_profile(name: str, number: int, profiles: str) -> str:
+    """Of the profiles of a set, which ones there are, and which one was probably meant."""
+    known = archetypes(profiles)
+    if name not in known:
+        every = [f"{other} {k}" for other, numbered in known.items() for k in numbered]
+        near = difflib.get_close_matches(f"{name} {number}", every, n=3)
+        hint = f", did you mean {' or '.join(near)}?" if near else f"; there are {', '.join(known)}"
+        return f"emotion: wanted a profile of the {profiles} ones, got '{name[:60]} {number}'{hint}"
+    numbers = sorted(known[name])
+    has = f"{name} {numbers[0]}" + (f" to {name} {numbers[-1]}" if len(numbers) > 1 else "")
+    said = f"emotion: wanted {has} of the {profiles} profiles, got '{name} {number}'"
+    if number in archetypes("published").get(name, {}):
+        return f"{said}; the published profiles have it"
+    return f"{said}, did you mean {name} {min(numbers, key=lambda k: abs(k - number))}?"
 
 
 def _unknown(word: str) -> str:

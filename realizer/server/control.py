@@ -236,27 +236,15 @@ def _feeling(asked: Feeling | None) -> dict[str, float]:
     """Name of AU -> 0..1; {} for none."""
     if asked is None:
         return {}
-    affect = asked.valence is not None or asked.arousal is not None
-    if (asked.name is not None) + (asked.angle is not None) + affect != 1:
-        raise Wrong("emotion", "wanted one of a name, an angle, or valence with arousal")
-    if asked.activation is not None and asked.angle is None:
-        raise Wrong("emotion.activation", "wanted an angle with it, got none")
-    if affect:
-        if asked.valence is None or asked.arousal is None:
-            raise Wrong("emotion", "wanted valence and arousal together, got one of them")
-        values = emotion.values_of_affect(asked.valence, asked.arousal, asked.intensity)
-    else:
-        node = Emotion(
-            id="set",
-            name=asked.name,
-            angle=asked.angle,
-            activation=asked.activation,
-            intensity=asked.intensity,
-        )
-        for fault in emotion.check(node, World()):
-            raise Wrong("emotion", fault.text)
-        values = emotion.values_of(node)
-    return {target.name: value for target, value in values.items()}
+    node = Emotion(id="set", **asked.model_dump())
+    said = node.fault() or next((fault.text for fault in emotion.check(node, World())), "")
+    if not said:
+        try:
+            return {target.name: value for target, value in emotion.values_of(node).items()}
+        except ValueError as off:
+            said = str(off)
+    field, _, rest = said.partition(": ")
+    raise Wrong(*((f"emotion.{field}", rest) if field in Feeling.model_fields else ("emotion", said)))
 
 
 def _state(session: Session, connection: Connection, t: float) -> StateMessage:

@@ -144,10 +144,10 @@ class Feeling(Message):
     """An emotion: its word, its place on the wheel, or its place in the plane of valence and arousal."""
 
     name: str | None = Field(None, min_length=1, max_length=64, description="a word, such as guilty")
-    angle: float | None = Field(None, ge=-360, le=360, description="degrees on the wheel")
-    activation: float | None = Field(None, ge=0, le=7, description="with an angle; none: the rim's")
-    valence: float | None = Field(None, ge=-1, le=1, description="with arousal")
-    arousal: float | None = Field(None, ge=-1, le=1)
+    angle: float | None = Field(None, description="degrees on the wheel; turns do not count")
+    activation: float | None = Field(None, description="0..7, with an angle; none: the rim's")
+    valence: float | None = Field(None, description="-1..1, with arousal")
+    arousal: float | None = Field(None, description="-1..1")
     intensity: float = Field(1.0, ge=0, le=1)
 
 
@@ -155,7 +155,7 @@ class SetMessage(Message):
     """Holds an emotion, AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go.
 
     The emotion lies below, AUs refine it, FAPs come on top, whatever is sent first (Paul 2010, 7.4): an AU
-    that is set is what it is set to, and a FAP adds to what AUs ask of it.
+    that is set is what it is set to, and so is a FAP, whatever AUs and speech ask of it.
     """
 
     type: Literal["set"]

@@ -20,6 +20,7 @@ class EmotionModel:
 
     Attributes:
         most: the highest activation, for which our own profiles are drawn.
+        spread: the part of an action unit by which a drawn face may differ.
         middle: of evaluation and activation.
         chosen: emotion -> the number of the published profile that stands for it.
         core, base: parts of a range's length within which a value belongs to it for sure, and perhaps.
@@ -29,6 +30,7 @@ class EmotionModel:
     """
 
     most: float
+    spread: float
     middle: float
     chosen: Mapping[str, int]
     core: float

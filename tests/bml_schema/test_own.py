@@ -6,6 +6,8 @@ import pytest
 
 from bml_schema import OWN, Behaviour, Block, Emotion, Fap, FapFile, Faps, Idle, Mood, Timeline, parse, write
 
+WAYS = "wanted one of a name, an angle, or valence with arousal"
+
 
 def document(inside: str) -> Block:
     return parse(f"<bml id='b' xmlns:r='{OWN}'>{inside}</bml>")
@@ -27,16 +29,28 @@ def test_an_emotion_has_a_word_or_a_place_on_the_wheel() -> None:
     assert only("<r:mood id='e' angle='-90' activation='4.5' profile='k1'/>") == Mood(
         id="e", angle=-90.0, activation=4.5, profile="k1"
     )
+    assert only("<r:emotion id='e' angle='1000'/>") == Emotion(id="e", angle=1000.0, intensity=1.0)
+    assert only("<r:mood id='e' valence='-1' arousal='.5' seed='7'/>") == Mood(
+        id="e", valence=-1.0, arousal=0.5, seed=7
+    )
 
 
 @pytest.mark.parametrize("tag", ["emotion", "mood"])
 @pytest.mark.parametrize(
     ("attributes", "said"),
     [
-        ("", "wanted a name, or an angle on the wheel, got neither"),
-        ("name='joy' angle='10'", "wanted a name, or an angle on the wheel, got both"),
+        ("", f"{WAYS}, got none of them"),
+        ("name='joy' angle='10'", f"{WAYS}, got a name and an angle"),
+        ("name='joy' valence='0' arousal='0'", f"{WAYS}, got a name and valence and arousal"),
+        ("arousal='0'", f"{WAYS}, got arousal"),
+        ("valence='-2' arousal='0'", "valence: wanted -1..1, got -2"),
+        (
+            "angle='1e3'",
+            'angle: wanted degrees (a plain decimal number, no exponent, NaN or infinity), got "1e3"',
+        ),
+        ("name='joy' seed='-1'", "seed: wanted a whole number 0..2147483647, got -1"),
         ("name='joy' activation='2'", "activation: wanted an angle with it, got none"),
-        ("angle='10' activation='8'", "activation: wanted 0..7, got 8"),
+        ("angle='10' activation='40'", "activation: wanted 0..7, got 40"),
         ("name='joy' intensity='1.5'", "intensity: wanted 0..1, got 1.5"),
     ],
 )

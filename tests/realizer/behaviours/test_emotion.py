@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
 
-from realizer.emotion import emotion, known_words
+from realizer.emotion import affect, emotion, known_words
 from realizer.emotion import wheel as place_on
 from realizer.tables.emotions import emotion_faces
-from realizer.tables.feelings import ring
+from realizer.tables.feelings import ring, whissell_words
 from realizer.tables.lexemes import face_lexemes
 
 AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'
@@ -50,7 +53,7 @@ def test_a_word_shows_what_the_face_lexeme_of_its_name_shows(play, name: str) ->
 def test_the_angle_of_an_archetype_shows_that_archetype_whatever_the_turn(play, name: str) -> None:
     by_name = asked(play(f'<own:emotion id="e" name="{name}" intensity="1" {AT}/>'), 1.0)
     place = ring("paul")[name].angle
-    for angle in (place, place - 360):
+    for angle in (place, place - 720, place + 1080):
         assert asked(play(f'<own:emotion id="e" angle="{angle}" intensity="1" {AT}/>'), 1.0) == by_name
 
 
@@ -115,7 +118,87 @@ def test_a_profile_that_is_not_there_is_said_and_the_usual_one_shows(play) -> No
     played = play(f'<own:emotion id="e" name="fear" profile="P_F(8)" {AT}/>')
     assert played.warnings == [("b:e", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
     assert "P_F(8)" in played.told
-    assert played.aus(1.0) == asked(play(f'<own:emotion id="e" name="fear" {AT}/>'), 1.0)
+    assert played.aus(1.0) == play(f'<own:emotion id="e" name="fear" {AT}/>').aus(1.0)
+
+
+def test_an_emotion_shows_whole_unless_it_says_how_much_of_it(play) -> None:
+    """A word is already as strong as it says; half of anger reads as no emotion at all."""
+    full = play(f'<own:emotion id="e" name="anger" {AT}/>')
+    assert full.aus(1.0) == play(f'<own:emotion id="e" name="anger" intensity="1" {AT}/>').aus(1.0)
+
+
+def test_valence_and_arousal_are_a_place_too(play) -> None:
+    row = whissell_words()["joyful"]
+    away = {"valence": (row.evaluation - 4) / 3, "arousal": (row.activation - 4) / 3}
+    length = math.hypot(*away.values())
+    place = " ".join(f'{name}="{value / length:.6f}"' for name, value in away.items())
+    joy = asked(play(f'<own:emotion id="e" {place} {AT}/>'), 1.0)
+    assert {au: value for au, value in joy.items() if value > 0.02} == pytest.approx(
+        asked(play(f'<own:emotion id="e" name="joy" {AT}/>'), 1.0), abs=0.02
+    )
+    half = " ".join(f'{name}="{value / length / 2:.6f}"' for name, value in away.items())
+    assert asked(play(f'<own:emotion id="e" {half} {AT}/>'), 1.0)["12L"] == pytest.approx(0.5, abs=0.02)
+    middle = play(f'<own:emotion id="e" valence="0" arousal="0" {AT}/>')
+    assert (middle.warnings, middle.aus(1.0)) == ([], {})
+    resting = play(f'<own:emotion id="e" valence="0" arousal="-1" {AT}/>')
+    assert (resting.warnings, resting.aus(1.0)) == ([], {})
+    published = play(f'<own:emotion id="e" valence="-0.6" arousal="0.4" profile="published" {AT}/>')
+    shown = [published.fap(number, 1.0) for number in range(1, 69)]
+    assert shown == pytest.approx(list(affect(-0.6, 0.4, "published").frame()), abs=0.1)
+
+
+def test_an_archetype_and_a_number_is_that_published_profile(play) -> None:
+    played = play(f'<own:emotion id="e" name="Fear 3" profile="published" {AT}/>')
+    assert played.warnings == []
+    shown = [played.fap(number, 1.0) for number in range(1, 69)]
+    assert shown == pytest.approx(list(emotion("fear 3", "published").frame()), abs=0.1)
+    own = play(f'<own:emotion id="e" name="fear 0" {AT}/>')
+    assert own.aus(1.0) == play(f'<own:emotion id="e" name="fear" {AT}/>').aus(1.0)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "said"),
+    [
+        ('name="fear 33" profile="published"', "got 'fear 33', did you mean fear 9?"),
+        ('name="feer 8" profile="raw"', "got 'feer 8', did you mean fear 8"),
+        ('name="fear 8"', "got 'fear 8'; the published profiles have it"),
+        ('name="accepting"', "accepting: nobody rated how activated it is"),
+    ],
+)
+def test_a_profile_that_nobody_has_is_dropped_and_what_was_meant_is_named(
+    play, attributes: str, said: str
+) -> None:
+    played = play(f'<own:emotion id="e" {attributes}/>')
+    assert played.warnings == [("b:e", "CANNOT_CREATE_BEHAVIOR")]
+    assert said in played.told
+
+
+def test_a_seed_draws_within_a_published_profile_the_same_each_time(play) -> None:
+    def faps(seed: int) -> list[float]:
+        played = play(f'<own:emotion id="e" name="fear 8" profile="published" seed="{seed}" {AT}/>')
+        assert played.warnings == []
+        return [played.fap(number, 1.0) for number in range(1, 69)]
+
+    one, other = faps(3), faps(4)
+    assert one == pytest.approx(list(emotion("fear 8", "published").draw(3)), abs=0.1)
+    assert one == faps(3)
+    assert one != other
+    for fap, (low, high) in emotion("fear 8", "published").ranges.items():
+        assert low - 0.1 <= one[fap - 1] <= high + 0.1
+
+
+def test_a_seed_draws_our_own_face_as_action_units_both_sides_alike(play) -> None:
+    middle = asked(play(f'<own:emotion id="e" name="joy" intensity="0.5" {AT}/>'), 1.0)
+    draws = [
+        asked(play(f'<own:emotion id="e" name="joy" seed="{seed}" intensity="0.5" {AT}/>'), 1.0)
+        for seed in (1, 1, 2)
+    ]
+    assert draws[0] == draws[1] != draws[2]
+    # Of every process: the numbers of seed 1.
+    factors = np.random.default_rng(1).uniform(0.85, 1.15, 4)
+    wanted = {au: middle[au] * factors[k] for k, au in enumerate(["6L", "12L", "25", "26"])}
+    assert {au: draws[0][au] for au in wanted} == pytest.approx(wanted, abs=2e-4)
+    assert draws[0]["12L"] == draws[0]["12R"]
 
 
 def test_a_mood_rises_and_stays_and_a_neutral_one_takes_it_back(play) -> None:

@@ -127,6 +127,12 @@ def test_expressions_play_over_what_is_set(face) -> None:
     assert shown["15L"] > 0.1
 
 
+def test_turns_of_the_wheel_do_not_count(face) -> None:
+    near = face.set(emotion={"angle": 20})
+    assert max(near.values()) > 0.1
+    assert face.set(emotion={"angle": -700}) == pytest.approx(near, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("asked", "where"),
     [
@@ -134,8 +140,8 @@ def test_expressions_play_over_what_is_set(face) -> None:
         ({"name": "joy", "angle": 3}, "set.emotion"),
         ({"valence": 0.5}, "set.emotion"),
         ({"name": "joy", "activation": 3}, "set.emotion.activation"),
-        ({"name": "jjoyy"}, "set.emotion"),
-        ({"angle": -700}, "set.emotion.angle"),
+        ({"name": "jjoyy"}, "set.emotion.name"),
+        ({"valence": 2, "arousal": 0}, "set.emotion.valence"),
         ({"angle": 7, "activation": 40}, "set.emotion.activation"),
     ],
 )
