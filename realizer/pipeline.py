@@ -227,7 +227,7 @@ def realize(
     for index, name in enumerate(player.characters):
         step = max(1, int(WINDOW * fps))
         windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
-        aus = AUFrames(times, np.concatenate([w.values for w in windows]), player.rules)
+        aus = AUFrames.joined(windows)
         characters[name] = Performance(aus, to_fap(aus, in_force))
     speaking = player.speech()
     # Those of planning say more than what is told of them; others arise while blocks play.

@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.curves import sample, smooth, weights
+from realizer.animation.curves import sample, weights
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle import Blink
 from realizer.animation.targets import AU_NAMES, axis, presence, region
@@ -17,6 +17,9 @@ from realizer.arrays import Bool, Float64
 from realizer.tables.cooccurrence import Rules
 
 __all__ = ["blend"]
+
+# What replaces what lies below, the upper one last.
+OVER = (Layer.FAPS, Layer.DIRECT)
 
 
 def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = None) -> AUFrames:
@@ -31,7 +34,9 @@ def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = Non
     - IDLE: the part of its motion and of its blinks that base states have taken does not show. A blink comes
       whole or not at all, as it is when it begins.
     - FAPs add up; presences add up to at most 1.
-    - DIRECT: as far as such a channel is there, it replaces all that lies below.
+    - FAPS, and above it DIRECT: as far as such a channel is there, it replaces all that lies below; of a FAP
+      that is also what AUs ask of it (`AUFrames.held`). Several in one layer that are there more than once
+      together each get their share.
 
     AUs are limited to 0..1 at the end.
 
@@ -52,7 +57,7 @@ def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = Non
     base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for channel, row in zip(alive, sampled, strict=True):
         i = place[channel.target.column]
-        if channel.layer is Layer.DIRECT:
+        if channel.layer in OVER:
             continue
         if channel.layer is Layer.BASE:
             base[i] += row
@@ -71,13 +76,20 @@ def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = Non
     over += gaze
     # Base states and expressions: the stronger one shows; rotations add up.
     values = np.where(sums[:, None], base + over, np.maximum(base, over))
-    _override(values, place, alive, sampled, times)
+    held = np.zeros(shape)
+    for layer in OVER:
+        rows = [k for k, channel in enumerate(alive) if channel.layer is layer]
+        _override(values, held, place, [alive[k] for k in rows], sampled[rows], times)
     # The FAPs between AUs and presences have limits of their own.
-    limited = np.array([not 0 <= column - len(AU_NAMES()) < 68 for column in columns], bool)
-    np.clip(values, 0.0, 1.0, out=values, where=limited[:, None])
+    faps = np.array([0 <= column - len(AU_NAMES()) < 68 for column in columns], bool)
+    np.clip(values, 0.0, 1.0, out=values, where=~faps[:, None])
     frames = np.zeros((len(times), len(axis())), np.float32)
     frames[:, columns] = values.T
-    return AUFrames(times, frames, rules)
+    if not held[faps].any():
+        return AUFrames(times, frames, rules)
+    of_faps = np.zeros((len(times), 68), np.float32)
+    of_faps[:, np.array(columns)[faps] - len(AU_NAMES())] = held[faps].T
+    return AUFrames(times, frames, rules, of_faps)
 
 
 def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
@@ -111,30 +123,26 @@ def _take_idle(sampled: Float64, channels: list[Channel]) -> None:
 
 
 def _override(
-    values: Float64, place: dict[int, int], channels: list[Channel], sampled: Float64, times: Float64
+    values: Float64,
+    held: Float64,
+    place: dict[int, int],
+    channels: list[Channel],
+    sampled: Float64,
+    times: Float64,
 ) -> None:
-    """Lay the DIRECT channels over `values` (columns that are moved, n), in place."""
-    rows = [i for i, channel in enumerate(channels) if channel.layer is Layer.DIRECT]
-    if not rows:
+    """Lay the channels of a layer over `values` (columns that are moved, n), in place, and so `held`."""
+    if not channels:
         return
-    sums = _sums()
-    there = weights([channels[i] for i in rows], times)
-    # What is set while nothing was held takes over as it rises, so that the face does not jump to 0 first.
-    for k, i in enumerate(rows):
-        if channels[i].values[0] == 0.0 and len(channels[i].times) > 1:
-            begin, reached = channels[i].times[:2]
-            there[k] *= smooth(np.clip((times - begin) / max(reached - begin, 1e-9), 0.0, 1.0))
-    direct: dict[int, tuple[Float64, Float64]] = {}
-    for i, weight in zip(rows, there, strict=True):
-        column = channels[i].target.column
-        value = sampled[i]
-        if column in direct:
-            other, other_weight = direct[column]
-            value = value + other if sums[column] else np.maximum(value, other)
-            weight = np.maximum(weight, other_weight)
-        direct[column] = value, weight
-    for column, (value, weight) in direct.items():
-        values[place[column]] = values[place[column]] * (1.0 - weight) + value
+    there, shown = np.zeros_like(values), np.zeros_like(values)
+    for channel, value, weight in zip(channels, sampled, weights(channels, times), strict=True):
+        i = place[channel.target.column]
+        there[i] += weight
+        shown[i] += value
+    shown /= np.maximum(there, 1.0)
+    left = 1.0 - np.minimum(there, 1.0)
+    values *= left
+    values += shown
+    held[:] = 1.0 - (1.0 - held) * left
 
 
 @cache

@@ -23,7 +23,8 @@ class Layer(IntEnum):
     GAZE = 3
     HEAD = 4
     SPEECH = 5
-    DIRECT = 6  # AU and FAP values set by a client
+    FAPS = 6  # FAPs that a document gives
+    DIRECT = 7  # AU and FAP values set by a client
 
 
 class Gain(NamedTuple):
@@ -42,13 +43,15 @@ class Gain(NamedTuple):
 class Joint(NamedTuple):
     """How a channel goes on from the one before it: by what it differs at `at`, which `length` seconds heal.
 
-    `value` and `slope` are what was shown at that time less what this channel would show, and a second of it.
+    `value` and `slope` are what was shown at that time less what this channel would show, and a second of it;
+    `share` is how far the one before was there less how far this one would be.
     """
 
     at: float
     value: float
     slope: float
     length: float
+    share: float = 0.0
 
     def shifted(self, seconds: float) -> Joint:
         return self._replace(at=self.at + seconds)
@@ -71,6 +74,8 @@ class Channel:
             nothing jumps.
         until: it shows nothing from then on: another channel goes on in its place.
         joint: it is such a channel, and shows nothing before `joint.at`.
+        there: (k,) 0..1 or None: how far it takes the place of what lies below, at each key; whole where it
+            is None. Only of the layers FAPS and DIRECT, whose values are what is shown, so 0 where this is 0.
         source: "block:behaviour" that made it, for messages.
     """
 
@@ -83,6 +88,7 @@ class Channel:
     gains: tuple[Gain, ...] = ()
     until: float = float("inf")
     joint: Joint | None = None
+    there: Float64 | None = None
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -108,6 +114,13 @@ class Channel:
     def scaled(self, gain: Gain) -> Channel:
         """The same channel with one more gain."""
         return replace(self, gains=(*self.gains, gain))
+
+    @property
+    def share(self) -> Channel:
+        """How far it takes the place of what lies below, as a channel itself."""
+        there = np.ones(len(self.times)) if self.there is None else self.there
+        joint = None if self.joint is None else self.joint._replace(value=self.joint.share, slope=0.0)
+        return replace(self, values=there, joint=joint)
 
     @property
     def gone(self) -> float:

@@ -75,19 +75,12 @@ def sample(channels: Sequence[Channel], times: Float64) -> Float64:
 
 
 def weights(channels: Sequence[Channel], times: Float64) -> Float64:
-    """How much of every channel is there: 1 from its first key to its last (for ever where it holds), times
-    its gains, 0 outside.
+    """How far every channel takes the place of what lies below: as its `there` says, times its gains.
 
     Returns:
         (m, n) float64, 0..1.
     """
-    first, last = np.array([channel.span for channel in channels]).reshape(-1, 2).T[..., None]
-    there: Float64 = ((times >= first) & (times <= last)).astype(np.float64)
-    for i, channel in enumerate(channels):
-        if channel.gains:
-            there[i] *= gain_at(channel.gains, times)
-        _window(there[i], channel, times)
-    return there
+    return np.clip(sample([channel.share for channel in channels], times), 0.0, 1.0)
 
 
 def _fill(

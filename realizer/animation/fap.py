@@ -27,7 +27,8 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
        Two that are a "different" combination in FACS show something more together.
     2. A closing eye lets go of what holds it open, and lids do not pass through each other.
     3. Where speech has the lips (presence "lips"), what AUs ask is taken away by `speech_owns`.
-    4. The FAPs that did not come from AUs are added; each FAP is limited to `least`..`most`.
+    4. The FAPs that did not come from AUs are added, or, as far as they are held, stand in place of what AUs
+       ask; each FAP is limited to `least`..`most`.
 
     Args:
         frames: n frames.
@@ -48,6 +49,8 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     lips = frames.values[:, presence("lips").column]
     if lips.any():
         values *= 1.0 - own[:, None] * lips
+    if frames.held is not None:
+        values *= 1.0 - frames.held.T
     faps = np.clip(values.T + frames.faps, least, most)
     # What a client sets directly counts too, wherever the mapping does not reach.
     mask = demand.mask | faps.any(axis=0)

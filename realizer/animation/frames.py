@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,11 +25,30 @@ class AUFrames:
         values: (n, n_targets) float32; columns as `animation.targets.axis()`: AUs 0..1 as they were asked
             for, FAPs in FAPU that did not come from AUs, presences 0..1.
         rules: which AUs a face can show together; None: all of them.
+        held: (n, 68) float32, 0..1: how far a FAP is what `values` say, so that no AU has a say in it; None:
+            AUs have theirs everywhere.
     """
 
     times: Float64
     values: Float32
     rules: Rules | None = None
+    held: Float32 | None = None
+
+    @classmethod
+    def joined(cls, windows: Sequence[AUFrames]) -> AUFrames:
+        """One after the other; at least one, all with the same rules."""
+        held = None
+        if any(window.held is not None for window in windows):
+            none = [np.zeros((len(window.times), 68), np.float32) for window in windows]
+            held = np.concatenate(
+                [n if w.held is None else w.held for w, n in zip(windows, none, strict=True)]
+            )
+        return cls(
+            np.concatenate([window.times for window in windows]),
+            np.concatenate([window.values for window in windows]),
+            windows[0].rules,
+            held,
+        )
 
     @property
     def asked(self) -> Float32:

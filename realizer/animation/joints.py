@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from realizer.animation.channel import Channel, Joint
-from realizer.animation.curves import sample
+from realizer.animation.curves import sample, weights
 
 __all__ = ["joined"]
 
@@ -37,9 +37,10 @@ def joined(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[
     before, after = (list(side) for side in zip(*follow, strict=True))
     shown = sample([*before, *after], np.array([now, now + STEP])).reshape(2, len(follow), 2)
     value, ahead = (shown[0] - shown[1]).T
+    there = weights([*before, *after], np.array([now])).reshape(2, len(follow))
     joints = [
-        replace(c, joint=Joint(now, float(v), float((a - v) / STEP), HEALS))
-        for c, v, a in zip(after, value, ahead, strict=True)
+        replace(c, joint=Joint(now, float(v), float((a - v) / STEP), HEALS, float(share)))
+        for c, v, a, share in zip(after, value, ahead, there[0] - there[1], strict=True)
     ]
     return (*kept, *(replace(c, until=now) for c in before), *joints, *lonely, *fresh)
 

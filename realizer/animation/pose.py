@@ -18,7 +18,8 @@ def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None =
 
     A column for each name, in its order: action units as they move a face (0..1), presences (0..1), and FAPs
     in FAPU: those that did not come from action units, and those that the other action units ask for. A face
-    that takes no action units gets `to_fap` whole.
+    that takes no action units gets `to_fap` whole. From a FAP that is held is taken what the action units of
+    the face move it by, as far as the mapping knows, so that the face shows the FAP as it is set.
 
     Args:
         frames: n frames.
@@ -37,5 +38,10 @@ def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None =
     values[:, :count] = frames.moving.T
     rest = values.copy()
     rest[:, [column for column in columns if column < count]] = 0
-    values[:, count : count + 68] = to_fap(AUFrames(frames.times, rest), mapping).values
+    values[:, count : count + 68] = to_fap(AUFrames(frames.times, rest, held=frames.held), mapping).values
+    if frames.held is not None:
+        moved, left = values.copy(), rest.copy()
+        moved[:, count : count + 68] = left[:, count : count + 68] = 0
+        both = (to_fap(AUFrames(frames.times, one), mapping).values for one in (moved, left))
+        values[:, count : count + 68] -= frames.held * np.subtract(*both)
     return np.ascontiguousarray(values[:, columns])

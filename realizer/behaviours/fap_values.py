@@ -6,12 +6,12 @@ import numpy as np
 
 from bml_schema import FapFile, Faps
 from realizer import tables
-from realizer.animation.channel import Channel
+from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap_clip import FAPClip
 from realizer.animation.fap_reader import read_fap
 from realizer.animation.targets import fap
 from realizer.arrays import Float64
-from realizer.behaviours import media, poses
+from realizer.behaviours import media
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
 from realizer.behaviours.tracks import track
@@ -29,8 +29,12 @@ def timing(node: Faps, world: World) -> Timing:
 
 
 def expand(node: Faps, times: Float64, world: World) -> tuple[Channel, ...]:
-    """There at attackPeak, held to relax, gone at end; they add to what else moves the face."""
-    return poses.shown({fap(part.number): part.value for part in node.values}, times, node.id)
+    """There at attackPeak, held to relax, gone at end; they replace what else moves these FAPs."""
+    there = np.array([0.0, 1.0, 1.0, 0.0])
+    return tuple(
+        Channel(fap(part.number), times, part.value * there, layer=Layer.FAPS, there=there, source=node.id)
+        for part in node.values
+    )
 
 
 def check(node: Faps, world: World) -> tuple[Fault, ...]:
@@ -60,7 +64,7 @@ def timing_of_file(node: FapFile, world: World) -> Timing:
 
 
 def expand_file(node: FapFile, times: Float64, world: World) -> tuple[Channel, ...]:
-    """Its frames from start to end; what is not neutral at an end gets there and back."""
+    """Its frames from start to end, in place of what else moves these FAPs; they come and go smoothly."""
     clip = media.load(node.file_name, world, read)
     keys = np.linspace(times[0], times[-1], len(clip.values))
     return tuple(

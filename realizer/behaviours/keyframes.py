@@ -61,7 +61,9 @@ def expand(node: FaceKeyframe, times: Float64, world: World) -> tuple[Channel, .
     channels = []
     for column, part in enumerate(keys.parts):
         values = keys.values[:, column]
-        channels += [track(target, at, values, node.id) for target in _targets(part) if values.any()]
+        # A FAP that is 0 is held at 0; an action unit of 0 leaves the face to others.
+        shown = values.any() or isinstance(part, int)
+        channels += [track(target, at, values, node.id) for target in _targets(part) if shown]
     return tuple(channels)
 
 
@@ -81,7 +83,7 @@ def check(node: FaceKeyframe, world: World) -> tuple[Fault, ...]:
 
 
 def claims(node: FaceKeyframe, world: World) -> frozenset[str]:
-    """FAPs add up, so two behaviours cannot have the same; AUs blend."""
+    """FAPs replace each other, so two behaviours cannot have the same; AUs blend."""
     return frozenset(f"FAP {part}" for part in _keys(node).parts if isinstance(part, int))
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.animation.channel import Channel
-from realizer.animation.targets import Target
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.targets import AU_NAMES, Target
 from realizer.arrays import Float64
 
 __all__: list[str] = []
@@ -17,7 +17,7 @@ AT_REST = 0.05
 
 
 def track(target: Target, times: Float64, values: Float64, source: str) -> Channel:
-    """A channel with these keys, straight between them.
+    """A channel with these keys, straight between them; one of a FAP replaces what lies below.
 
     Args:
         times: (k,) seconds, rising; values: (k,).
@@ -30,7 +30,14 @@ def track(target: Target, times: Float64, values: Float64, source: str) -> Chann
     if last > most and ease > 0:
         back, turned = _eased(-times[::-1], values[::-1], ease)
         times, values = -back[::-1], turned[::-1]
-    return Channel(target, times, values, curve="linear", source=source)
+    if not 0 <= target.column - len(AU_NAMES()) < 68 or ease <= 0:
+        return Channel(target, times, values, curve="linear", source=source)
+    # It comes and goes in the same time, also where it begins and ends at rest over a face that does not.
+    ends = np.array([times[0], times[0] + ease, times[-1] - ease, times[-1]])
+    keys = np.unique(np.concatenate([times, ends]))
+    there = np.interp(keys, ends, [0.0, 1.0, 1.0, 0.0])
+    values = np.interp(keys, times, values)
+    return Channel(target, keys, values, curve="linear", layer=Layer.FAPS, there=there, source=source)
 
 
 def _eased(times: Float64, values: Float64, ease: float) -> tuple[Float64, Float64]:

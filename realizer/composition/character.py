@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.curves import gain_at
+from realizer.animation.curves import sample, weights
 from realizer.animation.targets import axis, region
 
 __all__: list[str] = []
@@ -111,10 +111,10 @@ def _hold(
             if old is not None:
                 held[name] = old.faded(now, now + RELAX)
             continue
-        before = 0.0
+        before = share = 0.0
         if old is not None:
-            before = float(np.interp(now, old.times, old.values)) * float(
-                gain_at(old.gains, np.array([now]))[0]
-            )
+            at = np.array([now])
+            before, share = float(sample([old], at)[0, 0]), float(weights([old], at)[0, 0])
         keys, ends = np.array([now, now + rise]), np.array([before, value])
-        held[name] = Channel(targets[name], keys, ends, layer=layer, holds=True, source="set")
+        there = np.array([share, 1.0])
+        held[name] = Channel(targets[name], keys, ends, layer=layer, holds=True, there=there, source="set")

@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.blend import blend
+from realizer.animation.blend import OVER, blend
 from realizer.animation.channel import Channel, Layer
+from realizer.animation.fap import to_fap
 from realizer.animation.idle import Blink, Fewer
 from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
+from realizer.arrays import Float64
 
 ONE = np.array([0.0])
 
@@ -156,7 +158,8 @@ def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:
 
 
 def test_what_is_set_directly_replaces_all_else_and_lets_go_smoothly() -> None:
-    held = Channel(SMILE, np.array([0.0, 0.1]), np.array([0.0, 0.1]), layer=Layer.DIRECT, holds=True)
+    rises = np.array([0.0, 1.0])
+    held = Channel(SMILE, rises / 10, rises / 10, layer=Layer.DIRECT, holds=True, there=rises)
     face = [still(SMILE, 0.8), held.faded(2.0, 2.3)]
     times = np.linspace(0, 3, 3001)
     values = blend(face, times).values[:, SMILE.column]
@@ -169,3 +172,67 @@ def test_what_is_set_directly_replaces_all_else_and_lets_go_smoothly() -> None:
 def test_a_nod_set_directly_replaces_the_sum() -> None:
     face = [still(NOD, 0.3, Layer.HEAD), still(NOD, 0.1, Layer.DIRECT)]
     assert value_of(face, NOD) == pytest.approx(0.1)
+
+
+CORNER = fap(12)
+
+
+@st.composite
+def set_faps(draw: st.DrawFn) -> Channel:
+    """A FAP that comes, stays and goes, as documents and clients set it."""
+    times = np.cumsum(draw(st.lists(st.floats(0.1, 1.0), min_size=4, max_size=4)))
+    there = np.array([0.0, 1.0, 1.0, 0.0])
+    value = draw(st.floats(-200.0, 200.0))
+    return Channel(CORNER, times, value * there, layer=draw(st.sampled_from(OVER)), there=there)
+
+
+def corner(channels: list[Channel], times: Float64) -> Float64:
+    """The FAP as faces of MPEG-4 show it."""
+    return to_fap(blend(channels, times)).values[:, 11].astype(float)
+
+
+below = st.lists(
+    st.builds(still, st.sampled_from([*au(12), *au(15), *au(20), CORNER]), st.floats(0, 1)), max_size=4
+)
+
+
+@given(below, set_faps())
+def test_a_set_fap_has_its_value_while_it_is_there_and_leaves_the_face_before_and_after(
+    face: list[Channel], one: Channel
+) -> None:
+    inside = np.linspace(one.times[1], one.times[2], 5)
+    np.testing.assert_allclose(corner([*face, one], inside), one.values[1], atol=1e-3)
+    outside = np.array([one.times[0], one.times[-1] + 0.01])
+    np.testing.assert_allclose(corner([*face, one], outside), corner(face, outside), atol=1e-3)
+
+
+@given(below, st.lists(set_faps(), min_size=1, max_size=4))
+def test_nothing_jumps_when_set_faps_come_and_go(face: list[Channel], some: list[Channel]) -> None:
+    times = np.arange(0.0, 4.2, 0.001)
+    # Fastest is a whole change in the shortest rise, at 1.875 of its mean speed, both ways at once.
+    most = np.abs(corner([*face], times)).max() + sum(np.abs(one.values).max() for one in some)
+    assert np.abs(np.diff(corner([*face, *some], times))).max() <= 4 * most * 1.875 * 0.001 / 0.1 + 1e-3
+
+
+@given(below, st.lists(set_faps(), max_size=4), st.randoms(use_true_random=False))
+def test_the_order_in_which_faps_are_set_does_not_matter(
+    face: list[Channel], some: list[Channel], random: st.DataObject
+) -> None:
+    given = [*face, *some]
+    other = list(given)
+    random.shuffle(other)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(corner(given, TIMES), corner(other, TIMES), atol=1e-3)
+
+
+def test_a_client_stands_over_a_document_and_faps_that_nobody_sets_stay() -> None:
+    face = [still(part, 0.8) for part in au(12)]
+    document, client = still(CORNER, 50, Layer.FAPS), still(CORNER, -20, Layer.DIRECT)
+    alone, both = (to_fap(blend(some, ONE)).values[0] for some in (face, [*face, document, client]))
+    assert both[11] == -20
+    assert alone[11] not in (0, -20)
+    np.testing.assert_array_equal(np.delete(both, 11), np.delete(alone, 11))
+
+
+def test_two_of_one_layer_share_a_fap() -> None:
+    both = [still(CORNER, 50, Layer.FAPS), still(CORNER, 150, Layer.FAPS)]
+    assert value_of(both, CORNER) == 100

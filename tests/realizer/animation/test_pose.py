@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -54,6 +56,25 @@ def test_gaze_visemes_and_faps_set_directly_reach_a_face_that_takes_units() -> N
     assert found["open_jaw"] == 300
     assert found["head_yaw"] > 10_000
     assert found["yaw_l_eyeball"] > 10_000
+
+
+@given(faces, st.sets(st.sampled_from(AU_NAMES())), st.integers(3, 68), st.sampled_from([0.0, 0.5, 1.0]))
+def test_both_kinds_of_faces_show_a_fap_that_is_held_as_it_is_set(
+    face: dict[str, float], taken: set[str], number: int, part: float
+) -> None:
+    held = np.zeros((1, 68), np.float32)
+    held[0, number - 1] = part
+    clip = replace(frames({**face, FAPS[number - 1]: part * 50.0}), held=held)
+    (units,) = poses(clip, (*FAPS, *sorted(taken)))
+    # What the units of such a face move it by, and what is asked of it beside them.
+    all_, others = (
+        to_fap(frames({name: value for name, value in face.items() if name not in without})).values[0]
+        for without in (set(), taken)
+    )
+    whole = poses(clip, FAPS)[0, number - 1]
+    assert units[number - 1] + (all_ - others)[number - 1] == pytest.approx(whole, rel=1e-4, abs=1e-2)
+    if part == 1:
+        assert whole == 50
 
 
 def test_a_name_that_is_not_of_the_axis_is_an_error() -> None:

@@ -27,11 +27,14 @@ def test_values_are_reached_at_attack_peak_held_to_relax_and_gone_at_end(play) -
     assert played.fap(32, 1.0) == 0
 
 
-def test_they_add_to_what_else_moves_the_face(play) -> None:
+def test_they_stand_in_place_of_what_else_moves_the_face(play) -> None:
     smile = '<faceLexeme id="s" lexeme="SMILE" amount="0.5" start="0" attackPeak="0.5" relax="1.5" end="2"/>'
     alone = play(smile).fap(12, 1.0)
     assert alone > 0
-    assert play(smile + faps((12, 40))).fap(12, 1.0) == pytest.approx(alone + 40)
+    for value in (40, 0, -30):
+        both = play(smile + faps((12, value)))
+        assert both.fap(12, 1.0) == pytest.approx(value)
+        assert both.fap(13, 1.0) == pytest.approx(alone)
 
 
 def test_a_value_beyond_its_range_is_said_and_limited(play) -> None:

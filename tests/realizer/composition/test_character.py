@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from realizer import tables
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.targets import au
+from realizer.animation.fap import to_fap
+from realizer.animation.targets import au, axis
 from realizer.composition.character import Character, Shift
 
 SMILE = au(12, "LEFT")[0]
@@ -65,3 +69,55 @@ def test_what_is_set_holds_and_an_unknown_name_changes_nothing() -> None:
     assert shown(ann, 9.0) == pytest.approx(0.8)
     ann.set_direct({"12L": None}, now=3.0)
     assert shown(ann, 9.0) == pytest.approx(0, abs=1e-9)
+
+
+ASKED = (
+    ("direct", {"12L": 0.2}),
+    ("direct", {"raise_l_cornerlip": 150.0, "open_jaw": 90.0}),
+    ("direct", {"4L": 1.0, "raise_l_i_eyebrow": -40.0}),
+    ("feeling", {"12L": 0.9, "12R": 0.9, "1L": 0.5, "open_jaw": 30.0}),
+)
+
+
+@given(st.permutations(ASKED), st.floats(1.0, 2.0))
+def test_the_order_of_sending_does_not_matter(order: list[tuple[str, dict[str, float]]], now: float) -> None:
+    times = np.linspace(0.0, 4.0, 101)
+    shown = []
+    for some in (ASKED, order):
+        ann = Character(None)
+        for kind, values in some:
+            getattr(ann, f"set_{kind}")(values, now)
+        shown.append(to_fap(blend(ann.channels(), times)).values)
+    np.testing.assert_allclose(shown[0], shown[1], atol=1e-3)
+    last = dict(zip((row.name for row in tables.faps()), shown[1][-1], strict=True))
+    assert last["raise_l_cornerlip"] == 150
+    assert last["open_jaw"] == 90
+    assert last["raise_l_i_eyebrow"] == -40
+    assert last["raise_r_cornerlip"] > 50
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 0.5), st.none() | st.floats(-300, 300)), min_size=1, max_size=6))
+def test_nothing_jumps_however_often_a_fap_is_set_and_let_go(
+    steps: list[tuple[float, float | None]],
+) -> None:
+    """Each message changes nothing of the frame in which it comes."""
+    ann = Character(None)
+    ann.set_feeling({"12L": 0.8}, 0.0)
+    now = 1.0
+    for wait, value in steps:
+        now += wait
+        before = to_fap(blend(ann.channels(), np.array([now]))).values
+        ann.set_direct({"raise_l_cornerlip": value}, now)
+        after = to_fap(blend(ann.channels(), np.array([now, now + 1e-4]))).values
+        np.testing.assert_allclose(after[:1], before, atol=0.1)
+        np.testing.assert_allclose(after[1:], before, atol=1.5)
+
+
+def test_a_unit_that_is_held_at_0_does_not_let_the_mood_through_when_it_changes() -> None:
+    ann = Character(None)
+    ann.set_feeling({"12L": 0.8}, 0.0)
+    ann.set_direct({"12L": 0.0}, 1.0)
+    ann.set_direct({"12L": 0.3}, 2.0)
+    course = blend(ann.channels(), np.linspace(2.0, 3.0, 101)).values[:, axis()["12L"].column]
+    assert course[0] == 0
+    assert course.max() <= 0.3 + 1e-6
