@@ -12,14 +12,14 @@ from realizer.speech.utterance import WARP, Say, Utterance, Voice
 __all__ = ["fitted", "near", "stretched"]
 
 # A voice is asked again at another rate so often; its rate has steps, and pauses do not stretch evenly.
-TRIES = 3
+TRIES = 9
 # What is left is made up for by playing it faster or slower by so little (a tenth of a semitone) that nobody
 # hears it.
 NEAR = 0.006
 
 
 def fitted(voice: Voice, say: Say) -> Utterance:
-    """Speak, `say.seconds` long where that is given: at another rate, and what is left by resampling.
+    """Speak, `say.seconds` long where that is given: at the rate that comes nearest, then by resampling.
 
     Raises:
         VoiceError: as `voice.say`.
@@ -27,14 +27,28 @@ def fitted(voice: Voice, say: Say) -> Utterance:
     utterance = voice.say(replace(say, seconds=None))
     if say.seconds is None or not utterance.duration:
         return utterance
-    rate = say.rate
+    rate, best = say.rate, utterance
+    slow: tuple[float, float] | None = None  # the fastest rate that is too slow, and how long it takes
+    fast: tuple[float, float] | None = None
     for _ in range(TRIES):
-        ratio = utterance.duration / say.seconds
-        if abs(ratio - 1.0) <= NEAR:
+        if abs(best.duration / say.seconds - 1.0) <= NEAR:
             break
-        rate *= ratio
-        utterance = voice.say(replace(say, rate=rate, seconds=None))
-    return near(stretched(utterance, {"end": say.seconds}))
+        if utterance.duration > say.seconds:
+            slow = (rate, utterance.duration)
+        else:
+            fast = (rate, utterance.duration)
+        if slow and fast and slow[1] > fast[1]:
+            # Between the two, by length as they lie, but never so near to one of them that nothing is won.
+            part = min(0.8, max(0.2, (slow[1] - say.seconds) / (slow[1] - fast[1])))
+            rate = slow[0] + part * (fast[0] - slow[0])
+        else:
+            rate *= utterance.duration / say.seconds
+        before, utterance = utterance, voice.say(replace(say, rate=rate, seconds=None))
+        if abs(utterance.duration - say.seconds) < abs(best.duration - say.seconds):
+            best = utterance
+        elif utterance.duration == before.duration and not (slow and fast):
+            break  # as slow or as fast as it can
+    return near(stretched(best, {"end": say.seconds}))
 
 
 def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:

@@ -7,7 +7,7 @@ import pytest
 
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted, stretched
-from realizer.speech.utterance import WARP, Say
+from realizer.speech.utterance import WARP, Say, Utterance
 
 SAY = Say('one two <mark name="m"/>three four five', ("m",))
 
@@ -48,8 +48,6 @@ def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
 
 
 def test_a_stretched_sound_keeps_its_loudness() -> None:
-    from realizer.speech.utterance import Utterance
-
     wave = (8000 * np.sin(np.arange(22050) * 0.1)).astype(np.int16)
     made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, wave), {"end": 1.005})
     assert made.pcm is not None
@@ -58,11 +56,58 @@ def test_a_stretched_sound_keeps_its_loudness() -> None:
 
 
 def test_a_sound_is_warped_so_that_its_marks_come_where_they_are_wanted() -> None:
-    from realizer.speech.utterance import Utterance
-
     loud = np.zeros(22050, np.int16)
     loud[11025:11035] = 9000  # a click at the mark
     made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, loud), {"m": 0.53, "end": 1.02})
     assert (made.duration, made.marks["m"]) == (1.02, 0.53)
     assert made.pcm is not None
     assert int(np.argmax(made.pcm)) / 22050 == pytest.approx(0.53, abs=0.001)
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize("seconds", [1.3, 1.8, 2.3, 3.1])
+def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) -> None:
+    from realizer.speech import find_voice
+
+    class Heard:
+        """A voice that remembers how long what it said was."""
+
+        name = "heard"
+
+        def __init__(self) -> None:
+            self.voice = find_voice("espeak")
+            self.lengths: list[float] = []
+
+        def say(self, request: Say) -> Utterance:
+            said = self.voice.say(request)
+            self.lengths.append(said.duration)
+            return said
+
+        def close(self) -> None:
+            self.voice.close()
+
+    voice = Heard()
+    try:
+        text = "Hello, I am very pleased to meet you."
+        made = fitted(voice, Say(text, seconds=seconds))
+    finally:
+        voice.close()
+    assert made.duration == pytest.approx(seconds)
+    assert min(abs(length / seconds - 1) for length in voice.lengths) < 0.012
+
+
+def test_a_voice_at_its_limit_is_not_asked_for_ever() -> None:
+    asked = []
+
+    class Rigid:
+        name = "rigid"
+
+        def say(self, request: Say) -> Utterance:
+            asked.append(request.rate)
+            return Utterance(1.0, (), (), {})
+
+        def close(self) -> None:
+            pass
+
+    assert fitted(Rigid(), Say("x", seconds=3.0)).duration == 3.0
+    assert len(asked) == 2
