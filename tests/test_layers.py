@@ -142,6 +142,7 @@ DOORS = {
     "espeakng_loader": ("realizer.speech.espeak_worker",),
     "hibari": ("realizer.speech.hibari", "realizer.speech.hibari_worker"),
     "onnxruntime": ("realizer.speech.hibari_worker",),
+    "pocketsphinx": ("realizer.speech.align.sphinx",),
     "stomp": ("realizer.server.doors.broker",),
 }
 

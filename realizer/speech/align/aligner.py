@@ -1,0 +1,158 @@
+"""A recording and what it says in, when it says each word and phoneme out; the best aligner that is there."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from functools import cache
+from typing import Literal
+from xml.sax.saxutils import escape
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.arrays import Float32
+from realizer.speech.align import sphinx
+from realizer.speech.align.alignment import AlignError, Alignment, likely, moved
+from realizer.speech.align.by_model import by_model
+from realizer.speech.align.by_sound import by_sound
+from realizer.speech.align.even import even
+from realizer.speech.align.recording import mono, to_aligner
+from realizer.speech.utterance import Say, Utterance, Voice
+
+__all__ = ["Aligner", "align", "recorded"]
+
+Aligner = Literal["pocketsphinx", "espeak"]
+
+# The cost (`Spans`) of a probability of 1/2, and how fast it falls: between right texts and wrong ones, as
+# measured on human and espeak-ng's speech.
+COST, COST_OF_WORD = (0.92, -0.015), (0.97, -0.05)
+DOUBT = 0.5
+FASTEST = 4.0  # times as fast as a voice speaks: nobody does
+
+log = logging.getLogger(__name__)
+
+
+def align(
+    pcm: npt.ArrayLike,
+    rate: float,
+    text: str,
+    language: str = "en-US",
+    *,
+    aligner: Aligner | None = None,
+    voice: Voice | None = None,
+) -> Alignment:
+    """Find when a recording says each word and phoneme of a text.
+
+    English goes by pocketsphinx where it is installed; other languages, and what it cannot align, by what
+    espeak-ng says of the text, warped to the recording. Without either the words are spread over what sounds.
+
+    Args:
+        pcm: (n,) or (n, channels) samples: int16, int32 or floats in -1..1.
+        rate: Hz.
+        text: what is said, plain.
+        language: BCP-47.
+        aligner: only this one.
+        voice: what says the same, instead of espeak-ng.
+
+    Raises:
+        AlignError: the recording or the text cannot be used, or the aligner that was asked for cannot.
+        VoiceError: the text is too long, or espeak-ng died.
+    """
+    return _aligned(mono(pcm, rate), int(rate), Say(escape(text), language=language), aligner, voice)[0]
+
+
+def recorded(pcm: npt.ArrayLike, rate: float, request: Say, *, aligner: Aligner | None = None) -> Utterance:
+    """A recording of what is asked for as an utterance: its words, phonemes and marks where they are heard.
+
+    Args:
+        pcm: as in `align`.
+        rate: Hz.
+        request: the text with its marks; how it is to be spoken does not matter.
+        aligner: only this one.
+
+    Raises:
+        AlignError, VoiceError: as `align`.
+    """
+    sound = mono(pcm, rate)
+    found, reference = _aligned(sound, int(rate), request, aligner, None)
+    knots = [(time, at) for a, b in zip(reference.words, found.words, strict=True) for time, at in
+             ((a.start, b.start), (a.end, b.end))]  # fmt: skip
+    was, now = np.maximum.accumulate(np.array([(0.0, 0.0), *knots]), axis=0).T
+    # A word that follows another at once in the reference may follow a pause here: of knots at one time the
+    # last counts, so that a mark before a word comes when that word does.
+    marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
+    return Utterance(
+        duration=len(sound) / rate,
+        words=found.words,
+        phonemes=found.phonemes,
+        marks=marks,
+        sample_rate=int(rate),
+        pcm=np.rint(sound * 32767).astype(np.int16),
+        warnings=found.warnings,
+    )
+
+
+def _aligned(
+    sound: Float32, rate: int, request: Say, aligner: Aligner | None, voice: Voice | None
+) -> tuple[Alignment, Utterance]:
+    heard, duration = to_aligner(sound, rate), len(sound) / rate
+    fix = _unable(aligner, voice)
+    if fix:
+        raise AlignError(fix)
+    reference = (voice or _reference_voice()).say(replace(request, voice=None, rate=1.0, seconds=None))
+    if not reference.words:
+        raise AlignError("text: wanted words that are said in the recording, got none")
+    needed = reference.words[-1].end - reference.words[0].start
+    if duration < needed / FASTEST:
+        raise AlignError(
+            f"recording: wanted about {needed:.1f} s for {len(reference.words)} words, got {duration:.2f} s"
+        )
+    told = reference.warnings
+    found = None
+    if aligner == "pocketsphinx" or (aligner is None and _english(request.language) and not sphinx.missing()):
+        found = by_model(heard, duration, reference)
+        if found is None:
+            words = "pocketsphinx does not find the text in the recording"
+            if aligner is not None:
+                raise AlignError(words)
+            log.info("%s: aligned by espeak-ng instead", words)
+    if found is None:
+        found = (even if reference.pcm is None else _by_sound)(heard, duration, reference)
+    if found.confidence < DOUBT and found.aligner != "even":
+        told += (f"the recording does not sound like the text (confidence {found.confidence:.2f})",)
+    return replace(found, warnings=(*told, *found.warnings)), reference
+
+
+def _unable(aligner: str | None, voice: Voice | None) -> str | None:
+    """Why the aligner that was asked for cannot be used."""
+    from realizer.speech import espeak
+
+    if aligner not in (None, "pocketsphinx", "espeak"):
+        return f"aligner: wanted pocketsphinx or espeak, got {aligner!r}"
+    if aligner == "pocketsphinx":
+        return sphinx.missing()
+    return espeak.missing() if aligner == "espeak" and voice is None else None
+
+
+@cache
+def _reference_voice() -> Voice:
+    """What says the same: espeak-ng, or else rules without a sound. One for the whole process."""
+    from realizer.speech.espeak import EspeakVoice, missing
+    from realizer.speech.silent import SilentVoice
+
+    return SilentVoice() if missing() else EspeakVoice()
+
+
+def _english(language: str) -> bool:
+    return language.replace("_", "-").split("-")[0].lower() == "en"
+
+
+HOP = 160  # samples
+
+
+def _by_sound(sound: Float32, duration: float, reference: Utterance) -> Alignment:
+    """By a voice that says the same."""
+    spans = by_sound(sound, reference)
+    each = [likely(cost, COST_OF_WORD) for cost in spans.costs]
+    return moved("espeak", reference, duration, spans.words, spans.phonemes, each, likely(spans.cost, COST))

@@ -1,0 +1,123 @@
+"""What an aligner found: words and phonemes with times, and how far they can be trusted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from realizer.arrays import Float64
+from realizer.errors import RealizerError
+from realizer.speech.utterance import Phoneme, Utterance, Word
+
+__all__ = ["AlignError", "Alignment", "laid_out", "likely", "moved"]
+
+LEAST_PAUSE = 0.02  # s; shorter ones are of the sound before
+
+
+class AlignError(RealizerError):
+    """A recording and a text that cannot be brought together; the text says what was wanted and what came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """When a recording says what; all in seconds from its start.
+
+    Attributes:
+        duration: of the recording.
+        words: in the order of the text; those that are not heard have no length.
+        phonemes: they tile 0..duration; "" is a pause.
+        confidences: 0..1, one for each word.
+        phoneme_confidences: 0..1, one for each phoneme: that of its word; 1 of pauses.
+        confidence: 0..1 of all; below 0.5 the recording probably says something else.
+        aligner: "pocketsphinx", "espeak", or "even" where there is neither and the words are spread.
+        warnings: sentences.
+    """
+
+    duration: float
+    words: tuple[Word, ...]
+    phonemes: tuple[Phoneme, ...]
+    confidences: tuple[float, ...]
+    phoneme_confidences: tuple[float, ...]
+    confidence: float
+    aligner: str
+    warnings: tuple[str, ...] = ()
+
+
+def laid_out(
+    aligner: str,
+    reference: Utterance,
+    duration: float,
+    spans: Float64,
+    sounds: tuple[list[Phoneme], list[int]],
+    each: list[float],
+    confidence: float,
+) -> Alignment:
+    """What was found in order, inside the recording, with pauses between.
+
+    Args:
+        aligner: which one.
+        reference: what says the words' texts.
+        duration: of the recording.
+        spans: (n, 2) of its words.
+        sounds: phonemes in order, and the word of each.
+        each: confidence of each word.
+        confidence: of all.
+    """
+    spans = np.clip(np.maximum.accumulate(np.nan_to_num(spans).ravel()), 0.0, duration).reshape(-1, 2)
+    words = tuple(
+        Word(float(start), float(end), word.text)
+        for (start, end), word in zip(spans, reference.words, strict=True)
+    )
+    tiled: list[tuple[Phoneme, float]] = []
+    now = 0.0
+    for k, (phoneme, owner) in enumerate(zip(*sounds, strict=True)):
+        start = min(max(phoneme.start, now), duration)
+        end = min(max(phoneme.end, start), duration)
+        following = sounds[0][k + 1].start if k + 1 < len(sounds[0]) else duration
+        if start - now >= LEAST_PAUSE or (not tiled and start > 0):
+            tiled.append((Phoneme(now, start, ""), 1.0))
+        elif tiled:
+            start = now
+        if 0 < following - end < LEAST_PAUSE:
+            end = min(following, duration)
+        if end > start:
+            tiled.append((replace(phoneme, start=start, end=end), each[owner]))
+            now = end
+    if duration > now:
+        tiled.append((Phoneme(now, duration, ""), 1.0))
+    return Alignment(
+        duration=duration,
+        words=words,
+        phonemes=tuple(phoneme for phoneme, _ in tiled),
+        confidences=tuple(each),
+        phoneme_confidences=tuple(sure for _, sure in tiled),
+        confidence=confidence,
+        aligner=aligner,
+    )
+
+
+def moved(
+    aligner: str,
+    reference: Utterance,
+    duration: float,
+    words: Float64,
+    spans: Float64,
+    each: list[float],
+    confidence: float,
+) -> Alignment:
+    """The same of the reference's phonemes; (m, 2) `spans` are where they were found."""
+    starts = np.array([word.start for word in reference.words])
+    phonemes, owners = [], []
+    for phoneme, (start, end) in zip(reference.phonemes, spans, strict=True):
+        if phoneme.ipa:
+            phonemes.append(replace(phoneme, start=float(start), end=float(end)))
+            owners.append(max(0, int(np.searchsorted(starts, phoneme.start + 1e-6, side="right")) - 1))
+    return laid_out(aligner, reference, duration, words, (phonemes, owners), each, confidence)
+
+
+def likely(value: float, where: tuple[float, float]) -> float:
+    """0..1 by a logistic curve: 1/2 at the first of `where`, falling or rising as fast as the second says."""
+    middle, width = where
+    return 1.0 / (1.0 + math.exp(min(50.0, max(-50.0, -(value - middle) / width))))

@@ -1,0 +1,118 @@
+"""Sound in, what an ear would compare out: cepstra and loudness by frames, and where somebody speaks."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import gcd
+
+import numpy as np
+
+from realizer.arrays import Bool, Float32, Float64
+
+__all__ = ["RATE", "cepstra", "loudness", "normalised", "resampled", "sounding"]
+
+RATE = 16_000  # Hz; all that matters of speech lies below half of it
+WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as recognisers of speech take it
+BANDS, LOWEST, HIGHEST = 26, 100.0, 7000.0  # of the mel scale, Hz
+KEPT = 13  # cepstra; the finer ones tell the pitch
+EMPHASIS = 0.97
+# Of the mean energy of a band: below it a band counts as empty, so that noise in it does not matter.
+FLOOR = 0.01
+SLOPE = 2  # frames to each side, for how the cepstra change
+AT_ONCE = 4000  # frames; a spectrum of more would only take memory
+# Silence is near the quietest frames, speech near the loudest: percentiles, and parts of the range between.
+QUIET, LOUD, HEARD = 5, 95, 0.15
+LEAST_RANGE, MOST_RANGE = 1.0, 5.0  # powers of ten; steady noise has no range, digital silence too much
+
+
+def resampled(pcm: Float32, rate: int) -> Float32:
+    """(n,) float32 at `rate` Hz as (m,) float32 at 16 kHz, without what would alias."""
+    from scipy.signal import resample_poly
+
+    shared = gcd(rate, RATE)
+    if rate == RATE:
+        return pcm
+    sound: Float32 = resample_poly(pcm, RATE // shared, rate // shared).astype(np.float32)
+    return sound
+
+
+def cepstra(sound: Float32, hop: float) -> tuple[Float64, Float64]:
+    """(n, 26) cepstra of the mel spectrum with their slopes, and (n,) loudness; frame k is about k x hop.
+
+    Args:
+        sound: (m,) at 16 kHz, -1..1.
+        hop: samples between frames; need not be whole.
+
+    Source: Davis and Mermelstein 1980 for the cepstra; Furui 1986 for their slopes.
+    """
+    energy = _mel(sound, hop)
+    log = np.log(energy + FLOOR * energy.mean() + 1e-12)
+    plain = log @ _cosines()
+    return np.hstack([plain, _slopes(plain)]), loudness(energy)
+
+
+def loudness(energy: Float64) -> Float64:
+    """(n,) powers of ten, of (n, bands)."""
+    total: Float64 = np.log10(energy.sum(axis=1) + 1e-9)
+    return total
+
+
+def sounding(loud: Float64) -> tuple[Float64, Bool]:
+    """(n,) how loud each frame is between silence (0) and speech (1), and which are more than silence."""
+    low, high = np.percentile(loud, (QUIET, LOUD))
+    low = max(low, high - MOST_RANGE)
+    part = (loud - low) / max(high - low, LEAST_RANGE)
+    return part, part > HEARD
+
+
+def normalised(features: Float64, of: Bool) -> Float64:
+    """Each column with mean 0 and deviation 1 over the frames `of`: the room and the loudness go."""
+    chosen = features[of] if of.any() else features
+    scaled: Float64 = (features - chosen.mean(axis=0)) / (chosen.std(axis=0) + 1e-6)
+    return scaled
+
+
+def _mel(sound: Float32, hop: float) -> Float64:
+    """(n, bands) energy in the bands."""
+    flat = np.append(sound[:1], sound[1:] - np.float32(EMPHASIS) * sound[:-1])
+    at = np.rint(np.arange(int(len(sound) / hop) + 1) * hop).astype(np.intp)
+    padded = np.pad(flat, (WINDOW // 2, WINDOW))
+    frames = np.lib.stride_tricks.sliding_window_view(padded, WINDOW)
+    shape = np.hamming(WINDOW).astype(np.float32)
+    parts = [
+        np.abs(np.fft.rfft(frames[at[k : k + AT_ONCE]] * shape, SPECTRUM)) ** 2 @ _bands()
+        for k in range(0, len(at), AT_ONCE)
+    ]
+    return np.concatenate(parts)
+
+
+def _slopes(values: Float64) -> Float64:
+    """(n, k): the slope of the line through each value and its neighbours."""
+    padded = np.pad(values, ((SLOPE, SLOPE), (0, 0)), mode="edge")
+    count = len(values)
+    steps = range(1, SLOPE + 1)
+    rise: Float64 = np.add.reduce(
+        [k * (padded[SLOPE + k :][:count] - padded[SLOPE - k :][:count]) for k in steps]
+    )
+    slopes: Float64 = rise / (2.0 * sum(k * k for k in steps))
+    return slopes
+
+
+@cache
+def _bands() -> Float64:
+    """(spectrum / 2 + 1, bands): triangles, evenly spread on the mel scale."""
+    low, high = (1127 * np.log1p(edge / 700) for edge in (LOWEST, HIGHEST))
+    edges = 700 * np.expm1(np.linspace(low, high, BANDS + 2) / 1127)
+    places = np.fft.rfftfreq(SPECTRUM, 1 / RATE)[:, None]
+    rise = (places - edges[:-2]) / np.diff(edges[:-1])
+    fall = (edges[2:] - places) / np.diff(edges[1:])
+    bands: Float64 = np.maximum(0.0, np.minimum(rise, fall))
+    return bands
+
+
+@cache
+def _cosines() -> Float64:
+    """(bands, kept): the cosine transform."""
+    angles = np.pi / BANDS * (np.arange(BANDS)[:, None] + 0.5) * np.arange(KEPT)
+    cosines: Float64 = np.cos(angles) * np.sqrt(2 / BANDS)
+    return cosines
