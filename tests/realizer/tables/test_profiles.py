@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from realizer.tables.profiles import published_ranges, statistics, vocabularies
+from tests import own_profiles
 
 
 def test_the_first_profiles_are_mean_and_deviation_of_the_statistics_in_print_and_corrected() -> None:
@@ -44,3 +45,7 @@ def test_only_fear_is_misprinted_among_the_vocabularies() -> None:
     assert {emotion for emotion in known if known[emotion] != raw[emotion]} == {"fear"}
     assert known["fear"] - raw["fear"] == {19}
     assert raw["fear"] - known["fear"] == {12}
+
+
+def test_our_own_profiles_are_what_the_faces_of_their_emotions_ask_of_the_faps() -> None:
+    assert own_profiles.FILE.read_text("utf-8") == own_profiles.render(), "python -m tests.own_profiles"
