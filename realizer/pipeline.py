@@ -195,7 +195,7 @@ def realize(
         TableError: a file of rules, a mapping or an expression that cannot be used.
         VoiceError: the named voice is not installed.
     """
-    from realizer.face import face_name
+    from realizer.face import face_name, takes
 
     in_force = mapping_of(face, mapping)
     texts = [documents] if isinstance(documents, str | bytes) else list(documents)
@@ -210,6 +210,7 @@ def realize(
         expressions=expressions,
         history=float("inf"),
         cooccurrence=cooccurrence,
+        takes=lambda _: takes(face, deformer=deformer),
     )
     accepted, refused = play(texts, player, voice)
     # Blocks act on each other while they play: what is seen and heard is known when all of them have ended.

@@ -5,8 +5,9 @@ Knows no clock and no I/O: every call is told `now`, in seconds on the session c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,7 @@ class Player:
         expressions: a folder of expressions of the user's own, before those that ship; None: there are none.
         history: seconds before the last `due` for which frames can still be asked for.
         cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
+        takes: index of a character -> what moves its face (`Face.takes`); None: that is not known.
 
     Attributes:
         revision: rises whenever frames change that were already computed.
@@ -66,8 +68,10 @@ class Player:
         expressions: Path | None = None,
         history: float = HISTORY,
         cooccurrence: str = "on",
+        takes: Callable[[int], Sequence[str]] | None = None,
     ) -> None:
         self.kinds = kinds
+        self._takes = takes
         library = library_of(expressions)
         self.world = World(scene=scene, seed=seed, language=language, media=media, library=library)
         self.idle = idle
@@ -108,8 +112,11 @@ class Player:
             the block fits with other utterances: submit it again with such as last so long
             (`speech.fitting`), or with the same ones whose `stretch` is (1, 1).
         """
+        character = self._character(block.character_id)
         world = replace(self.world, utterances=dict(utterances or {}))
-        return self._blocks.submit(block, self._character(block.character_id), world, now)
+        if self._takes is not None:
+            world = replace(world, takes=partial(self._takes, character))
+        return self._blocks.submit(block, character, world, now)
 
     def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
         """Report a document, block or behaviour that cannot be played."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ class World:
         seed: for anything random.
         media: the folder that holds the files documents may name; None: there are none.
         library: the expressions that documents may name.
+        takes: () -> what moves the character's face (`Face.takes`); None where that is not known.
     """
 
     scene: Mapping[str, Position] | None = None
@@ -38,6 +39,7 @@ class World:
     seed: int = 0
     media: Path | None = None
     library: Library = field(default_factory=shipped)
+    takes: Callable[[], Sequence[str] | None] = lambda: None
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""timeline: a designer's file of the media folder -> a channel for each action unit of each of its tracks."""
+"""timeline: a designer's file of the media folder -> channels of its action units and of their mixing."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import numpy as np
 
 from bml_schema import Timeline as Node
 from realizer.animation.channel import Channel
-from realizer.animation.targets import Target
+from realizer.animation.targets import Target, presence, rank
 from realizer.arrays import Float64
 from realizer.behaviours import media, poses
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.expressions import Timeline, faults_of, lasts, read_timeline, spans
-from realizer.expressions.timeline import Track
+from realizer.expressions import Timeline, Track, faults_of, lasts, read_timeline, remarks, spans
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]
 
 # 1/s^2; it bends like an expression, as far as what it is tied to asks.
 STIFFNESS = 4.0
+# s; the mixer changes over so long, or what else the face shows would jump.
+CHANGE = 0.2
 
 
 def timing(node: Node, world: World) -> Timing:
@@ -33,18 +34,25 @@ def expand(node: Node, times: Float64, world: World) -> tuple[Channel, ...]:
     timeline = _timeline(node, world)
     start, end = float(times[0]), float(times[-1])
     scale = (end - start) / lasts(timeline, world.library)
-    return tuple(
-        channel for track in timeline.tracks for channel in _channels(track, start, scale, node, world)
-    )
+    shown = (channel for track in timeline.tracks for channel in _channels(track, start, scale, node, world))
+    return (*shown, *_mixing(timeline, start, end, node.id))
 
 
 def check(node: Node, world: World) -> tuple[Fault, ...]:
-    """A file that cannot be read, and expressions that are not in the library, are fatal: all in one."""
+    """A file that cannot be read, and expressions that are not in the library, are fatal: all in one.
+
+    What the face cannot mix as the file asks is told, and it plays.
+    """
     if faults := media.faults(node.file_name, world, read_timeline):
         return tuple(replace(fault, text=fault.text.replace("\n", "; ")) for fault in faults)
-    if wrong := faults_of(_timeline(node, world), world.library):
-        return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {node.file_name}: {'; '.join(wrong)}"),)
-    return ()
+    timeline = _timeline(node, world)
+    if wrong := faults_of(timeline, world.library):
+        return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {node.file_name!r}: {'; '.join(wrong)}"),)
+    takes = world.takes() if timeline.mixer == "successive" else None
+    return tuple(
+        Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"fileName: {node.file_name!r}: {remark}", fatal=False)
+        for remark in remarks(timeline, takes)
+    )
 
 
 def _timeline(node: Node, world: World) -> Timeline:
@@ -69,6 +77,20 @@ def _channels(track: Track, start: float, scale: float, node: Node, world: World
             Channel(target, times[kept], np.array([*values, 0.0])[kept], curve=track.curve, source=node.id)
         )
     return channels
+
+
+def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[Channel]:
+    """How far the successive mixer is at work, and how early it takes each unit that the order names."""
+    if timeline.mixer == "additive":
+        return []
+    change = min(CHANGE, (end - start) / 4)
+    times = np.array([start, start + change, end - change, end])
+    # Ranks add up to 1 at most: two timelines at once stay below it, or their orders would be lost.
+    ranks = np.linspace(0.5, 0.0, len(timeline.order), endpoint=False)
+    targets = [(presence("successive"), 1.0), *zip(map(rank, timeline.order), ranks, strict=True)]
+    return [
+        Channel(target, times, np.array([0.0, value, value, 0.0]), source=source) for target, value in targets
+    ]
 
 
 def _pose(name: str, intensity: float, world: World) -> dict[Target, float]:

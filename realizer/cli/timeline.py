@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -33,6 +33,10 @@ def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
     """Play a timeline: channels of expressions that grow out of each other (Wojdel 2005, 5.4).
 
     FILE is TOML or JSON. In a document, <realizer:timeline fileName="..."/> plays a file of the media folder.
+
+    \b
+    mixer = "successive"      # or "additive", which is usual: with --deformer au
+    order = [4, 1, 2]         # the action units that come first
 
     \b
     [[channel]]
@@ -84,9 +88,10 @@ def faults_in(content: bytes, library: Library) -> list[str]:
 
 def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -> list[str]:
     """What people's faces do otherwise than those of a sound timeline, and what would be usual."""
-    from realizer.expressions import read_timeline
+    from realizer.expressions import read_timeline, remarks
 
-    found = _advice(read_timeline(content), library, role, mood)
+    timeline = read_timeline(content)
+    found = chain(remarks(timeline), _advice(timeline, library, role, mood))
     return list(islice(found, MOST_ADVICE))
 
 

@@ -4,17 +4,9 @@ from realizer.expressions.expression import Expression, key
 from realizer.expressions.find import by_action_units, by_meaning
 from realizer.expressions.library import Library, library_of, shipped
 from realizer.expressions.own import read_folder
-from realizer.expressions.timeline import (
-    Entry,
-    Span,
-    Timeline,
-    Track,
-    evident,
-    faults_of,
-    lasts,
-    read_timeline,
-    spans,
-)
+from realizer.expressions.spans import Span, evident, lasts, spans
+from realizer.expressions.timeline import Entry, Timeline, Track, faults_of, remarks
+from realizer.expressions.timeline_reader import read_timeline
 
 __all__ = [
     "Entry",
@@ -32,6 +24,7 @@ __all__ = [
     "library_of",
     "read_folder",
     "read_timeline",
+    "remarks",
     "shipped",
     "spans",
 ]

@@ -58,9 +58,13 @@ class Played:
 def play() -> Callable[..., Played]:
     """Plays one block with these elements in it, without idle motion."""
 
-    def run(body: str, *, media: Path | None = None, idle: bool = False) -> Played:
+    def run(
+        body: str, *, media: Path | None = None, idle: bool = False, deformer: str | None = None
+    ) -> Played:
         document = f'<bml id="b" {NAMESPACES}>{body}</bml>'
-        return Played(realize(document, fps=FPS, voice=SilentVoice(), media=media, idle=idle))
+        return Played(
+            realize(document, deformer=deformer, fps=FPS, voice=SilentVoice(), media=media, idle=idle)
+        )
 
     return run
 

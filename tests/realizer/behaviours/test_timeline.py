@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer.face import deform, load_face
+
 SURPRISE = {"expression": "template:surprise", "duration": 1.0}
 ANGER = {"expression": "template:anger", "duration": 1.0}
 
@@ -16,9 +18,9 @@ ANGER = {"expression": "template:anger", "duration": 1.0}
 def timeline(play, tmp_path: Path):
     """Plays a timeline with these channels."""
 
-    def run(*channels: dict, attributes: str = "", also: str = ""):
-        (tmp_path / "t.json").write_text(json.dumps({"channel": list(channels)}), "utf-8")
-        return play(f'<own:timeline id="t" fileName="t.json" {attributes}/>{also}', media=tmp_path)
+    def run(*channels: dict, attributes: str = "", also: str = "", mixing: dict | None = None, **asked):
+        (tmp_path / "t.json").write_text(json.dumps({"channel": list(channels)} | (mixing or {})), "utf-8")
+        return play(f'<own:timeline id="t" fileName="t.json" {attributes}/>{also}', media=tmp_path, **asked)
 
     return run
 
@@ -120,3 +122,72 @@ def test_every_fault_of_a_file_is_told_in_one_warning(timeline, channel, told) -
     assert played.warnings == [("b:t", "CANNOT_CREATE_BEHAVIOR")]
     for part in told:
         assert part in played.told
+
+
+SNEER = {"entries": [{"expression": "template:disgust", "duration": 2.0}]}
+GRIN = {"entries": [{"expression": "smile", "duration": 2.0}]}
+AMAZED = {"entries": [{"expression": "template:surprise", "duration": 2.0}]}
+
+
+def mixed(played, face, name: str) -> np.ndarray:
+    return played.realization.poses[:, face.takes.index(name)]
+
+
+def test_the_mixer_and_the_order_reach_the_face_while_it_plays(timeline) -> None:
+    """Softly, so that what else the face shows does not jump; between, wholly, in the file's order."""
+    face = load_face(deformer="au")
+    asked = {"mixer": "successive", "order": [26, 12, 1]}
+    played = timeline(GRIN, AMAZED, mixing=asked, attributes='start="1" end="4"', deformer="au")
+    assert played.warnings == []
+    share = mixed(played, face, "successive")
+    assert share[[100, 110, 120, 250, 380, 400]] == pytest.approx([0, 0.5, 1, 1, 1, 0], abs=1e-5)
+    ranks = np.stack([mixed(played, face, f"rank {au}") for au in (26, 12, 1, 2)])[:, 101:400]
+    assert (ranks[0] > ranks[1]).all()
+    assert (ranks[1] > ranks[2]).all()
+    assert (ranks[2] > ranks[3]).all()
+    assert not ranks[3].any()
+
+
+def test_another_mixer_and_another_order_give_other_faces(timeline) -> None:
+    """Her figures 5.1 and 5.2; before and after it, and of its own accord, units are added up."""
+    face = load_face(deformer="au")
+
+    def shown(**mixing) -> np.ndarray:
+        played = timeline(GRIN, SNEER, mixing=mixing, deformer="au")
+        return np.asarray(deform(face, played.realization.poses[[0, 100]]))
+
+    summed, first = shown(mixer="additive"), shown(mixer="successive", order=[12])
+    last = shown(mixer="successive", order=[9, 6, 12])
+    assert np.array_equal(summed, shown())
+    assert np.array_equal(summed[0], first[0])
+    for one, other in ((summed, first), (summed, last), (first, last)):
+        assert np.linalg.norm(one[1] - other[1], axis=1).max() > 5e-4
+
+
+def test_what_it_asks_of_a_mixer_in_vain_is_told_and_it_plays(timeline) -> None:
+    played = timeline(GRIN, mixing={"mixer": "successive"}, deformer="mpeg4")
+    assert played.warnings == [("b:t", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
+    assert "fileName: 't.json': mixer: no effect, FAPs move this face; wanted" in played.told
+    assert course(played, "12L").max() > 0.8
+    played = timeline(GRIN, mixing={"order": [12]}, deformer="au")
+    assert "order: no effect, a sum has no order" in played.told
+
+
+def test_two_timelines_at_once_keep_an_order(play, tmp_path: Path) -> None:
+    face = load_face(deformer="au")
+    for name, order in (("a", [4, 12, 1]), ("b", [4, 1, 12])):
+        told = {"mixer": "successive", "order": order, "channel": [GRIN]}
+        (tmp_path / f"{name}.json").write_text(json.dumps(told), "utf-8")
+    nodes = "".join(f'<own:timeline id="{name}" fileName="{name}.json"/>' for name in "ab")
+    played = play(nodes, media=tmp_path, deformer="au")
+    values = [mixed(played, face, name)[100] for name in ("successive", "rank 4", "rank 12", "rank 1")]
+    assert values == pytest.approx([1, 1, 0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    "mixing", [{"mixer": "sum"}, {"order": [51]}, {"mixer": "successive", "order": [1, 1]}]
+)
+def test_a_mixer_or_an_order_that_is_none_is_refused(timeline, mixing) -> None:
+    played = timeline(GRIN, mixing=mixing)
+    assert played.warnings == [("b:t", "CANNOT_CREATE_BEHAVIOR")]
+    assert "'t.json': timeline, " in played.told

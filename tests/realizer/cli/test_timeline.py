@@ -88,3 +88,25 @@ def test_what_cannot_be_played_is_refused(tmp_path: Path, words: list[str], told
     done = CliRunner().invoke(cli, ["timeline", str(tmp_path / words[0]), *words[1:]])
     assert done.exit_code == 2
     assert told in " ".join(done.stderr.split())
+
+
+def test_a_mixer_that_a_face_has_not_is_told_and_it_plays(file: Path) -> None:
+    file.write_text('mixer = "successive"\n[[channel]]\nentries = [{ expression = "smile" }]', "utf-8")
+    out = str(file.with_suffix(".json"))
+    done = run("timeline", str(file), "--deformer", "mpeg4", "-o", out)
+    assert done.return_value == 0
+    assert "mixer: no effect, FAPs move this face" in done.stderr
+    done = run("timeline", str(file), "--deformer", "au", "-o", out)
+    assert done.return_value == 0
+    assert "no effect" not in done.stderr
+
+
+def test_an_order_without_the_successive_mixer_gets_advice(file: Path) -> None:
+    file.write_text('order = [4, 1]\n[[channel]]\nentries = [{ expression = "smile" }]', "utf-8")
+    done = run("check", str(file))
+    assert done.return_value == 0
+    assert "ADVICE order: no effect, a sum has no order" in done.stderr
+    file.write_text('order = [4, 51]\n[[channel]]\nentries = [{ expression = "smile" }]', "utf-8")
+    done = run("check", str(file))
+    assert done.return_value == 1
+    assert done.stdout.startswith(f"{file}: timeline, order, place 2: wanted the number of an action unit")

@@ -1,0 +1,157 @@
+"""A designer's timeline file (TOML or JSON) in; the timeline out, or all that is wrong with it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any, cast, get_args
+
+from realizer.errors import TableError
+from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
+from realizer.tables import action_units
+
+__all__ = ["read_timeline"]
+
+SHORTEST, LONGEST = 0.04, 3600.0  # s
+TIMELINE = ("mixer", "order", "channel")
+TRACK = ("name", "start", "joins", "curve", "entries")
+ENTRY = ("expression", "intensity", "duration")
+
+
+def read_timeline(content: bytes) -> Timeline:
+    """A timeline of TOML or, where it begins with "{", of JSON.
+
+        mixer = "successive"    # or "additive", which is usual
+        order = [4, 1, 2]       # with "successive": these action units first
+
+        [[channel]]
+        name = "brows"
+        joins = "both"          # or "onset", "offset"
+        curve = "linear"        # or "smooth"
+        start = 0.0
+        entries = [
+            { expression = "template:surprise", intensity = 0.8, duration = 1.2 },
+            { expression = "neutral", duration = 0.5 },
+            { expression = "template:anger" },
+        ]
+
+    Raises:
+        TableError: all that is wrong, a line each: channel, entry, what was wanted, what came.
+    """
+    try:
+        text = content.decode("utf-8-sig")
+        told = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits is no error of syntax
+        raise TableError(f"wanted a timeline in TOML or JSON, got: {error}") from None
+    reading = _Reading()
+    timeline = reading.timeline(told)
+    if reading.faults:
+        raise TableError("\n".join(reading.faults))
+    return timeline
+
+
+class _Reading:
+    """What is wrong with a file, as it is read."""
+
+    def __init__(self) -> None:
+        self.faults: list[str] = []
+
+    def _fault(self, place: str, wanted: str, got: object) -> None:
+        try:
+            words = repr(got)
+        except ValueError:
+            words = "a number of thousands of digits"
+        self.faults.append(
+            f"{place}: wanted {wanted}, got {words if len(words) <= 80 else words[:80] + '...'}"
+        )
+
+    def _keys(self, row: Mapping[str, Any], known: Sequence[str], place: str) -> None:
+        for name in row:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=1)
+                hint = f"; did you mean {near[0]}?" if near else ""
+                if place != "timeline" and name in TIMELINE:
+                    hint = "; that stands before all channels"
+                self.faults.append(f"{place}: wanted {', '.join(known)}, got {name!r}{hint}")
+
+    def timeline(self, told: Mapping[str, Any]) -> Timeline:
+        self._keys(told, TIMELINE, "timeline")
+        mixer = cast(Mixer, self._choice(told, "mixer", get_args(Mixer), "timeline"))
+        order = self._order(told.get("order", []))
+        rows = told.get("channel")
+        if not isinstance(rows, list) or not rows:
+            self._fault("timeline", "channels, [[channel]] each", rows)
+            rows = []
+        tracks = tuple(self._track(row, number) for number, row in enumerate(rows, 1))
+        return Timeline(tracks, mixer, order)
+
+    def _order(self, told: Any) -> tuple[int, ...]:
+        if not isinstance(told, list):
+            self._fault("timeline, order", "a list of action units, such as [4, 1, 2]", told)
+            return ()
+        # What turns follows all others, whatever their order (5.1).
+        still = {row.au for row in action_units() if not row.degrees}
+        order: list[int] = []
+        for number, au in enumerate(told, 1):
+            place = f"timeline, order, place {number}"
+            if type(au) is not int or au not in still:
+                self._fault(place, "the number of an action unit that turns neither head nor eyes", au)
+            elif au in order:
+                self._fault(place, "each action unit once", au)
+            else:
+                order.append(au)
+        return tuple(order)
+
+    def _track(self, row: Any, number: int) -> Track:
+        place = f"channel {number}"
+        if not isinstance(row, dict):
+            self._fault(place, "a table with entries", row)
+            return Track(place, ())
+        self._keys(row, TRACK, place)
+        name = row.get("name", str(number))
+        if not isinstance(name, str) or not name.strip():
+            self._fault(f"{place}, name", "a name", name)
+        place = f"channel {name}"
+        entries = row.get("entries")
+        if not isinstance(entries, list) or not entries:
+            self._fault(f"{place}, entries", "a list of { expression, intensity, duration }", entries)
+            entries = []
+        return Track(
+            str(name),
+            tuple(self._entry(entry, f"{place}, entry {k}") for k, entry in enumerate(entries, 1)),
+            cast(Joins, self._choice(row, "joins", get_args(Joins), place)),
+            cast(Curve, self._choice(row, "curve", get_args(Curve), place)),
+            self._number(row, "start", 0.0, 0.0, LONGEST, place),
+        )
+
+    def _entry(self, row: Any, place: str) -> Entry:
+        if not isinstance(row, dict):
+            self._fault(place, "{ expression, intensity, duration }", row)
+            return Entry("")
+        self._keys(row, ENTRY, place)
+        expression = row.get("expression")
+        if not isinstance(expression, str) or not expression.strip():
+            self._fault(f"{place}, expression", "the name of an expression, or neutral", expression)
+            expression = ""
+        duration = (
+            self._number(row, "duration", SHORTEST, SHORTEST, LONGEST, place) if "duration" in row else None
+        )
+        return Entry(expression, self._number(row, "intensity", 1.0, 0.0, 1.0, place), duration)
+
+    def _choice(self, row: Mapping[str, Any], name: str, known: Sequence[str], place: str) -> str:
+        value = row.get(name, known[0])
+        if value not in known:
+            self._fault(f"{place}, {name}", " or ".join(known), value)
+            return known[0]
+        return str(value)
+
+    def _number(
+        self, row: Mapping[str, Any], name: str, usual: float, low: float, high: float, place: str
+    ) -> float:
+        value = row.get(name, usual)
+        if isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high:
+            return float(value)
+        self._fault(f"{place}, {name}", f"a number {low:g}..{high:g}", value)
+        return usual

@@ -1,0 +1,53 @@
+"""When each entry of a timeline shows."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.expressions import Entry, Timeline, Track, evident, lasts, shipped, spans
+
+
+def test_an_entry_without_a_duration_lasts_as_its_expression_does() -> None:
+    (span,) = spans(Track("a", (Entry("smile"),)), shipped())
+    smile = shipped()["SMILE"]
+    assert span.reached == pytest.approx(smile.onset)
+    assert span.end - span.left == pytest.approx(smile.offset)
+    assert lasts(Timeline((Track("a", (Entry("smile"),), start=1.0),)), shipped()) == pytest.approx(
+        1 + smile.duration
+    )
+
+
+NAMES = [*shipped(), "neutral"]
+
+
+@given(
+    entries=st.lists(
+        st.tuples(st.sampled_from(NAMES), st.one_of(st.none(), st.floats(0.04, 9))), min_size=1, max_size=6
+    ),
+    joins=st.sampled_from(["both", "onset", "offset"]),
+    start=st.floats(0, 5),
+)
+def test_whatever_the_entries_time_goes_forward(entries, joins, start: float) -> None:
+    track = Track(
+        "a", tuple(Entry(name, 1.0, duration) for name, duration in entries), joins, "linear", start
+    )
+    shown = spans(track, shipped())
+    times = [start]
+    for span in shown:
+        assert span.start == pytest.approx(times[-1]) or span.start <= span.reached
+        assert span.start - 1e-9 <= span.reached <= span.left + 1e-9
+        assert span.left <= span.end + 1e-9
+        times.append(span.end)
+    for one, other in pairwise(shown):
+        assert one.end == pytest.approx(other.start)
+
+
+def test_an_expression_is_evident_from_half_of_its_coming_to_half_of_its_going() -> None:
+    track = Track("a", (Entry("template:surprise", 1.0, 1.0), Entry("neutral"), Entry("smile")))
+    (place, one, begin, end), (_, other, _, _) = evident(Timeline((track,)), shipped())
+    assert (place, one.name, other.name) == ("channel a, entry 1", "template:surprise", "SMILE")
+    assert (begin, end) == pytest.approx((0.15, 0.75))

@@ -1,0 +1,83 @@
+"""Timeline files, good and bad."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.errors import TableError
+from realizer.expressions import Entry, Timeline, Track, read_timeline
+
+FILE = b"""
+[[channel]]
+name = "brows"
+joins = "onset"
+curve = "smooth"
+start = 0.5
+entries = [{ expression = "template:surprise", intensity = 0.8, duration = 1.2 }, { expression = "Neutral" }]
+[[channel]]
+entries = [{ expression = "smile" }]
+"""
+JSON = b'{"channel": [{"name": "2", "entries": [{"expression": "smile"}]}]}'
+
+
+def test_a_file_is_read_as_toml_and_as_json() -> None:
+    read = read_timeline(FILE)
+    brows = Track("brows", (Entry("template:surprise", 0.8, 1.2), Entry("Neutral")), "onset", "smooth", 0.5)
+    assert read == Timeline((brows, Track("2", (Entry("smile"),))))
+    assert read_timeline(b"\n" + JSON).tracks == read.tracks[1:]
+
+
+def test_the_mixer_and_the_order_stand_before_the_channels() -> None:
+    read = read_timeline(b'mixer = "successive"\norder = [4, 1, 2]\n' + FILE)
+    assert (read.mixer, read.order) == ("successive", (4, 1, 2))
+    assert read.tracks == read_timeline(FILE).tracks
+    assert read_timeline(b'{"order": [], ' + JSON[1:]) == read_timeline(JSON)
+
+
+ONE = b"[[channel]]\nentries = [{ expression = 'a' }]"
+BAD = {
+    b"mixer = 'sum'\n" + ONE: "timeline, mixer: wanted additive or successive, got 'sum'",
+    b"mixer = ['additive']\n" + ONE: "timeline, mixer: wanted additive or successive, got ['additive']",
+    b"order = 12\n" + ONE: "timeline, order: wanted a list of action units, such as [4, 1, 2], got 12",
+    b"order = [4, 51]\n"
+    + ONE: "order, place 2: wanted the number of an action unit that turns neither head nor eyes, got 51",
+    b"order = [300]\n" + ONE: "order, place 1: wanted the number of an action unit",
+    b"order = ['4']\n"
+    + ONE: "order, place 1: wanted the number of an action unit that turns neither head nor eyes, got '4'",
+    b"order = [true]\n" + ONE: "order, place 1: wanted the number",
+    b"order = [4, 1, 4]\n" + ONE: "order, place 3: wanted each action unit once, got 4",
+    ONE + b"\nmixer = 'successive'": "got 'mixer'; that stands before all channels",
+    ONE + b"\nstart = 1" + b"0" * 400: "channel 1, start: wanted a number 0..3600, got 1000",
+    ONE + b"\nstart = 1" + b"0" * 9000: "wanted a timeline in TOML or JSON",
+    b"\xff": "wanted a timeline in TOML or JSON",
+    b"{": "wanted a timeline in TOML or JSON",
+    b"": "timeline: wanted channels, [[channel]] each, got None",
+    b"channel = 3": "timeline: wanted channels",
+    b"channel = [3]": "channel 1: wanted a table with entries, got 3",
+    b"x = 1\n[[channel]]\nentries = [{ expression = 'a' }]": "wanted mixer, order, channel, got 'x'",
+    b"[[channel]]\nname = 3\nentries = [{ expression = 'a' }]": "channel 1, name: wanted a name, got 3",
+    b"[[channel]]\nstart = -1\nentries = [{ expression = 'a' }]": "channel 1, start: wanted a number 0..3600",
+    b"[[channel]]\njoins = 'x'\nentries = [{ expression = 'a' }]": "joins: wanted both or onset or offset",
+    b"[[channel]]\ncurve = 'x'\nentries = [{ expression = 'a' }]": "curve: wanted linear or smooth, got 'x'",
+    b"[[channel]]\nentries = ['a']": "entry 1: wanted { expression, intensity, duration }, got 'a'",
+    b"[[channel]]\nentries = [{}]": "channel 1, entry 1, expression: wanted the name of an expression",
+    b"[[channel]]\nentries = [{ expression = 'a', duration = nan }]": "entry 1, duration: wanted a number",
+    b"[[channel]]\nentries = [{ expression = 'a', intensity = true }]": "entry 1, intensity: wanted a number",
+    b"[[channel]]\nentries = [{ expression = 'a', durasion = 1 }]": "did you mean duration?",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_fault_is_told_with_its_channel_and_entry(text: bytes) -> None:
+    with pytest.raises(TableError) as caught:
+        read_timeline(text)
+    assert BAD[text] in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_all_faults_are_told_at_once() -> None:
+    with pytest.raises(TableError) as caught:
+        read_timeline(
+            b"[[channel]]\njoins = 1\nentries = [{}, { expression = 'a', intensity = 7 }]\n[[channel]]"
+        )
+    assert len(str(caught.value).splitlines()) == 4
