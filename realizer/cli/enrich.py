@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__: list[str] = []
 
 FILES = (".bml", ".xml", ".txt")  # a single word that ends so is meant to be a file
+MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # "<3" is none
 # What XML 1.0 has no way to write (production 2, Char).
 UNWRITABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -141,7 +142,7 @@ def enrich(
     enricher = Enricher(role, mood, lists)
     faults = 0
     before = 0
-    if isinstance(said, bytes) or said.lstrip().startswith("<"):
+    if isinstance(said, bytes) or MARKUP.match(said):
         blocks, before, faults, languages = _documents(said, enricher)
     else:
         blocks = list(enricher.texts(_writable(said), MOST_TEXT))
@@ -179,7 +180,7 @@ def _read(text: str) -> str | bytes:
             raise click.UsageError(f"{text}: wanted a text, or a file that is there; a text may come by -")
         return text
     data = options.read_documents([text])[0]
-    if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if re.match(rb"(?:\xef\xbb\xbf)?\s*<(?![\d\s])", data) or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data
     try:
         return data.decode("utf-8-sig")

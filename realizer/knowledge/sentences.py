@@ -12,7 +12,11 @@ from realizer.speech.words import words_in
 __all__ = ["Sentence", "SpokenWord", "sentences"]
 
 QUESTION, EXCLAMATION = "?？؟՞\u037e", "!！՜"  # U+037E is the Greek one, which looks like a semicolon
-ENDS = re.compile(r"[.?!…。？！؟।՞՜\u037e]+[\"'”’»)\]]*(?=\s|$)|[。？！؟।]+|\n\s*\n")
+PICTURE = "\U0001f000-\U0001faff\u2600-\u27bf"  # emoji, which no voice says
+ENDS = re.compile(
+    rf"[.?!…。？！؟।՞՜\u037e]+[\"'”’»)\]\u200e\u200f\u202c\u2069]*(?=\s|$|[{PICTURE}])|[。？！؟।]+|\n\s*\n"
+)
+SAID = re.compile(f"[^{PICTURE}]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +50,16 @@ def sentences(text: str, language: str = "en", rate: float = 1.0) -> tuple[Sente
         language: BCP-47; which letters are vowels.
         rate: beside the ordinary rate of 0.2 s a vowel unit.
     """
+    if language.replace("_", "-").partition("-")[0].lower() == "el":
+        text = text.replace(";", "\u037e")  # keyboards and normal forms make no difference
     found: list[Sentence] = []
     now = 0.0
     for piece, place, signs in _pieces(text):
         words = []
         at = place
         for word, start in words_in(piece):
+            if not SAID.search(word):
+                continue
             now += _pauses(text[at : place + start]) * _unit(rate)
             length = units(word, language) * _unit(rate)
             words.append(SpokenWord(word, place + start, now, now + length))

@@ -149,3 +149,10 @@ def test_a_documents_language_says_which_words_count() -> None:
 def test_a_text_keeps_the_language_that_was_asked_for() -> None:
     assert '<text xml:lang="de">' in enrich("Gut.", "--language", "de").stdout
     assert "xml:lang" not in enrich("Good.").stdout
+
+
+def test_a_text_may_begin_with_a_heart() -> None:
+    done = enrich("-", stdin="<3 you! Really?")
+    assert done.return_value == 0
+    assert "surprise1" in done.stdout
+    assert "surprise1" in enrich("<3 Really?").stdout

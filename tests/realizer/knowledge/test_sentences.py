@@ -47,3 +47,18 @@ def test_any_text_gives_words_in_its_order_at_rising_times(text: str) -> None:
     words = [word for one in sentences(text) for word in one.words]
     assert all(text[word.place :].startswith(word.text) for word in words)
     assert all(a.end <= b.start + 1e-9 and a.place < b.place for a, b in pairwise(words))
+
+
+def test_emoji_end_a_sentence_and_are_no_words() -> None:
+    one, other = sentences("Really?😱 No 😀!")
+    assert [word.text for word in one.words] == ["Really"]
+    assert one.question
+    assert [word.text for word in other.words] == ["No"]
+    assert other.exclamation
+    assert sentences("😱!") == ()
+
+
+def test_greek_asks_with_a_semicolon() -> None:
+    text = "Είσαι σίγουρος; Ναι."
+    assert [one.question for one in sentences(text, "el-GR")] == [True, False]
+    assert not sentences(text)[0].question
