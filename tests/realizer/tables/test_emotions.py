@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from realizer.emotion import wheel
 from realizer.tables.emotions import archetypes, emotion_faces
 from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes
@@ -27,3 +29,11 @@ def test_a_face_is_its_lexeme_or_has_units_of_its_own(face) -> None:
     assert face.aus
     if face.lexeme:
         assert face.aus == face_lexemes()[face.lexeme].aus
+
+
+@pytest.mark.parametrize("name", [place.name for place in ring("paul").values() if place.opposite])
+def test_opposites_on_the_wheel_do_not_resemble_each_other(name: str) -> None:
+    """Table 6.1 of Paul 2010: as FAPs, whose signs tell brows that rise from brows that fall."""
+    here = ring("paul")[name]
+    one, other = wheel(here.angle).frame(), wheel(ring("paul")[here.opposite].angle).frame()
+    assert one @ other / (np.linalg.norm(one) * np.linalg.norm(other)) <= 0
