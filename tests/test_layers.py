@@ -136,7 +136,7 @@ DOORS = {
     "numba": ("realizer.render.raster",),
     "pyrender": ("realizer.render.offscreen",),
     "websockets": ("realizer.server", "realizer.client"),
-    "av": ("realizer.outputs",),
+    "av": ("realizer.outputs", "realizer.behaviours.sound_file"),
     "clarabel": ("realizer.scheduling",),
     "click": ("realizer.cli",),
     "espeakng_loader": ("realizer.speech.espeak_worker",),

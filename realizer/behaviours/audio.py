@@ -1,4 +1,4 @@
-"""audiofile: a WAV file of the media folder -> what sounds from start to end."""
+"""audiofile: a sound file of the media folder -> what sounds from start to end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from realizer.animation.channel import Channel
 from realizer.arrays import Float64
 from realizer.behaviours import media
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.wav_file import read_wav
+from realizer.behaviours.sound_file import read_sound
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Utterance
 
@@ -33,25 +33,16 @@ def expand(node: AudioFile, times: Float64, world: World) -> tuple[Channel, ...]
 
 
 def check(node: AudioFile, world: World) -> tuple[Fault, ...]:
-    return media.faults(node.file_name, world, read)
+    return media.faults(node.file_name, world, read_sound)
 
 
 def sound(node: AudioFile, world: World) -> Utterance | None:
     return _sound(node, world)
 
 
-def read(content: bytes) -> Utterance:
-    """The sound of a file.
-
-    Raises:
-        RealizerError: no WAV, or a coding that is not supported.
-    """
-    rate, pcm = read_wav(content)
-    return Utterance(len(pcm) / rate, (), (), {}, rate, pcm)
-
-
 def _sound(node: AudioFile, world: World) -> Utterance:
-    return media.load(node.file_name, world, read)
+    recording = media.load(node.file_name, world, read_sound)
+    return Utterance(len(recording.pcm) / recording.rate, (), (), {}, recording.rate, recording.pcm)
 
 
 KINDS = (Kind(AudioFile, timing, expand, check, sound=sound, parameters={"volume": 100.0}),)

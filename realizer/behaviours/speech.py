@@ -1,4 +1,4 @@
-"""speech: its text or SSML -> what a voice has to say, the times it took, and the lips."""
+"""speech: its text or SSML, or a recording -> what a voice has to say, the times it took, and the lips."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from bml_schema import Speech, Sync
+from bml_schema import AudioFile, Speech, Sync
 from realizer.animation.channel import Channel
 from realizer.arrays import Float64
+from realizer.behaviours import media
 from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.media import MediaError
+from realizer.behaviours.sound_file import read_sound
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import MOST_TEXT, Say, Utterance
+from realizer.speech.utterance import MOST_TEXT, Recording, Say, Utterance
 
 __all__ = ["KINDS"]
 
@@ -35,11 +38,15 @@ class Spoken:
 
 
 def say(node: Speech, world: World) -> Say | None:
-    """The description of highest priority that is SSML, or else the text with its syncs as marks."""
+    """The description of highest priority that is SSML, or else the text with its syncs as marks.
+
+    A description that is an audio file says how it sounds; what is said in it stands in the others.
+    """
     spoken = _spoken(node)
     if spoken is None or len(spoken.ssml) > MOST_TEXT:
         return None
-    return Say(spoken.ssml, spoken.marks, language=spoken.language or world.language)
+    language = spoken.language or world.language
+    return Say(spoken.ssml, spoken.marks, language=language, recording=_recording(node, world))
 
 
 def timing(node: Speech, world: World) -> Timing:
@@ -87,7 +94,7 @@ def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
 
 
 def check(node: Speech, world: World) -> tuple[Fault, ...]:
-    """Nothing to say is fatal, and more than a voice takes."""
+    """Nothing to say is fatal, and more than a voice takes; a recording that is not there is spoken."""
     spoken = _spoken(node)
     if spoken is None:
         words = f"speech: wanted <text> or a description of type {SSML}, got none"
@@ -97,7 +104,9 @@ def check(node: Speech, world: World) -> tuple[Fault, ...]:
             "say it in several behaviours"
         )
     else:
-        return ()
+        name = _audio_file(node)
+        faults = media.faults(name, world, read_sound) if name is not None else ()
+        return tuple(replace(fault, fatal=False) for fault in faults)
     return (Fault("CANNOT_CREATE_BEHAVIOR", words),)
 
 
@@ -114,6 +123,29 @@ def _spoken(node: Speech) -> Spoken | None:
         for part in node.text.parts
     ]
     return Spoken("".join(parts), tuple(part.id for part in node.text.parts if isinstance(part, Sync)))
+
+
+def _audio_file(node: Speech) -> str | None:
+    """The name of the recording: of the highest <bmlt:audiofile> among the descriptions."""
+    for description in sorted(node.descriptions, key=lambda d: -d.priority):
+        try:
+            element = ElementTree.fromstring(description.content)
+        except ElementTree.ParseError:
+            continue
+        if element.tag == AudioFile.tag:
+            return element.get("fileName", "")
+    return None
+
+
+def _recording(node: Speech, world: World) -> Recording | None:
+    """What is played instead of a voice; `check` has said why where there is none."""
+    name = _audio_file(node)
+    if name is None:
+        return None
+    try:
+        return media.load(name, world, read_sound)
+    except MediaError:
+        return None
 
 
 def _inside(content: str) -> Spoken | None:

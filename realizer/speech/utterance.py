@@ -8,13 +8,21 @@ from typing import Protocol
 
 from realizer.arrays import Int16
 
-__all__ = ["MOST_TEXT", "STRETCH", "WARP", "Phoneme", "Say", "Utterance", "Voice", "Word"]
+__all__ = ["MOST_TEXT", "STRETCH", "WARP", "Phoneme", "Recording", "Say", "Utterance", "Voice", "Word"]
 
 # A voice can speak so much faster or slower and still be understood, as parts of its usual length; ours.
 STRETCH = (0.6, 1.8)
 # And a sound can be played so much faster or slower, here more and there less, without asking the voice.
 WARP = (0.92, 1.08)
 MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """Sound that is there already: (n,) int16 mono at `rate` Hz. It equals nothing but itself."""
+
+    rate: int
+    pcm: Int16
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +37,7 @@ class Say:
         voice: name of a voice, or None for the language's default.
         rate: 1 is the voice's own rate, 2 twice as fast.
         seconds: how long it is to last; None as long as it takes. For `speech.fitting`, voices need not look.
+        recording: somebody who says it already: no voice is asked, it is aligned (`speech.align`).
     """
 
     ssml: str
@@ -37,6 +46,7 @@ class Say:
     voice: str | None = None
     rate: float = 1.0
     seconds: float | None = None
+    recording: Recording | None = None
 
 
 @dataclass(frozen=True, slots=True)

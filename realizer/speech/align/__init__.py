@@ -6,12 +6,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from realizer.speech.align.aligner import Aligner, align, recorded
+    from realizer.speech.align.aligner import Aligner, align
     from realizer.speech.align.alignment import AlignError, Alignment
+    from realizer.speech.align.given import recorded
 
 __all__ = ["AlignError", "Aligner", "Alignment", "align", "recorded"]
 
-_HOME = {"AlignError": "alignment", "Alignment": "alignment"}
+_HOME = {"AlignError": "alignment", "Alignment": "alignment", "recorded": "given"}
 
 
 def __getattr__(name: str) -> Any:

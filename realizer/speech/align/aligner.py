@@ -8,7 +8,6 @@ from functools import cache
 from typing import Literal
 from xml.sax.saxutils import escape
 
-import numpy as np
 import numpy.typing as npt
 
 from realizer.arrays import Float32
@@ -20,7 +19,7 @@ from realizer.speech.align.even import even
 from realizer.speech.align.recording import mono, to_aligner
 from realizer.speech.utterance import Say, Utterance, Voice
 
-__all__ = ["Aligner", "align", "recorded"]
+__all__ = ["Aligner", "align", "aligned"]
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
@@ -59,48 +58,30 @@ def align(
         AlignError: the recording or the text cannot be used, or the aligner that was asked for cannot.
         VoiceError: the text is too long, or espeak-ng died.
     """
-    return _aligned(mono(pcm, rate), int(rate), Say(escape(text), language=language), aligner, voice)[0]
+    return aligned(mono(pcm, rate), int(rate), Say(escape(text), language=language), aligner, voice)[0]
 
 
-def recorded(pcm: npt.ArrayLike, rate: float, request: Say, *, aligner: Aligner | None = None) -> Utterance:
-    """A recording of what is asked for as an utterance: its words, phonemes and marks where they are heard.
+def aligned(
+    sound: Float32, rate: int, request: Say, aligner: Aligner | None, voice: Voice | None
+) -> tuple[Alignment, Utterance]:
+    """The alignment of a recording, and what a voice made of the same request.
 
     Args:
-        pcm: as in `align`.
+        sound: (n,) -1..1.
         rate: Hz.
-        request: the text with its marks; how it is to be spoken does not matter.
-        aligner: only this one.
+        request: how it is to be spoken does not matter.
+        aligner, voice: as in `align`.
 
     Raises:
         AlignError, VoiceError: as `align`.
     """
-    sound = mono(pcm, rate)
-    found, reference = _aligned(sound, int(rate), request, aligner, None)
-    knots = [(time, at) for a, b in zip(reference.words, found.words, strict=True) for time, at in
-             ((a.start, b.start), (a.end, b.end))]  # fmt: skip
-    was, now = np.maximum.accumulate(np.array([(0.0, 0.0), *knots]), axis=0).T
-    # A word that follows another at once in the reference may follow a pause here: of knots at one time the
-    # last counts, so that a mark before a word comes when that word does.
-    marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
-    return Utterance(
-        duration=len(sound) / rate,
-        words=found.words,
-        phonemes=found.phonemes,
-        marks=marks,
-        sample_rate=int(rate),
-        pcm=np.rint(sound * 32767).astype(np.int16),
-        warnings=found.warnings,
-    )
-
-
-def _aligned(
-    sound: Float32, rate: int, request: Say, aligner: Aligner | None, voice: Voice | None
-) -> tuple[Alignment, Utterance]:
     heard, duration = to_aligner(sound, rate), len(sound) / rate
     fix = _unable(aligner, voice)
     if fix:
         raise AlignError(fix)
-    reference = (voice or _reference_voice()).say(replace(request, voice=None, rate=1.0, seconds=None))
+    reference = (voice or _reference_voice()).say(
+        replace(request, voice=None, rate=1.0, seconds=None, recording=None)
+    )
     if not reference.words:
         raise AlignError("text: wanted words that are said in the recording, got none")
     needed = reference.words[-1].end - reference.words[0].start
