@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ import numpy as np
 from realizer.arrays import Bool, Float64
 from realizer.emotion.archetypes import archetypes
 from realizer.emotion.profile import Profile
+from realizer.emotion.wheel import wheel
 from realizer.tables.emotion_model import emotion_model
+from realizer.tables.feelings import ring
 
 __all__ = ["Recogniser", "Recognition", "recogniser"]
 
@@ -117,10 +119,13 @@ def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
 
     Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. In
     the published sets an emotion has many profiles, weak and strong; in ours one, which counts at any
-    strength.
+    strength, and the advanced emotions of the wheel, which lie in the middle of two, are known too.
     """
     strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
+    if profiles == "own":
+        blends = [place for place in ring("paul").values() if place.kind == "advanced"]
+        every += [replace(wheel(place.angle), name=place.name) for place in blends]
     return Recogniser([*every, Profile("neutral", profiles, {})] if absent else every, absent, strengths)
 
 

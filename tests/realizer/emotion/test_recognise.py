@@ -7,6 +7,7 @@ import pytest
 
 from realizer.emotion import Profile, Recogniser, archetypes, emotion, known_words, recogniser
 from realizer.tables.emotion_model import emotion_model
+from realizer.tables.feelings import ring
 
 DRAWS = 60
 
@@ -90,6 +91,13 @@ def test_our_own_archetypes_are_recognised_at_less_than_full_strength(strength: 
         assert known.recognise(weaker.frame()).emotion == name, weaker
         right = sum(got == name for got in known.names(noisy(weaker, 3)))
         assert right >= 0.9 * DRAWS, name
+
+
+@pytest.mark.parametrize("name", [place.name for place in ring("paul").values() if place.kind == "advanced"])
+def test_a_blend_in_the_middle_of_two_archetypes_is_named_with_its_belief(name: str) -> None:
+    seen = recogniser().recognise(emotion(name).frame())
+    assert seen.emotion == name
+    assert seen.emotions[name] == 1
 
 
 def test_a_word_of_a_category_is_recognised_as_its_archetype() -> None:
