@@ -105,10 +105,13 @@ def read_rules(text: str, name: str) -> Rules:
             try:
                 found.append(parse_rule(line, kind, sets))
             except TableError as error:
-                faults.append(f"{name}, [{kind}] {line!r}: {error}")
+                faults.append(f"{name}{_at(text, line)}, [{kind}] {line!r}: {error}")
     if SMALL not in sets and any(rule.kind in ("exclusion", "inclusion") for rule in found):
         faults.append(f"{name}, [sets]: wanted {SMALL} = [1, 0, 0], or how else a unit is small, got none")
-    faults += [f"{name}, {fault}" for fault in _contradictions(found)]
+    faults += [
+        f"{name}{_at(text, rule.text)}, [{rule.kind}] {rule.text!r}: {says}"
+        for rule, says in _contradictions(found)
+    ]
     if faults:
         raise TableError("\n".join(faults))
     return Rules(sets, tuple(found))
@@ -181,7 +184,14 @@ def _set(values: object, where: str, faults: list[str]) -> tuple[float, float, f
     return 0.0, 0.0, 0.0
 
 
-def _contradictions(found: list[Rule]) -> list[str]:
+def _at(text: str, rule: object) -> str:
+    """ ":7", the last line on which a rule stands; "" where it is written in another way."""
+    lines = [row.partition("#")[0] for row in text.splitlines()]
+    at = [n for n, row in enumerate(lines, 1) if f'"{rule}"' in row or f"'{rule}'" in row]
+    return f":{at[-1]}" if at else ""
+
+
+def _contradictions(found: list[Rule]) -> list[tuple[Rule, str]]:
     """Pairs of rules of which one says that the other's stronger unit is the weaker, or says it twice."""
     faults = []
     seen: dict[tuple[int, tuple[Unit, ...]], Rule] = {}
@@ -189,8 +199,8 @@ def _contradictions(found: list[Rule]) -> list[str]:
         key = (rule.weaker, rule.stronger)
         turned = (rule.stronger[0].au, (Unit(rule.weaker),)) if len(rule.stronger) == 1 else None
         if key in seen:
-            faults.append(f"[{rule.kind}] {rule.text!r}: says what {seen[key].text!r} says already")
+            faults.append((rule, f"says what {seen[key].text!r} says already"))
         elif turned in seen:
-            faults.append(f"[{rule.kind}] {rule.text!r}: says the opposite of {seen[turned].text!r}")
+            faults.append((rule, f"says the opposite of {seen[turned].text!r}"))
         seen[key] = rule
     return faults

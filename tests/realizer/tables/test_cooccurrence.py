@@ -43,7 +43,18 @@ def test_a_dominated_unit_stands_left_and_an_excluded_one_right() -> None:
 def test_a_rule_that_cannot_be_read_says_what_was_wanted(section: str, rule: str, says: str) -> None:
     with pytest.raises(TableError) as caught:
         read_rules(f'{HEAD}[{section}]\nrules = ["{rule}"]\n', "mine.toml")
-    assert str(caught.value) == f"mine.toml, [{section}] {rule!r}: {says}"
+    line = HEAD.count("\n") + 2
+    assert str(caught.value) == f"mine.toml:{line}, [{section}] {rule!r}: {says}"
+
+
+def test_a_rule_that_stands_twice_is_found_where_it_stands_the_second_time() -> None:
+    with pytest.raises(TableError) as caught:
+        read_rules(
+            f'{HEAD}[domination]\nrules = [\n  "5<63",\n  "7<6",  # "5<63"\n  "5<63",\n]\n', "mine.toml"
+        )
+    assert str(caught.value).startswith(
+        f"mine.toml:{HEAD.count(chr(10)) + 5}, [domination] '5<63': says what"
+    )
 
 
 def test_all_faults_of_a_file_are_said_at_once() -> None:
