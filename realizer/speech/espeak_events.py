@@ -94,7 +94,7 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
     return Timeline(
         words=tuple(
             Word(first / rate, last / rate, text)
-            for (text, _), (first, last, _) in zip(document.words, words, strict=True)
+            for (text, _), (first, last) in zip(document.words, words, strict=True)
         ),
         phonemes=phonemes,
         marks={name: sample / rate for name, sample in marks.items()},
@@ -139,8 +139,8 @@ def _words(
     events: Sequence[tuple[int, int, int]],
     end: int,
     spoken: Spoken,
-) -> list[tuple[int, int, bool]]:
-    """For each of our words: first and last sample, and whether espeak-ng says that it begins there."""
+) -> list[tuple[int, int]]:
+    """For each of our words: its first sample and the one after its last."""
     if not document.words:
         return []
     starts = {place: index for index, (_, place) in enumerate(document.words)}
@@ -165,7 +165,7 @@ def _words(
     alone = dict(zip(merged, spoken([document.words[i][0] for i in merged]), strict=True)) if merged else {}
     inner = {first: sample for sample, _, first in events}
 
-    found: list[tuple[int, int, bool]] = []
+    found: list[tuple[int, int]] = []
     for k, group in enumerate(groups):
         stop = groups[k + 1].first if k + 1 < len(groups) else len(sounds)
         own = [i for i in range(group.first, stop) if sounds[i]]  # without pauses
@@ -183,18 +183,16 @@ def _words(
             else:
                 first = found[-1][1]
             until = begins[mine[-1] + 1] if mine and mine[-1] + 1 < len(begins) else end
-            found.append((first, max(first, until if mine else first), n == 0))
+            found.append((first, max(first, until if mine else first)))
     # A word ends where the next begins at the latest.
     return [
-        (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last, sure)
-        for k, (first, last, sure) in enumerate(found)
+        (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last)
+        for k, (first, last) in enumerate(found)
     ]
 
 
-def _marks(
-    document: Document, events: Sequence[Event], words: Sequence[tuple[int, int, bool]]
-) -> dict[str, int]:
-    """Mark -> sample. A reported mark is exact, except inside merged words; a lost one goes by its word."""
+def _marks(document: Document, events: Sequence[Event], words: Sequence[tuple[int, int]]) -> dict[str, int]:
+    """Mark -> sample: where the next word begins; before a <break> and at the end as it is reported."""
     reported: dict[str, int] = {}
     for kind, sample, _, text in events:
         if kind == MARK:
@@ -205,7 +203,8 @@ def _marks(
         before = words[mark.word - 1][1] if mark.word else 0
         following = words[mark.word] if mark.word < len(words) else None
         heard = reported.get(f"m{k}")
-        if following is not None and not mark.paused and (heard is None or not following[2]):
+        if following is not None and not mark.paused:
+            # A reported mark comes too early where espeak-ng puts a little pause before the word.
             sample = following[0]
         else:
             sample = before if heard is None else heard

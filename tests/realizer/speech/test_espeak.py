@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib.util
 import os
 import signal
 import threading
@@ -149,6 +150,37 @@ def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
     assert list(said.marks) == ["a\"b'ü"]
 
 
+@pytest.mark.parametrize(
+    ("language", "text", "word"),
+    [
+        ("de-DE", 'Das sind 42 Äpfel <mark name="m"/>und Birnen.', "und"),
+        ("nl-NL", 'Dat zijn 42 appels <mark name="m"/>en peren.', "en"),
+        ("pl-PL", 'To są 42 jabłka <mark name="m"/>i gruszki.', "i"),
+    ],
+)
+def test_a_mark_is_at_its_word_and_not_before_the_little_pause_that_the_engine_makes(
+    voice: EspeakVoice, language: str, text: str, word: str
+) -> None:
+    said = voice.say(Say(text, ("m",), language))
+    assert said.marks["m"] == starts(said)[word]
+    assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes if phoneme.ipa}
+
+
+def test_marks_of_five_languages_are_within_five_milliseconds_of_the_engines_own_words(
+    voice: EspeakVoice,
+) -> None:
+    path = Path(__file__).parents[2] / "benchmarks" / "marks.py"
+    spec = importlib.util.spec_from_file_location("marks", path)
+    assert spec is not None
+    assert spec.loader is not None
+    marks = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(marks)
+    found = list(marks.errors(voice, 60))
+    assert len(found) == 60
+    assert {language for language, _, _ in found} == set(marks.TEXTS)
+    assert max(ms for _, ms, _ in found) < 5
+
+
 def test_a_mark_before_a_break_is_before_the_silence(voice: EspeakVoice) -> None:
     said = voice.say(Say('one <mark name="a"/><break time="800ms"/><mark name="b"/>two', ("a", "b")))
     assert said.marks["a"] == pytest.approx(said.words[0].end, abs=0.05)
@@ -165,6 +197,17 @@ def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
     finally:
         first.close()
         second.close()
+
+
+def test_every_fork_says_the_same(voice: EspeakVoice) -> None:
+    process = voice._process
+    name, _ = choose_voice(process.hello(), None, "en-US")
+    request = {"op": "say", "text": "<speak>Hello, I am here.</speak>", "voice": name, "wpm": 175}
+    other = {**request, "text": "<speak>Something else in between.</speak>"}
+    first = process.ask(request)
+    for _ in range(12):
+        process.ask(other)
+        assert process.ask(request) == first
 
 
 def test_without_fork_the_samples_are_the_same(voice: EspeakVoice) -> None:
@@ -309,7 +352,10 @@ def test_data_that_are_not_there_are_an_error_with_words(tmp_path: Path) -> None
         ("en-AU", "gmw/en"),
         ("pt-BR", "roa/pt-BR"),
         ("zh-CN", "sit/cmn"),
+        ("zh", "sit/cmn"),
         ("zh-yue", "sit/yue"),
+        ("nl", "gmw/nl"),
+        ("en-gb", "gmw/en"),
         ("no", "gmq/nb"),
         ("es-MX", "roa/es-419"),
     ],
@@ -347,6 +393,24 @@ def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) ->
 def test_language_flags_are_no_phonemes(voice: EspeakVoice) -> None:
     said = voice.say(Say("c'est un weekend", language="fr"))
     assert not any("(" in phoneme.ipa for phoneme in said.phonemes)
+
+
+@pytest.mark.parametrize(
+    ("language", "text"),
+    [
+        ("en-GB", "The flower's power: an hour of fire, our tired choir, a player and a lower tower."),
+        ("fr", "Le week-end, c'est le jazz et le marketing."),
+        ("de", "Das Meeting über Computer und Chips."),
+        ("pl", "Dżem, czekolada i dźwięk."),
+        ("zh-CN", "你好，我很高兴见到你。"),
+    ],
+)
+def test_phonemes_are_ipa_and_nothing_but_ipa(voice: EspeakVoice, language: str, text: str) -> None:
+    said = voice.say(Say(text, language=language))
+    heard = "".join(phoneme.ipa for phoneme in said.phonemes)
+    assert len(heard) > 10
+    assert not set(heard) & set("()�\x00_ˈˌ͡"), heard
+    assert all(len(phoneme.ipa.encode()) <= 8 for phoneme in said.phonemes)
 
 
 def test_a_phoneme_of_eight_bytes_is_read_whole() -> None:
