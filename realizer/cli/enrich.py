@@ -145,7 +145,10 @@ def enrich(
     if isinstance(said, bytes) or MARKUP.match(said):
         blocks, before, faults, languages = _documents(said, enricher)
     else:
-        blocks = list(enricher.texts(_writable(said), MOST_TEXT))
+        clean = _writable(said)
+        if not clean.strip():
+            raise click.UsageError("wanted a text or a BML document, got nothing that can be said")
+        blocks = list(enricher.texts(clean, MOST_TEXT))
         languages = [lists.language]
     if not context.obj["quiet"]:
         tell_unknown(lists, languages, set())

@@ -59,4 +59,5 @@ def habits(
         path, line = (where.path, where.line) if where is not None else ("/bml", None)
         spot = source.locate(path, line=line, block=block.id)
         id = f"{block.id}:{one.id}" if one.id else block.id
-        yield Finding(file, ADVICE, id, path, one.said, one.said, (Label(spot, ""),), (f"help: {one.hint}",))
+        whole = f"{one.said}; {one.hint}"
+        yield Finding(file, ADVICE, id, path, whole, one.said, (Label(spot, ""),), (f"help: {one.hint}",))

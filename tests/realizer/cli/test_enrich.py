@@ -156,3 +156,7 @@ def test_a_text_may_begin_with_a_heart() -> None:
     assert done.return_value == 0
     assert "surprise1" in done.stdout
     assert "surprise1" in enrich("<3 Really?").stdout
+
+
+def test_a_text_of_nothing_that_can_be_written_is_refused() -> None:
+    assert "got nothing that can be said" in str(enrich("-", stdin="\0\x01 ").exception)

@@ -20,7 +20,10 @@ def check(tmp_path: Path, body: str, *options: str) -> Result:
 def test_advice_stands_on_standard_error_with_its_place_and_does_not_count(tmp_path: Path) -> None:
     done = check(tmp_path, '<r:expression id="e" name="template:disgust"/>')
     assert (done.return_value, done.stdout) == (0, "")
-    assert "d.bml:2:2: ADVICE b1:e: line 2, /bml/expression[1]: disgust stands alone" in done.stderr
+    assert (
+        "d.bml:2:2: ADVICE b1:e: line 2, /bml/expression[1]: disgust stands alone; disgust stands within"
+        in done.stderr
+    )
 
 
 def test_a_word_is_looked_up_where_it_is_spoken(tmp_path: Path) -> None:
