@@ -369,8 +369,6 @@ def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
 
             print(f"realizer: {behaviour}: {error}; going on without sound", file=sys.stderr)
             utterances[behaviour] = fitted(SilentVoice(), say)
-        for warning in utterances[behaviour].warnings:
-            print(f"realizer: {behaviour}: {warning}", file=sys.stderr)
     return utterances
 
 

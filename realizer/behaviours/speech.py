@@ -94,7 +94,10 @@ def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
 
 
 def check(node: Speech, world: World) -> tuple[Fault, ...]:
-    """Nothing to say is fatal, and more than a voice takes; a recording that is not there is spoken."""
+    """Nothing to say is fatal, and more than a voice takes; a recording that is not there is spoken.
+
+    What the voice could not say as it is written is one fault that is not fatal.
+    """
     spoken = _spoken(node)
     if spoken is None:
         words = f"speech: wanted <text> or a description of type {SSML}, got none"
@@ -106,6 +109,10 @@ def check(node: Speech, world: World) -> tuple[Fault, ...]:
     else:
         name = _audio_file(node)
         faults = media.faults(name, world, read_sound) if name is not None else ()
+        unsaid = world.utterances[node.id].warnings if node.id in world.utterances else ()
+        if unsaid:
+            words = f"speech: {'; '.join(unsaid)}"
+            faults = (*faults, Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", words))
         return tuple(replace(fault, fatal=False) for fault in faults)
     return (Fault("CANNOT_CREATE_BEHAVIOR", words),)
 
@@ -122,7 +129,8 @@ def _spoken(node: Speech) -> Spoken | None:
         f"<mark name={quoteattr(part.id)}/>" if isinstance(part, Sync) else escape(part)
         for part in node.text.parts
     ]
-    return Spoken("".join(parts), tuple(part.id for part in node.text.parts if isinstance(part, Sync)))
+    marks = tuple(part.id for part in node.text.parts if isinstance(part, Sync))
+    return Spoken("".join(parts), marks, node.text.language or None)
 
 
 def _audio_file(node: Speech) -> str | None:

@@ -42,7 +42,8 @@ class Studio:
     def speak(self, order: Speak) -> Utterance | RealizerError:
         """What a voice made of it; or why it could not, which is also said once on stderr."""
         try:
-            return fitted(self._voice(order.say.voice), order.say)
+            # The name is the whole of what chooses the voice; an engine would take it for one of its own.
+            return fitted(self._voice(order.say.voice), replace(order.say, voice=None))
         except VoiceError as error:
             self._tell(str(error))
             return error

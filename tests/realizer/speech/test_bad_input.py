@@ -1,0 +1,179 @@
+"""Bad texts and dead engines, from a document's end: one clear warning, and everything else plays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+import realizer
+from bml_schema import Speech
+from realizer.behaviours.kind import World
+from realizer.behaviours.speech import say
+from realizer.errors import RealizerError, VoiceError
+from realizer.pipeline import VOCABULARY
+from realizer.scheduling.timing import Schedule
+from realizer.server.effects import Speak
+from realizer.server.studio import Studio
+from realizer.speech import EspeakVoice, Say, SilentVoice
+from realizer.speech.hibari import HibariVoice
+
+SSML = "application/ssml+xml"
+
+
+def document(speech: str) -> str:
+    return (
+        '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">'
+        f'<speech id="s">{speech}</speech><head id="h" lexeme="NOD" start="0" end="1"/></bml>'
+    )
+
+
+def played(speech: str, voice: EspeakVoice | HibariVoice | SilentVoice | str) -> Schedule:
+    schedule = realizer.schedule(document(speech), voice=voice)
+    assert points(schedule, "h")["end"] == 1.0
+    return schedule
+
+
+def points(schedule: Schedule, behaviour: str) -> dict[str, float]:
+    return schedule.to_json()["behaviours"][behaviour]  # type: ignore[no-any-return]
+
+
+def warned(schedule: Schedule) -> list[str]:
+    assert {w.id for w in schedule.warnings} <= {"b:s"}
+    return [w.text for w in schedule.warnings]
+
+
+BAD = [
+    ("<text></text>", "empty"),
+    ("<text>  </text>", "empty"),
+    ("<text>...</text>", "empty"),
+    ("<text>😀</text>", "emoji"),
+    ("<text>one 😀 two</text>", "emoji"),
+    (f"<text>{'word ' * 40_000}</text>", "at most 20000 characters, got 200000"),
+]
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize(("speech", "words"), BAD, ids=range(len(BAD)))
+def test_bad_text_gives_one_warning_and_the_others_play(voice: EspeakVoice, speech: str, words: str) -> None:
+    told = warned(played(speech, voice))
+    assert len(told) == 1
+    assert words in told[0]
+    assert "line 1" in told[0]
+    assert not warned(played("<text>and now?</text>", voice))
+
+
+@pytest.mark.hibari
+@pytest.mark.parametrize(("speech", "words"), BAD, ids=range(len(BAD)))
+def test_bad_text_is_no_other_for_the_neural_voice(neural: HibariVoice, speech: str, words: str) -> None:
+    told = warned(played(speech, neural))
+    assert len(told) == 1
+    assert words in told[0]
+
+
+@pytest.mark.parametrize(
+    "text", ["one &#9; two", "one \x7f\u202e\u200b two", "Привет 你好 مرحبا שלום नमस्ते end"]
+)
+@pytest.mark.espeak
+def test_odd_characters_and_mixed_scripts_are_spoken_without_a_word(voice: EspeakVoice, text: str) -> None:
+    schedule = played(f"<text>{text}</text>", voice)
+    assert not schedule.warnings
+    assert points(schedule, "s")["end"] > 0.5
+
+
+def test_a_speech_without_a_word_lasts_a_moment_so_that_its_points_are_apart() -> None:
+    times = points(played('<text>... <sync id="a"/></text>', "silent"), "s")
+    assert times["start"] == 0
+    assert times["end"] == pytest.approx(0.1)
+
+
+@pytest.mark.espeak
+def test_ssml_that_is_not_understood_is_spoken_all_the_same(voice: EspeakVoice) -> None:
+    ssml = '<speak><prosody rate="banana">one</prosody><nonsense>two</nonsense><break time="x"/></speak>'
+    schedule = played(f'<text>a</text><description priority="1" type="{SSML}">{ssml}</description>', voice)
+    assert not schedule.warnings
+    assert points(schedule, "s")["end"] > 0.8
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize(
+    "speech",
+    [
+        '<text xml:lang="xx-YY">hello there</text>',
+        f'<text>a</text><description priority="1" type="{SSML}">'
+        '<speak xml:lang="xx-YY">hello</speak></description>',
+    ],
+)
+def test_a_language_that_no_voice_speaks_is_a_warning_of_the_document(
+    voice: EspeakVoice, speech: str
+) -> None:
+    told = warned(played(speech, voice))
+    assert told == [
+        "line 1, /bml/speech[1]: speech: espeak-ng does not speak 'xx-YY': spoken as English",
+    ]
+
+
+def test_the_language_of_the_text_is_what_the_voice_is_asked_for() -> None:
+    from bml_schema import parse
+
+    for given, wanted in ((' xml:lang="nl-NL"', "nl-NL"), ("", "fr-FR")):
+        node = parse(document(f"<text{given}>hallo</text>"), VOCABULARY).behaviours[0]
+        assert isinstance(node, Speech)
+        asked = say(node, World(language="fr-FR"))
+        assert asked is not None
+        assert asked.language == wanted
+
+
+def test_a_voice_that_is_not_there_is_refused_with_those_that_are() -> None:
+    with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'nobody'"):
+        realizer.schedule(document("<text>one</text>"), voice="nobody")
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize("name", ["espeak", "espeak:nl", "espeak:en-gb+f3"])
+def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> None:
+    studio = Studio()
+    alone = EspeakVoice(name.partition(":")[2] or None)
+    try:
+        said = studio.speak(Speak(1, Say("een twee", voice=name)))
+        assert not isinstance(said, RealizerError)
+        assert said.warnings == ()
+        assert said.phonemes == alone.say(Say("een twee")).phonemes
+    finally:
+        studio.close()
+        alone.close()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param("espeak", marks=pytest.mark.espeak), pytest.param("hibari", marks=pytest.mark.hibari)],
+)
+def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    studio = Studio()
+    answers: list[object] = []
+    try:
+        first = studio.speak(Speak(1, Say("One two three.", voice=name)))
+        engine = studio._voices[name]
+        assert isinstance(engine, EspeakVoice | HibariVoice)
+        pid = engine.pid
+        assert pid is not None
+        os.kill(pid, signal.SIGSTOP)  # so that it can never answer before it dies
+        order = Speak(2, Say("It is raining here today. " * 50, voice=name))
+        asking = threading.Thread(target=lambda: answers.append(studio.speak(order)))
+        asking.start()
+        os.kill(pid, signal.SIGKILL)
+        asking.join()
+        again = studio.speak(Speak(3, Say("Four five six.", voice=name)))
+    finally:
+        studio.close()
+    assert not isinstance(first, RealizerError)
+    assert isinstance(answers[0], VoiceError)
+    assert not isinstance(again, RealizerError)
+    assert again.duration > 0.5
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1
+    assert "going on without sound" in told[0]
