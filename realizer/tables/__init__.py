@@ -137,13 +137,17 @@ class Fap:
 
 @dataclass(frozen=True, slots=True)
 class ActionUnit:
-    """One FACS action unit; `no_fap` says why no FAP shows it, "" where FAPs do."""
+    """One FACS action unit; `no_fap` says why no FAP shows it, "" where FAPs do.
+
+    `strength` is how far full intensity goes beside the shape that the unit was measured in.
+    """
 
     au: int
     name: str
     sides: bool
     combine: Literal["max", "sum"]
     degrees: float
+    strength: float
     no_fap: str
 
 

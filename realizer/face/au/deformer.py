@@ -102,11 +102,16 @@ class Moves:
         self._opening = [names.index((au, "")) for au in OPENING if (au, "") in names]
         self._gaps = np.array([model.gap(au) for au in OPENING if (au, "") in names])
         self._jaw = np.array([np.radians(model.units[au].jaw_degrees) for au, _ in names], np.float32)
+        strong = {row.au: row.strength for row in action_units()}
+        self._strengths = np.array([strong[au] for au, _ in names], np.float32)
         self._lids, self._owned = _shares(face, self.moving)
 
     def intensities(self, pose: Float32) -> Float32:
-        """(n, units) of the (n, columns) part of poses that follows the FAPs, opened as far as the widest."""
-        shown = np.stack([pose[:, read].max(axis=1) for read in self._read], axis=1)
+        """(n, units) of the (n, columns) part of poses that follows the FAPs, opened as far as the widest.
+
+        Full intensity is `ActionUnit.strength`: what was measured shows some units mildly.
+        """
+        shown = np.stack([pose[:, read].max(axis=1) for read in self._read], axis=1) * self._strengths
         shown[:, self._opening] = opened(self._gaps, shown[:, self._opening].T).T
         return shown
 

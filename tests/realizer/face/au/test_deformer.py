@@ -87,7 +87,7 @@ def test_a_turned_head_carries_what_units_do(face: Face) -> None:
 
 
 def test_lashes_and_brows_stay_on_the_skin_they_grow_on(face: Face) -> None:
-    """Half closed and closed, raised and lowered, nothing comes loose by more than a millimetre."""
+    """Half closed and closed, raised and lowered, nothing comes loose by more than a millimetre and a half."""
     from scipy.spatial import cKDTree
 
     skin = part(face, face.vertices, "skin")
@@ -96,7 +96,7 @@ def test_lashes_and_brows_stay_on_the_skin_they_grow_on(face: Face) -> None:
         for name in ("brows", "lashes"):
             before = np.asarray(cKDTree(skin).query(part(face, face.vertices, name))[0])
             after = np.asarray(cKDTree(part(face, made, "skin")).query(part(face, made, name))[0])
-            assert (after - before).max() < 0.001, (values, name)
+            assert (after - before).max() < 0.0015, (values, name)
 
 
 def test_a_smile_on_the_left_leaves_the_right_alone(face: Face) -> None:
