@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -91,7 +93,8 @@ def read_rules(text: str, name: str) -> Rules:
 
     Raises:
         TableError: every fault at once, a line each: not TOML, an unknown section, a rule that cannot be
-            read, an AU that does not exist, a rule that says the opposite of another.
+            read, an AU that does not exist, a rule that says the opposite of another, or
+            closes a circle with others.
     """
     table = tables.read_toml(text, name)
     faults = [f"{name}: wanted sections sets, {', '.join(SIGNS)}; got [{key}]" for key in _strange(table)]
@@ -203,4 +206,25 @@ def _contradictions(found: list[Rule]) -> list[tuple[Rule, str]]:
         elif turned in seen:
             faults.append((rule, f"says the opposite of {seen[turned].text!r}"))
         seen[key] = rule
+    if not faults:
+        faults += _circles(found)
     return faults
+
+
+def _circles(found: list[Rule]) -> list[tuple[Rule, str]]:
+    """A rule by which units would silence each other in a round, as 1<2, 2<4 and 4<1."""
+    whole = {
+        (rule.weaker, rule.stronger[0].au): rule
+        for rule in found
+        if rule.kind == "domination" and len(rule.stronger) == 1 and not rule.stronger[0].set
+    }
+    graph: dict[int, set[int]] = {}
+    for weaker, stronger in whole:
+        graph.setdefault(weaker, set()).add(stronger)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        circle = list(reversed(error.args[1]))  # each before what it gives way to
+        texts = [whole[pair].text for pair in pairwise(circle)]
+        return [(whole[circle[-2], circle[-1]], f"closes a circle with {', '.join(texts[:-1])}")]
+    return []

@@ -57,6 +57,13 @@ def test_a_rule_that_stands_twice_is_found_where_it_stands_the_second_time() -> 
     )
 
 
+def test_rules_that_would_silence_units_in_a_round_are_refused() -> None:
+    with pytest.raises(TableError) as caught:
+        read_rules(f'{HEAD}[domination]\nrules = ["5<63", "1<2", "2<4", "4<1"]\n', "mine.toml")
+    line = HEAD.count("\n") + 2
+    assert str(caught.value) == f"mine.toml:{line}, [domination] '4<1': closes a circle with 1<2, 2<4"
+
+
 def test_all_faults_of_a_file_are_said_at_once() -> None:
     with pytest.raises(TableError) as caught:
         read_rules(
