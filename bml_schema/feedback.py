@@ -47,6 +47,7 @@ class BlockProgress:
         global_time: seconds on the session clock.
         character_id: as in the block.
         status: BMLA's word for the block's state: IN_EXEC, DONE, INTERRUPTED, REVOKED; None says nothing.
+        said: where speech of the block was cut off: all its words that were spoken to their end, "" for none.
         posix_time: milliseconds since 1970, as read; None where it does not say.
     """
 
@@ -54,8 +55,14 @@ class BlockProgress:
     global_time: float
     character_id: str | None = None
     status: str | None = None
+    said: str | None = None
     seq: int | None = field(default=None, compare=False)
     posix_time: int | None = field(default=None, compare=False)
+
+    @property
+    def last_word(self) -> str | None:
+        """The last word of `said`; None where there is none."""
+        return self.said.split()[-1] if self.said and self.said.strip() else None
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; `seq` and `epoch` as the module says."""
@@ -64,6 +71,7 @@ class BlockProgress:
             {"id": self.id, "globalTime": self.global_time, "characterId": self.character_id},
             seq=self.seq if seq is None else seq,
             bmla={"posixTime": _posix(self.global_time, epoch, self.posix_time), "status": self.status},
+            own={"said": self.said, "lastWord": self.last_word},
         )
 
 
@@ -226,6 +234,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
             id=_needed(root, "id"),
             global_time=_time(root, "globalTime"),
             status=status,
+            said=root.get(own("said")),
             posix_time=_milliseconds(root),
             **who,
         )
@@ -319,14 +328,16 @@ def _xml(
     *,
     seq: int | None,
     bmla: Mapping[str, str | None] | None = None,
+    own: Mapping[str, str | None] | None = None,
     declarations: str = "",
 ) -> str:
     """One element in the core namespace; times to the microsecond, and never with an exponent."""
     start = f'<{name} xmlns="{CORE}"{declarations}{_attributes(values)}'
     if told := {f"bmla:{name}": value for name, value in (bmla or {}).items() if value is not None}:
         start += f' xmlns:bmla="{BMLA}"{_attributes(told)}'
-    if seq is not None:
+    said = {**(own or {}), "seq": None if seq is None else str(seq)}
+    if ours := {f"realizer:{name}": value for name, value in said.items() if value is not None}:
         declared = f'xmlns:realizer="{OWN}"'
         # A predicted behaviour of ours has declared it already.
-        start += f' realizer:seq="{seq}"' if declared in declarations else f' {declared} realizer:seq="{seq}"'
+        start += ("" if declared in declarations else f" {declared}") + _attributes(ours)
     return f"{start}>{inside}</{name}>" if inside else f"{start}/>"

@@ -219,7 +219,7 @@ class Course:
         playing.cut(list(playing.schedule.times), now, ends=True)
         playing.stopped, playing.state = now, state
         self.cast.end(playing)
-        self.reports.tell(progress(playing.block, "end", now, state))
+        self.reports.tell(progress(playing.block, "end", now, state, playing.said(now)))
         self.changed()
         self.solve_again([p for p in tied if not p.done], playing.start, now)
         self.follow(playing, now)

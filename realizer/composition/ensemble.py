@@ -156,7 +156,7 @@ class Ensemble:
             case Phase.END:
                 playing.state = State.DONE
                 self.cast.end(playing)
-                self.reports.tell(progress(block, "end", time, playing.state))
+                self.reports.tell(progress(block, "end", time, playing.state, playing.said(time)))
 
     def _act(self, playing: Playing, behaviour: str, act: Act, now: float) -> None:
         try:

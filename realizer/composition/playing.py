@@ -26,6 +26,8 @@ __all__ = ["Playing", "Speaking", "Wait"]
 HUSH = 0.12  # s
 # Times that differ by less are the same, solved again.
 SAME = 1e-9  # s
+# A word that lacks no more than this has sounded to its end.
+HEARD = 1e-4  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,15 @@ class Speaking:
     utterance: Utterance
     character: int
     gains: tuple[Gain, ...] = ()
+
+    def whole(self, now: float) -> bool:
+        """Whether it has sounded to its end."""
+        return min(self.until, now) >= self.start + self.utterance.duration - HEARD
+
+    def words(self, now: float) -> list[str]:
+        """The words that have sounded to their end."""
+        heard = min(self.until, now) - self.start + HEARD
+        return [word.text for word in self.utterance.words if word.end <= heard]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +134,15 @@ class Playing:
     def end(self) -> float:
         """When its end is due."""
         return self.schedule.end if self.stopped is None else self.stopped
+
+    def said(self, now: float) -> str | None:
+        """Where speech of it was cut off: the words of all its speech that sounded to their end; else None."""
+        spoken = [b for b in self.world.utterances if b in self.first.times]
+        heard = [self.speech[b] for b in spoken if b in self.speech]
+        if len(heard) == len(spoken) and all(s.whole(now) for s in heard):
+            return None
+        order = sorted(heard, key=lambda s: s.start)
+        return " ".join(word for s in order for word in s.words(now))
 
     @property
     def gone(self) -> float:

@@ -91,10 +91,14 @@ def prediction(
     )
 
 
-def progress(block: Block, point: str, time: float, state: State) -> BlockProgress:
-    """The block started or ended at `time` on the session clock."""
+def progress(block: Block, point: str, time: float, state: State, said: str | None = None) -> BlockProgress:
+    """The block started or ended at `time` on the session clock; `said` where its speech was cut off."""
     return BlockProgress(
-        id=f"{block.id}:{point}", global_time=time, character_id=block.character_id, status=state.value
+        id=f"{block.id}:{point}",
+        global_time=time,
+        character_id=block.character_id,
+        status=state.value,
+        said=said,
     )
 
 

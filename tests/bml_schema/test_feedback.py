@@ -241,3 +241,13 @@ def test_marks_that_only_a_description_names_are_predicted_behind_the_text() -> 
 def text_of(node: Behaviour) -> str:
     xml = PredictionFeedback(behaviours=(node,)).to_xml()
     return xml[xml.index("<text>") + 6 : xml.index("</text>")]
+
+
+def test_the_end_of_a_block_says_how_far_its_speech_came() -> None:
+    told = BlockProgress(id="b:end", global_time=1.0, status="INTERRUPTED", said="I think that")
+    root = etree.fromstring(told.to_xml(3).encode())
+    assert root.get(f"{{{OWN}}}said") == "I think that"
+    assert root.get(f"{{{OWN}}}lastWord") == "that"
+    assert parse_feedback(told.to_xml(3)) == told
+    silent = parse_feedback(BlockProgress(id="b:end", global_time=1.0, said="").to_xml())
+    assert (silent.said, silent.last_word) == ("", None)

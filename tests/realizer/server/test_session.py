@@ -13,6 +13,7 @@ from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.errors import RenderError, VoiceError
 from realizer.server.feedback_log import FeedbackLog
 from realizer.server.wire import FrameKind
+from realizer.speech.utterance import Phoneme, Utterance, Word
 
 from .conftest import NOD, RATE, TALK, Driver, spoken
 
@@ -380,6 +381,72 @@ def test_stop_takes_back_the_sound_that_was_sent_ahead(driver) -> None:
     assert after[0].time == pytest.approx(0.5, abs=0.021)
     assert after[-1].time < 0.6
     assert abs(int(after[-1].values[-1])) < 2000, "it fades out"
+
+
+def words(*timed: tuple[float, float, str]) -> Utterance:
+    """What `spoken` gives, as long as its last word, with words."""
+    return replace(spoken(timed[-1][1]), words=tuple(Word(*one) for one in timed))
+
+
+HELLO = ((0.0, 0.3, "Hello"), (0.3, 0.6, "there"), (0.6, 1.0, "friend"))
+
+
+@pytest.mark.parametrize(
+    ("when", "said", "last"), [(0.1, "", None), (0.45, "Hello", "Hello"), (0.7, "Hello there", "there")]
+)
+def test_the_end_of_an_interrupted_block_says_the_last_word(when, said, last) -> None:
+    driver = Driver(mute=True)
+    driver.send(TALK.format("b"))
+    driver.say(driver.spoken[0].id, words(*HELLO))
+    driver.run(when)
+    driver.send({"type": "stop"})
+    end = driver.clients[1].feedback[-1]
+    assert (end.id, end.status, end.said, end.last_word) == ("b:end", "INTERRUPTED", said, last)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        '<bml id="i"><bmla:interrupt xmlns:bmla="http://www.asap-project.org/bmla" id="x" target="b"/></bml>',
+        '<bml id="i" composition="REPLACE"><head id="n" lexeme="NOD"/></bml>',
+        {"type": "stop", "blocks": ["b"]},
+    ],
+)
+def test_sound_stops_within_50_ms_of_any_interruption_and_the_face_relaxes(how) -> None:
+    driver = Driver(mute=True, idle=False)
+    driver.send({"type": "subscribe", "stream": "audio", "rate": RATE})
+    driver.send(TALK.format("b"))
+    driver.say(driver.spoken[0].id, replace(words(*HELLO), phonemes=(Phoneme(0.0, 1.0, "a"),)))
+    driver.run(0.5)
+    assert driver.session.player.frames(np.array([0.5])).faps.any()
+    driver.send(how)
+    client = driver.run(2.0)
+    heard = heard_of(client)
+    assert heard[round(0.48 * RATE) : round(0.5 * RATE)].any()
+    assert not heard[round(0.55 * RATE) :].any()
+    end = next(f for f in client.feedback if getattr(f, "id", "") == "b:end")
+    assert end.global_time == pytest.approx(0.5, abs=1e-3)
+    assert end.said == "Hello"
+    frames = driver.session.player.frames(np.arange(0.5, 1.5, 0.04))
+    assert not frames.faps[-1].any()
+
+
+def heard_of(client, seconds: float = 3.0):
+    """What a client plays: packets by their time; from one with the flag on everything is forgotten."""
+    heard = np.zeros(round(seconds * RATE), np.int16)
+    for frame in (f for f in client.frames if f.kind is FrameKind.SOUND):
+        first = round(frame.time * RATE)
+        if frame.forget:
+            heard[first:] = 0
+        heard[first : first + len(frame.values)] = frame.values
+    return heard
+
+
+def test_a_block_that_was_heard_to_its_end_says_nothing_of_it() -> None:
+    driver = Driver(mute=True)
+    driver.send(TALK.format("b"))
+    driver.say(driver.spoken[0].id, words(*HELLO))
+    assert driver.run(3.0).feedback[-1].said is None
 
 
 # pictures ---------------------------------------------------------------------------------------
