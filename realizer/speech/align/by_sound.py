@@ -26,14 +26,16 @@ class Spans:
     """What was found, in seconds of the recording.
 
     Attributes:
+        reference: the voice that was most like it.
         words: (n, 2) start and end of each word of the reference.
         phonemes: (m, 2) of each phoneme; its pauses are (nan, nan).
         costs: (n,) how unlike the two are in each word, where 1 is as unlike as the same sounds in the wrong
-            order: near 0.8 for the same words in another voice, 1 and more for other words.
+            order: under 0.9 for the same words in another voice, near 1 for others.
         cost: of all of it.
         pace: how many times faster than the reference it is.
     """
 
+    reference: Utterance
     words: Float64
     phonemes: Float64
     costs: Float64
@@ -41,42 +43,48 @@ class Spans:
     pace: float
 
 
-def by_sound(sound: Float32, reference: Utterance) -> Spans:
-    """Warp a voice that says the same text to the recording; no model, any language that the voice speaks.
+@dataclass(frozen=True, eq=False)
+class _Match:
+    """A voice brought to the speed of the recording, and the coarse way between the two."""
 
-    Source: Malfrère and Dutoit 1997, who align speech by synthesis.
+    reference: Utterance
+    spoken: Float32
+    speed: float
+    pace: float
+    states: States
+    heard: Heard
+    way: Index
+    spent: Float64
+    null: float
+
+    @property
+    def cost(self) -> float:
+        said = ~self.states.pause[self.way]
+        return float(self.spent[said].mean()) / self.null if said.any() else 1.0
+
+
+def by_sound(sound: Float32, references: Sequence[Utterance]) -> Spans:
+    """Warp a voice that says the same text to the recording; no model, any language that the voice speaks.
 
     Args:
         sound: (n,) at 16 kHz, with something to be heard in it.
-        reference: with sound, words and phonemes.
+        references: the same text by voices that differ, with sound; what is most like the recording counts.
+
+    Source: Malfrère and Dutoit 1997, who align speech by synthesis.
     """
-    assert reference.pcm is not None
-    spoken = f.resampled((reference.pcm / 32768).astype(np.float32), reference.sample_rate)
-    pauses = [(p.start, p.end) for p in reference.phonemes if not p.ipa]
-    seconds = max(reference.duration - sum(end - start for start, end in pauses), LEAST)
-    starts = np.array([word.start for word in reference.words])
+    best = min((_matched(sound, reference) for reference in references), key=lambda match: match.cost)
+    reference, states, way = best.reference, best.states, best.way
 
-    values, loud = f.cepstra(sound, COARSE)
-    part, talks = f.sounding(loud)
-    pace = seconds / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
-    speed = min(max(pace, SLOWEST), FASTEST)
-    states = _states(spoken, COARSE * speed, pauses, starts)
-    heard = _heard(values, part, talks, states)
-    centre = np.rint(np.linspace(0, len(states.times) - 1, len(values))).astype(np.intp)
-    reach = max(round(FAR * f.RATE / COARSE), 1)
-    way, spent = matched(heard, states, centre, reach)
-    null = _null(heard, states, centre, reach)
-
-    # The same with the reference made to sound like the recording, closer, and only near the way found.
-    change = _likened(heard.features, states, way, talks)
-    values, loud = f.cepstra(sound, FINE)
-    part, talks = f.sounding(loud)
-    fine = _states(spoken, FINE * speed, pauses, starts)
+    # The same with the voice made to sound like the recording, closer, and only near the way found.
+    energy = f.energies(sound, FINE)
+    part, talks = f.sounding(f.loudness(energy))
+    fine = _states(best.spoken, FINE * best.speed, reference)
+    change = _likened(best.heard.features, states, way)
     likened = States(
         np.hstack([fine.features, np.ones((len(fine.times), 1))]) @ change, fine.pause, fine.times
     )
-    heard = _heard(values, part, talks, likened)
-    about = np.minimum(np.arange(len(values)) * FINE // COARSE, len(way) - 1)
+    heard = _heard(f.cepstra(energy), part, talks, likened)
+    about = np.minimum(np.arange(len(energy)) * FINE // COARSE, len(way) - 1)
     centre = np.maximum.accumulate(np.searchsorted(fine.times, states.times[way[about]]).astype(np.intp))
     centre[-1] = len(fine.times) - 1
     closely, _ = matched(heard, likened, centre, round(NEAR * f.RATE / FINE))
@@ -86,25 +94,45 @@ def by_sound(sound: Float32, reference: Utterance) -> Spans:
 
     words = spans([(word.start, word.end) for word in reference.words])
     return Spans(
+        reference=reference,
         words=words,
         phonemes=spans([(p.start, p.end) if p.ipa else (np.nan, np.nan) for p in reference.phonemes]),
-        costs=_costs(words, way, spent, states.pause, null),
-        cost=float(spent[~states.pause[way]].mean()) / null if (~states.pause[way]).any() else 1.0,
-        pace=pace,
+        costs=_costs(words, way, best.spent, states.pause, best.null),
+        cost=best.cost,
+        pace=best.pace,
     )
 
 
-def _states(spoken: Float32, hop: float, pauses: Sequence[tuple[float, float]], starts: Float64) -> States:
+def _matched(sound: Float32, reference: Utterance) -> _Match:
+    assert reference.pcm is not None
+    spoken = f.resampled((reference.pcm / 32768).astype(np.float32), reference.sample_rate)
+    seconds = sum(p.end - p.start for p in reference.phonemes if p.ipa)
+    energy = f.energies(sound, COARSE)
+    part, talks = f.sounding(f.loudness(energy))
+    pace = max(seconds, LEAST) / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
+    speed = min(max(pace, SLOWEST), FASTEST)
+    states = _states(spoken, COARSE * speed, reference)
+    heard = _heard(f.cepstra(energy), part, talks, states)
+    centre = np.rint(np.linspace(0, len(states.times) - 1, len(energy))).astype(np.intp)
+    reach = max(round(FAR * f.RATE / COARSE), 1)
+    way, spent = matched(heard, states, centre, reach)
+    null = _null(heard, states, centre, reach)
+    return _Match(reference, spoken, speed, pace, states, heard, way, spent, null)
+
+
+def _states(spoken: Float32, hop: float, reference: Utterance) -> States:
     """The frames of the reference, instead of its pauses one before each word and at the end."""
-    values, _ = f.cepstra(spoken, hop)
+    values = f.cepstra(f.energies(spoken, hop))
     times = np.arange(len(values)) * hop / f.RATE
     said = np.ones(len(times), bool)
-    for start, end in pauses:
-        said &= (times < start) | (times >= end)
+    for phoneme in reference.phonemes:
+        if not phoneme.ipa:
+            said &= (times < phoneme.start) | (times >= phoneme.end)
     if not said.any():
         said[:] = True
     values = f.normalised(values, said)[said]
     times = times[said]
+    starts = [word.start for word in reference.words]
     word = np.maximum(np.searchsorted(starts, times + 1e-9, side="right") - 1, 0)
     breaks = np.append(np.flatnonzero(np.diff(word, prepend=-1)), len(times))
     return States(
@@ -120,9 +148,9 @@ def _heard(values: Float64, part: Float64, talks: Bool, states: States) -> Heard
     return Heard(values, quiet(part, f.HEARD), unit)
 
 
-def _likened(values: Float64, states: States, way: Index, talks: Bool) -> Float64:
+def _likened(values: Float64, states: States, way: Index) -> Float64:
     """(d + 1, d): a linear change of the reference's features, and a shift, to the recording's."""
-    pairs = talks & ~states.pause[way]
+    pairs = ~states.pause[way]
     ours = np.hstack([states.features[way[pairs]], np.ones((int(pairs.sum()), 1))])
     same = np.eye(ours.shape[1])
     change = np.linalg.solve(ours.T @ ours + RIDGE * same, ours.T @ values[pairs] + RIDGE * same[:, :-1])

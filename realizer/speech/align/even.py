@@ -19,15 +19,15 @@ INSTALL = "no aligner, words are spread evenly: pip install 'bml-realizer[speech
 
 def even(sound: Float32, duration: float, reference: Utterance) -> Alignment:
     """What is left where no aligner is installed; the confidence is 0."""
-    _, loud = features.cepstra(sound, HOP)
+    loud = features.loudness(features.energies(sound, HOP))
     _, talks = features.sounding(loud)
     passed = np.append(0.0, np.cumsum(talks)) / max(int(talks.sum()), 1)
-    passed += np.arange(len(passed)) * 1e-9  # rising, so that it can be turned round
+    passed += np.arange(len(passed)) * 1e-12  # rising, so that it can be turned round
     times = np.minimum(np.arange(len(passed)) * HOP / features.RATE, duration)
     first, last = reference.words[0].start, reference.words[-1].end
 
     def spread(pairs: Float64) -> Float64:
-        return np.interp(np.clip((pairs - first) / max(last - first, 1e-6), 0.0, 1.0), passed, times)
+        return np.interp(np.clip((pairs - first) / max(last - first, 1e-6), 1e-6, 1.0), passed, times)
 
     words = spread(np.array([(w.start, w.end) for w in reference.words]))
     phonemes = spread(np.array([(p.start, p.end) for p in reference.phonemes]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.arrays import Bool, Float32, Float64
 
-__all__ = ["RATE", "cepstra", "loudness", "normalised", "resampled", "sounding"]
+__all__ = ["RATE", "cepstra", "energies", "loudness", "normalised", "resampled", "sounding"]
 
 RATE = 16_000  # Hz; all that matters of speech lies below half of it
 WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as recognisers of speech take it
@@ -21,7 +21,7 @@ FLOOR = 0.01
 SLOPE = 2  # frames to each side, for how the cepstra change
 AT_ONCE = 4000  # frames; a spectrum of more would only take memory
 # Silence is near the quietest frames, speech near the loudest: percentiles, and parts of the range between.
-QUIET, LOUD, HEARD = 5, 95, 0.15
+QUIET, LOUD, HEARD = 5, 95, 0.1
 LEAST_RANGE, MOST_RANGE = 1.0, 5.0  # powers of ten; steady noise has no range, digital silence too much
 
 
@@ -36,19 +36,33 @@ def resampled(pcm: Float32, rate: int) -> Float32:
     return sound
 
 
-def cepstra(sound: Float32, hop: float) -> tuple[Float64, Float64]:
-    """(n, 26) cepstra of the mel spectrum with their slopes, and (n,) loudness; frame k is about k x hop.
+def energies(sound: Float32, hop: float) -> Float64:
+    """(n, bands) energy in the bands of the mel scale; frame k is about k x hop.
 
     Args:
         sound: (m,) at 16 kHz, -1..1.
         hop: samples between frames; need not be whole.
+    """
+    flat = np.append(sound[:1], sound[1:] - np.float32(EMPHASIS) * sound[:-1])
+    at = np.rint(np.arange(int(len(sound) / hop) + 1) * hop).astype(np.intp)
+    padded = np.pad(flat, (WINDOW // 2, WINDOW))
+    frames = np.lib.stride_tricks.sliding_window_view(padded, WINDOW)
+    shape = np.hamming(WINDOW).astype(np.float32)
+    parts = [
+        np.abs(np.fft.rfft(frames[at[k : k + AT_ONCE]] * shape, SPECTRUM)) ** 2 @ _bands()
+        for k in range(0, len(at), AT_ONCE)
+    ]
+    return np.concatenate(parts)
+
+
+def cepstra(energy: Float64) -> Float64:
+    """(n, 26) cepstra of (n, bands) energies, with their slopes.
 
     Source: Davis and Mermelstein 1980 for the cepstra; Furui 1986 for their slopes.
     """
-    energy = _mel(sound, hop)
     log = np.log(energy + FLOOR * energy.mean() + 1e-12)
     plain = log @ _cosines()
-    return np.hstack([plain, _slopes(plain)]), loudness(energy)
+    return np.hstack([plain, _slopes(plain)])
 
 
 def loudness(energy: Float64) -> Float64:
@@ -70,20 +84,6 @@ def normalised(features: Float64, of: Bool) -> Float64:
     chosen = features[of] if of.any() else features
     scaled: Float64 = (features - chosen.mean(axis=0)) / (chosen.std(axis=0) + 1e-6)
     return scaled
-
-
-def _mel(sound: Float32, hop: float) -> Float64:
-    """(n, bands) energy in the bands."""
-    flat = np.append(sound[:1], sound[1:] - np.float32(EMPHASIS) * sound[:-1])
-    at = np.rint(np.arange(int(len(sound) / hop) + 1) * hop).astype(np.intp)
-    padded = np.pad(flat, (WINDOW // 2, WINDOW))
-    frames = np.lib.stride_tricks.sliding_window_view(padded, WINDOW)
-    shape = np.hamming(WINDOW).astype(np.float32)
-    parts = [
-        np.abs(np.fft.rfft(frames[at[k : k + AT_ONCE]] * shape, SPECTRUM)) ** 2 @ _bands()
-        for k in range(0, len(at), AT_ONCE)
-    ]
-    return np.concatenate(parts)
 
 
 def _slopes(values: Float64) -> Float64:

@@ -92,7 +92,7 @@ def _known(decoder: Any, spelling: str, phones: Sequence[str]) -> str:
 
 
 def _hear(decoder: Any, pcm: bytes) -> None:
-    decoder.start_stream()  # forget the noise of what was heard before
+    decoder.reinit_feat()  # forget the noise of what was heard before: the same sound gives the same times
     decoder.start_utt()
     decoder.process_raw(pcm, full_utt=True)
     decoder.end_utt()

@@ -1,0 +1,183 @@
+"""How near aligners come to the truth: `python tests/benchmarks/align.py` prints errors of word onsets in ms.
+
+The truth is what an engine says of its own speech, with noise added; for human speech, which nobody measured,
+what pocketsphinx finds: there only the other aligner is measured. The five recordings are those of Debian's
+package pocketsphinx-testdata; `--recordings DIR` says where they lie.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+import wave
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from realizer.errors import RealizerError
+from realizer.speech import Say, find_voice
+from realizer.speech.align import Alignment, align
+
+RECORDINGS = Path("/usr/share/pocketsphinx/test/data/librivox")
+NEEDED = "no recordings in {}: apt-get install pocketsphinx-testdata, or --recordings DIR"
+SENTENCES = {
+    "en-US": (
+        "Hello, I am very pleased to meet you.",
+        "The tall woman carried a basket of apples down the hill.",
+        "She had nothing to say, so she left the room quietly.",
+        "Please put the large box next to the window, not under the table.",
+        "Yesterday it rained all day; today the sun is shining.",
+        "My brother works in a small bakery near the river.",
+        "Can you tell me where the station is?",
+        "We will be back before the end of the week.",
+        "Nobody knows why the old lighthouse was abandoned.",
+        "Five people were waiting for the last bus home.",
+        "If you want to catch the train, you should hurry.",
+        "Our neighbours painted their kitchen bright yellow.",
+    ),
+    "nl": (
+        "Goedemorgen, hoe gaat het met u?",
+        "De trein naar Utrecht vertrekt over vijf minuten.",
+        "Mijn zus woont in een klein huis aan het water.",
+        "Wij gaan morgen samen naar de markt.",
+    ),
+    "fr": (
+        "Bonjour, comment allez-vous aujourd'hui?",
+        "Le petit chat dort sur le canapé du salon.",
+        "Nous avons mangé du pain et du fromage.",
+        "Il fait froid ce matin, prenez votre manteau.",
+    ),
+    "de": (
+        "Guten Morgen, wie geht es Ihnen heute?",
+        "Der Zug nach Hamburg hat zehn Minuten Verspätung.",
+        "Meine Schwester wohnt in einem kleinen Haus am See.",
+        "Wir gehen morgen zusammen auf den Markt.",
+    ),
+    "pl": (
+        "Dzień dobry, jak się pan dzisiaj czuje?",
+        "Pociąg do Krakowa odjeżdża za pięć minut.",
+        "Moja siostra mieszka w małym domu nad rzeką.",
+        "Jutro pójdziemy razem na targ.",
+    ),
+}
+# Never a voice that the aligner itself speaks with.
+VARIANTS = {"en-US": ("en-us+f4", "en-gb+m3", "en-us+f2", "en-us+m7")}
+RATES = (0.85, 1.0, 1.15)
+NOISES = (20.0, 15.0, 25.0)  # dB below the speech
+SILENCE = (0.0, 0.3, 0.6)  # s before and after, with the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A recording, and when its words begin (None: nobody knows)."""
+
+    language: str
+    text: str
+    rate: int
+    pcm: np.ndarray
+    onsets: np.ndarray | None
+
+
+def spoken(name: str, language: str) -> Iterator[Sample]:
+    """What a voice says, with noise."""
+    random = np.random.default_rng(7)
+    voice = find_voice(name)
+    variants = VARIANTS.get(language, (f"{language}+f2", f"{language}+m3")) if name == "espeak" else (None,)
+    for k, text in enumerate(SENTENCES[language]):
+        said = voice.say(
+            Say(text, language=language, voice=variants[k % len(variants)], rate=RATES[k % len(RATES)])
+        )
+        pause = round(SILENCE[k % len(SILENCE)] * said.sample_rate)
+        clean = np.pad(said.pcm.astype(float), pause)
+        loud = np.sqrt((said.pcm.astype(float) ** 2).mean()) / 10 ** (NOISES[k % len(NOISES)] / 20)
+        noisy = 0.5 * (clean + random.normal(0, loud, len(clean)))
+        onsets = np.array([word.start for word in said.words]) + pause / said.sample_rate
+        pcm = np.clip(noisy, -32768, 32767).astype(np.int16)
+        yield Sample(language, text, said.sample_rate, pcm, onsets)
+    voice.close()
+
+
+def human(folder: Path) -> Iterator[Sample]:
+    """The recordings and what is said in them."""
+    for line in (folder / "transcription").read_text("utf-8").splitlines():
+        text, _, name = line.replace("<s>", "").replace("</s>", "").rpartition(" (")
+        with wave.open(str(folder / f"{name.rstrip(')')}.wav")) as file:
+            pcm = np.frombuffer(file.readframes(file.getnframes()), "<i2")
+            yield Sample("en-US", text.strip(), file.getframerate(), pcm, None)
+
+
+def found(sample: Sample, text: str, aligner: str | None) -> Alignment | None:
+    try:
+        return align(sample.pcm, sample.rate, text, sample.language, aligner=aligner)
+    except RealizerError:
+        return None
+
+
+def measure(name: str, samples: list[Sample], aligner: str, truth: str = "its own times") -> None:
+    """A line of errors, and one of confidences with the right text and with that of the next recording."""
+    errors: list[float] = []
+    right: list[float] = []
+    wrong: list[float] = []
+    failed = 0
+    spent = seconds = 0.0
+    for sample, other in zip(samples, [*samples[1:], samples[0]], strict=True):
+        onsets = sample.onsets
+        if onsets is None:
+            reference = found(sample, sample.text, "pocketsphinx")
+            onsets = np.array([w.start for w in reference.words]) if reference else None
+        found(sample, sample.text, aligner)  # what is loaded and started first does not count
+        began = time.perf_counter()
+        result = found(sample, sample.text, aligner)
+        spent += time.perf_counter() - began
+        seconds += len(sample.pcm) / sample.rate
+        if result is None or onsets is None:
+            failed += 1
+            continue
+        errors += list(np.array([w.start for w in result.words]) - onsets)
+        right.append(result.confidence)
+        misled = found(sample, other.text, aligner)
+        wrong.append(misled.confidence if misled else 0.0)
+    if not errors:
+        print(f"{name:<18} {aligner:<13} all {failed} failed")
+        return
+    ms = 1000 * np.array(errors)
+    print(
+        f"{name:<18} {aligner:<13} {len(ms):>4} words  shift {np.median(ms):>4.0f}  "
+        f"median {np.median(abs(ms)):>3.0f}  p90 {np.percentile(abs(ms), 90):>3.0f}  "
+        f"worst {abs(ms).max():>4.0f}  against {truth}, "
+        f"{failed} of {len(samples)} failed, real-time factor {spent / seconds:.3f}"
+    )
+    print(
+        f"{'':<18} confidence of the right text {min(right):.2f}..{max(right):.2f}, "
+        f"of a wrong one {min(wrong):.2f}..{max(wrong):.2f}"
+    )
+
+
+def main() -> None:
+    reader = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    reader.add_argument("--recordings", type=Path, default=RECORDINGS, metavar="DIR")
+    folder: Path = reader.parse_args().recordings
+    for voice in ("espeak", "hibari"):
+        try:
+            samples = list(spoken(voice, "en-US"))
+        except RealizerError as error:
+            print(f"{voice}: {error}")
+            continue
+        for aligner in ("pocketsphinx", "espeak"):
+            measure(f"{voice} en-US", samples, aligner)
+        if voice == "espeak":
+            for language in ("nl", "fr", "de", "pl"):
+                measure(f"espeak {language}", list(spoken(voice, language)), "espeak")
+    if (folder / "transcription").is_file():
+        measure("human", list(human(folder)), "espeak", "pocketsphinx")
+    else:
+        print(NEEDED.format(folder))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,47 @@
+"""A sentence said by a voice that no aligner speaks with, with its true times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from realizer.speech import Say
+from realizer.speech.espeak import EspeakVoice
+from realizer.speech.utterance import Utterance
+
+TEXT = "The tall woman carried a basket of apples down the hill."
+WRONG = "Yesterday it rained all day; today the sun is shining."
+
+
+@dataclass(frozen=True, eq=False)
+class Noisy:
+    """The recording: half a second of noise before the speech, and noise 20 dB under it."""
+
+    said: Utterance
+    pcm: np.ndarray
+    rate: int
+    onsets: np.ndarray
+
+
+def noisy(said: Utterance) -> Noisy:
+    assert said.pcm is not None
+    before = said.sample_rate // 2
+    clean = np.pad(said.pcm.astype(float), (before, before))
+    loud = 0.1 * np.sqrt((said.pcm.astype(float) ** 2).mean())
+    pcm = clean + np.random.default_rng(3).normal(0, loud, len(clean))
+    onsets = np.array([word.start for word in said.words]) + 0.5
+    return Noisy(said, np.clip(pcm / 2, -32768, 32767).astype(np.int16), said.sample_rate, onsets)
+
+
+@pytest.fixture(scope="session")
+def sentence(voice: EspeakVoice) -> Noisy:
+    return noisy(voice.say(Say(TEXT, voice="en-us+m7")))
+
+
+@pytest.fixture(scope="session")
+def zin(voice: EspeakVoice) -> Noisy:
+    return noisy(
+        voice.say(Say("Mijn zus woont in een klein huis aan het water.", language="nl", voice="nl+m3"))
+    )

@@ -1,0 +1,165 @@
+"""A recording and its text: where the words are, and how sure that is."""
+
+from __future__ import annotations
+
+from xml.sax.saxutils import escape
+
+import numpy as np
+import pytest
+
+from realizer.errors import RealizerError
+from realizer.speech import SilentVoice
+from realizer.speech.align import AlignError, Alignment, align
+from realizer.speech.align.sphinx import missing
+from realizer.speech.utterance import MOST_TEXT
+
+TEXT = "The tall woman carried a basket of apples down the hill."
+WRONG = "Yesterday it rained all day; today the sun is shining."
+AFTER = "how quietly they came"
+
+both = pytest.mark.parametrize(
+    "aligner",
+    [
+        pytest.param("espeak", marks=pytest.mark.espeak),
+        pytest.param(
+            "pocketsphinx",
+            marks=[pytest.mark.espeak, pytest.mark.skipif(bool(missing()), reason=str(missing()))],
+        ),
+    ],
+)
+
+
+def errors(found: Alignment, onsets: np.ndarray) -> np.ndarray:
+    return np.abs(np.array([word.start for word in found.words]) - onsets)
+
+
+@both
+def test_words_are_found_in_noise(aligner, sentence) -> None:
+    found = align(sentence.pcm, sentence.rate, TEXT, aligner=aligner)
+    assert [word.text for word in found.words] == [word.text for word in sentence.said.words]
+    assert np.median(errors(found, sentence.onsets)) < 0.02
+    assert np.percentile(errors(found, sentence.onsets), 90) < 0.06
+    assert found.aligner == aligner
+    assert found.confidence > 0.8
+    assert found.warnings == ()
+
+
+@both
+def test_phonemes_tile_the_recording_and_lie_in_their_words(aligner, sentence) -> None:
+    found = align(sentence.pcm, sentence.rate, TEXT, aligner=aligner)
+    assert found.phonemes[0].start == 0
+    assert found.phonemes[-1].end == found.duration == len(sentence.pcm) / sentence.rate
+    assert all(a.end == b.start for a, b in zip(found.phonemes, found.phonemes[1:], strict=False))
+    assert not found.phonemes[0].ipa, "it begins with half a second of noise"
+    tall = found.words[1]
+    sounds = [p.ipa for p in found.phonemes if tall.start - 0.005 <= p.start < tall.end - 0.005]
+    assert sounds[0] == "t"
+    assert "l" in sounds
+    assert max(p.stress for p in found.phonemes) >= 1
+    assert len(found.phoneme_confidences) == len(found.phonemes)
+    assert len(found.confidences) == len(found.words)
+
+
+@pytest.mark.espeak
+def test_another_language_is_aligned_by_espeak(zin) -> None:
+    text = escape("Mijn zus woont in een klein huis aan het water.")
+    found = align(zin.pcm, zin.rate, text, "nl-NL")
+    assert found.aligner == "espeak"
+    assert np.median(errors(found, zin.onsets)) < 0.02
+    assert found.confidence > 0.8
+
+
+@both
+def test_a_wrong_text_is_not_believed(aligner, sentence) -> None:
+    try:
+        found = align(sentence.pcm, sentence.rate, WRONG, aligner=aligner)
+    except AlignError as error:
+        assert "does not find the text" in str(error)  # noqa: PT017
+        return
+    assert found.confidence < 0.5
+    assert "does not sound like the text" in found.warnings[0]
+
+
+@pytest.mark.espeak
+def test_noise_is_not_believed_whatever_aligns_it(sentence) -> None:
+    noise = np.random.default_rng(1).normal(0, 0.1, 48_000)
+    assert align(noise, 16_000, TEXT).confidence < 0.2
+
+
+@pytest.mark.espeak
+def test_a_text_of_another_language_is_not_believed(sentence) -> None:
+    assert (
+        align(sentence.pcm, sentence.rate, "Moja siostra mieszka w małym domu nad rzeką.", "pl").confidence
+        < 0.5
+    )
+
+
+@pytest.mark.espeak
+def test_a_pause_that_the_text_does_not_tell_of_falls_between_words(sentence) -> None:
+    cut = round(sentence.onsets[3] * sentence.rate)
+    noise = sentence.pcm[: sentence.rate // 2]
+    pcm = np.concatenate([sentence.pcm[:cut], np.tile(noise, 4), sentence.pcm[cut:]])
+    onsets = sentence.onsets + 2.0 * (np.arange(len(sentence.onsets)) >= 3)
+    found = align(pcm, sentence.rate, TEXT, aligner="espeak")
+    assert errors(found, onsets).max() < 0.1
+    assert found.words[2].end < onsets[3] - 1.8
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize("rate", [8000, 11_025, 48_000])
+def test_channels_rates_and_kinds_of_samples_do_not_matter(sentence, rate) -> None:
+    times = np.arange(round(len(sentence.pcm) / sentence.rate * rate)) / rate
+    mono = np.interp(times, np.arange(len(sentence.pcm)) / sentence.rate, sentence.pcm / 32768)
+    found = align(np.stack([mono, mono], axis=1), rate, TEXT, aligner="espeak")
+    assert np.percentile(errors(found, sentence.onsets), 90) < 0.06
+
+
+@pytest.mark.espeak
+def test_words_that_no_dictionary_has_are_said_as_espeak_says_them(voice) -> None:
+    from realizer.speech import Say
+
+    said = voice.say(Say("Zorblat gave 27 florbs to Quixley.", voice="en-us+f2"))
+    found = align(said.pcm, said.sample_rate, "Zorblat gave 27 florbs to Quixley.")
+    assert np.median(errors(found, np.array([w.start for w in said.words]))) < 0.06
+    assert found.confidence > 0.5
+
+
+def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) -> None:
+    from realizer.speech.align import aligner, sphinx
+
+    monkeypatch.setattr(aligner, "_reference_voice", SilentVoice)
+    monkeypatch.setattr(sphinx, "missing", lambda: "not here")
+    times = np.arange(32_000) / 16_000
+    tone = np.where((times > 0.5) & (times < 1.5), 0.3 * np.sin(2 * np.pi * 300 * times), 0.0)
+    found = align(tone, 16_000, AFTER)
+    assert (found.aligner, found.confidence) == ("even", 0.0)
+    assert found.words[0].start == pytest.approx(0.5, abs=0.05)
+    assert found.words[-1].end == pytest.approx(1.5, abs=0.05)
+    assert "pip install" in found.warnings[0]
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize(
+    ("pcm", "rate", "text", "says"),
+    [
+        (np.zeros(16_000, np.int16), 16_000, TEXT, "wanted somebody who speaks, got silence"),
+        ([], 16_000, TEXT, "of sound, got 0 s"),
+        (np.ones((2, 16_000)), 16_000, TEXT, r"samples, got the shape \(2, 16000\)"),
+        (np.ones(100, np.uint8), 16_000, TEXT, "got uint8"),
+        (np.full(9000, np.nan), 16_000, TEXT, "finite"),
+        (np.ones(9000), 0, TEXT, "rate: wanted a whole number of 1000..384000 Hz, got 0"),
+        (np.ones(9000), float("nan"), TEXT, "rate: .* got nan"),
+        (np.ones(9000), 16_000, "", "text: wanted words"),
+        (np.ones(9000), 16_000, " ...! ", "text: wanted words"),
+        (np.ones(3200), 16_000, TEXT, "wanted about .* s for 11 words, got 0.20 s"),
+        (np.ones(9000), 16_000, "x" * (MOST_TEXT + 1), f"at most {MOST_TEXT} characters"),
+    ],
+)
+def test_what_cannot_be_aligned_is_refused_in_words(pcm, rate, text, says) -> None:
+    with pytest.raises(RealizerError, match=says):
+        align(pcm, rate, text)
+
+
+def test_an_unknown_aligner_is_refused(sentence) -> None:
+    with pytest.raises(AlignError, match="wanted pocketsphinx or espeak, got 'mine'"):
+        align(sentence.pcm, sentence.rate, TEXT, aligner="mine")  # type: ignore[arg-type]

@@ -1,0 +1,48 @@
+"""Cepstra, loudness, and where somebody speaks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.speech.align import features as f
+
+
+def tone(hertz: float, seconds: float = 1.0, loud: float = 0.3) -> np.ndarray:
+    return (loud * np.sin(2 * np.pi * hertz * np.arange(round(seconds * f.RATE)) / f.RATE)).astype(np.float32)
+
+
+def test_a_tone_is_loudest_in_the_band_of_its_pitch() -> None:
+    peaks = [int(f.energies(tone(hertz), 160).mean(axis=0).argmax()) for hertz in (200, 1000, 3000, 6000)]
+    assert peaks == sorted(set(peaks))
+
+
+def test_there_is_a_frame_for_each_hop_which_need_not_be_whole() -> None:
+    energy = f.energies(tone(500), 100.5)
+    assert len(energy) == int(f.RATE / 100.5) + 1
+    assert f.cepstra(energy).shape == (len(energy), 26)
+
+
+def test_sound_is_told_from_silence_and_steady_noise_has_none() -> None:
+    sound = np.concatenate([tone(400, 0.5, 1e-4), tone(400, 1.0), tone(400, 0.5, 1e-4)])
+    _, talks = f.sounding(f.loudness(f.energies(sound, 160)))
+    assert 95 <= talks.sum() <= 110
+    assert not talks[:45].any()
+    part, _ = f.sounding(np.zeros(50))
+    assert part.max() == 0
+
+
+def test_normalising_takes_the_mean_and_the_spread_away() -> None:
+    rng = np.random.default_rng(0)
+    some = rng.random(400) < 0.5
+    rows = f.normalised(rng.normal(5, 3, (400, 4)), some)
+    assert np.allclose(rows[some].mean(axis=0), 0, atol=1e-5)
+    assert np.allclose(rows[some].std(axis=0), 1, atol=1e-5)
+
+
+def test_resampling_keeps_the_pitch_and_lets_nothing_alias() -> None:
+    times = np.arange(44_100) / 44_100
+    low, high = (np.sin(2 * np.pi * hertz * times).astype(np.float32) for hertz in (1000, 15_000))
+    kept = f.resampled(low, 44_100)
+    assert len(kept) == f.RATE
+    assert abs(np.abs(np.fft.rfft(kept)).argmax() - 1000) <= 1
+    assert np.abs(f.resampled(high, 44_100)[200:-200]).max() < 0.01
