@@ -11,11 +11,12 @@ loaded in a process of its own.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ctypes
 import ctypes.util
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 __all__: list[str] = []
 
@@ -75,6 +76,8 @@ class Engine:
     """
 
     drifts = True
+    # Spoken before any request, always the same: a fork of an engine that has spoken takes half the time.
+    first: ClassVar[dict[str, Any]] = {"text": "<speak>One, two.</speak>", "voice": "en-us", "wpm": 175}
 
     def __init__(self, data: str | None) -> None:
         path, own_data = find_library()
@@ -103,6 +106,8 @@ class Engine:
         if self.rate <= 0:
             raise RuntimeError(f"espeak-ng found no data in {data!r}")
 
+        with contextlib.suppress(RuntimeError):  # an installation without English
+            self.say(self.first)
         self.operations = {"say": self.say, "phonemes": self.phonemes}
 
     def hello(self) -> dict[str, Any]:
