@@ -136,7 +136,7 @@ class Playing:
         return self.schedule.end if self.stopped is None else self.stopped
 
     def said(self, now: float) -> str | None:
-        """Where speech of it was cut off: the words of all its speech that sounded to their end; else None."""
+        """Where its speech was cut off: all words that have sounded to their end; None where it was not."""
         spoken = [b for b in self.world.utterances if b in self.first.times]
         heard = [self.speech[b] for b in spoken if b in self.speech]
         if len(heard) == len(spoken) and all(s.whole(now) for s in heard):

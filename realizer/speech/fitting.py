@@ -21,14 +21,13 @@ NEAR = 0.006
 def fitted(voice: Voice, say: Say) -> Utterance:
     """Speak, `say.seconds` long where that is given: at the rate that comes nearest, then by resampling.
 
-    What is recorded is not spoken but aligned, and stays as long as it is.
+    What is recorded is not spoken (`speech.given`), and stays as long as it is.
 
     Raises:
         VoiceError: as `voice.say`.
     """
     if say.recording is not None:
-        # Imported here: what it needs takes longer to load than most texts to speak.
-        from realizer.speech.align.given import played
+        from realizer.speech.given import played
 
         return played(say, say.recording)
     utterance = voice.say(replace(say, seconds=None))

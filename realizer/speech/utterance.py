@@ -19,10 +19,20 @@ MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one be
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """Sound that is there already: (n,) int16 mono at `rate` Hz. It equals nothing but itself."""
+    """Sound that is there already. It equals nothing but itself.
+
+    Attributes:
+        rate: Hz.
+        pcm: (n,) int16 mono.
+        text: what is said in it, plain, where whoever made it told.
+        words, phonemes: when, in seconds from its start, where that was told; in order.
+    """
 
     rate: int
     pcm: Int16
+    text: str | None = None
+    words: tuple[Word, ...] = ()
+    phonemes: tuple[Phoneme, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,47 @@
+"""A viseme by the name that another's set has for it in, a sound with the same mouth out; by a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from realizer import tables
+
+__all__ = ["sound_of", "viseme_sets"]
+
+
+@dataclass(frozen=True, slots=True)
+class GivenViseme:
+    """A row of the table; `ipa` is "" for silence."""
+
+    set: str
+    viseme: str
+    ipa: str
+
+
+def viseme_sets() -> tuple[str, ...]:
+    """The sets that are known."""
+    return tuple(_sounds())
+
+
+def sound_of(set: str, viseme: str) -> str:
+    """IPA whose mouth the viseme is; "" for silence.
+
+    Raises:
+        KeyError: no such set, or no such viseme in it; the text says which there are.
+    """
+    if set not in _sounds():
+        raise KeyError(f"wanted a set of visemes of {', '.join(_sounds())}, got {set!r}")
+    known = _sounds()[set]
+    if viseme not in known:
+        raise KeyError(f"wanted a viseme of {set}: {', '.join(known)}; got {viseme!r}")
+    return known[viseme]
+
+
+@cache
+def _sounds() -> Mapping[str, Mapping[str, str]]:
+    rows = tables.read_csv(tables.text_of("visemes_given.csv"), GivenViseme, "visemes_given.csv")
+    return {
+        name: {r.viseme: r.ipa for r in rows if r.set == name} for name in dict.fromkeys(r.set for r in rows)
+    }
