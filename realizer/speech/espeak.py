@@ -22,7 +22,7 @@ __all__ = ["EspeakVoice", "choose_voice", "missing"]
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
 SLOWEST, FASTEST = 80, 450  # words a minute; what it accepts
 KEPT_WORDS = 4096
-INSTALL = "no voice with sound: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
+INSTALL = "espeak-ng is not installed: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
 
 
 def missing() -> str | None:

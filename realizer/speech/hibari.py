@@ -34,7 +34,7 @@ from realizer.speech.utterance import STRETCH, Say, Utterance, Word
 
 __all__ = ["HibariVoice", "missing", "missing_voice"]
 
-INSTALL = "no neural voice (English): pip install 'bml-realizer[neural]'"
+INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
 SHOWN = 3  # words that a warning names
 
 

@@ -116,8 +116,11 @@ def test_every_voice_says_what_it_is_or_what_to_install() -> None:
     assert all(len(voice.says) > 20 for voice in listed.values())
 
 
-def test_without_the_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.speech.espeak.missing", lambda: "pip install 'bml-realizer[speech]'")
+    monkeypatch.setattr("realizer.speech.hibari.missing", lambda: None)
+    assert find_voice(None).name == "hibari"
+    monkeypatch.setattr("realizer.speech.hibari.missing", lambda: "pip install 'bml-realizer[neural]'")
     assert find_voice(None).name == "silent"
     assert not voices()[0].available
     assert "pip install" in voices()[0].says
@@ -132,7 +135,7 @@ def test_the_best_voice_is_the_one_with_sound() -> None:
 
 
 def test_an_unknown_voice_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(VoiceError, match="wanted one of espeak, silent, got 'hal'"):
+    with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'hal'"):
         find_voice("hal")
 
 
