@@ -8,6 +8,7 @@ import click
 
 import realizer
 from realizer.cli import options
+from realizer.cli.align import align
 from realizer.cli.check import check
 from realizer.cli.demo import demo
 from realizer.cli.doctor import doctor
@@ -59,6 +60,7 @@ for command in (
     timeline,
     faces,
     voices,
+    align,
     outputs,
     doctor,
     demo,

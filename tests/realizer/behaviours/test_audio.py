@@ -7,6 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer.speech import Say
+from realizer.speech.espeak import EspeakVoice, missing
+from tests.realizer.behaviours.conftest import wav
+
 
 def sound(played, rate: int = 8000) -> np.ndarray:
     return np.abs(played.realization.sound(rate).astype(float))
@@ -75,3 +79,53 @@ def test_its_volume_changes_while_it_sounds(play, media: Path) -> None:
     heard = sound(played)
     assert heard[:1900].max() == pytest.approx(0.5 * 32767, rel=0.02)
     assert heard[2800:4000].max() == pytest.approx(0.1 * 32767, rel=0.02)
+
+
+def test_a_speech_with_a_recording_moves_its_lips_and_its_syncs_with_it(play, media: Path) -> None:
+    if fix := missing():
+        pytest.skip(fix)
+    voice = EspeakVoice()
+    said = voice.say(Say("Mind the open map, please.", voice="en-us+m7"))
+    voice.close()
+    (media / "said.wav").write_bytes(wav(said.pcm.tobytes(), rate=said.sample_rate))
+    played = play(
+        '<speech id="s"><text>Mind the <sync id="x"/>open map, please.</text>'
+        '<description priority="1" type="audiofile"><bmlt:audiofile fileName="said.wav"/></description>'
+        "</speech>",
+        media=media,
+    )
+    assert played.warnings == []
+    assert played.times("s")["end"] == pytest.approx(said.duration)
+    assert played.times("s")["x"] == pytest.approx(said.words[2].start, abs=0.06)
+    assert sound(played).max() > 1000, "the recording is heard"
+    open_vowel = next(p for p in said.phonemes if p.ipa == "æ")
+    closed = next(p for p in said.phonemes if p.ipa == "p")
+    opening = [
+        -played.fap(5, (p.start + p.end) / 2) - played.fap(4, (p.start + p.end) / 2)
+        for p in (open_vowel, closed)
+    ]
+    assert opening[0] > opening[1] + 50, "the mouth is open in the vowel and closed in the p"
+
+
+def test_a_speech_whose_recording_is_missing_is_spoken_with_a_warning(play, media: Path) -> None:
+    played = play(
+        '<speech id="s"><text>Hello there</text>'
+        '<description priority="1" type="audiofile"><bmlt:audiofile fileName="none.wav"/></description>'
+        "</speech>",
+        media=media,
+    )
+    assert played.warnings == [("b:s", "CANNOT_CREATE_BEHAVIOR")]
+    assert "none.wav" in played.told
+    assert played.times("s")["end"] > 0.3
+
+
+def test_a_speech_whose_recording_says_nothing_plays_it_and_guesses_its_syncs(play, media: Path) -> None:
+    (media / "still.wav").write_bytes(wav(bytes(16_000)))
+    played = play(
+        '<speech id="s"><text>Hello <sync id="x"/>there</text>'
+        '<description priority="1" type="audiofile"><bmlt:audiofile fileName="still.wav"/></description>'
+        "</speech>",
+        media=media,
+    )
+    assert played.times("s")["end"] == pytest.approx(1.0)
+    assert 0.3 < played.times("s")["x"] < 0.8
