@@ -1,0 +1,51 @@
+"""How much later than it says a voice is heard: `python tests/benchmarks/calibrate.py NAME [--aligner A]`.
+
+Prints the median of what an aligner finds minus what the voice says, over the word onsets of twelve English
+sentences: what is to be added to the voice's `offset` in realizer/tables/voices.csv.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+import numpy as np
+from align import SENTENCES
+
+from realizer.errors import RealizerError
+from realizer.speech import Say, find_voice
+from realizer.speech.align import align
+
+
+def main() -> None:
+    reader = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    reader.add_argument("voice", help="a voice of `realizer voices`")
+    reader.add_argument("--aligner", choices=["pocketsphinx", "espeak"], default="pocketsphinx")
+    asked = reader.parse_args()
+    voice = find_voice(asked.voice)
+    late: list[float] = []
+    for text in SENTENCES["en-US"]:
+        said = voice.say(Say(text))
+        if said.pcm is None:
+            sys.exit(f"{asked.voice} has no sound: there is nothing to calibrate")
+        try:
+            found = align(said.pcm, said.sample_rate, text, aligner=asked.aligner)
+        except RealizerError as error:
+            print(f"{text!r} is left out: {error}")
+            continue
+        if found.confidence > 0.5:
+            late += [a.start - b.start for a, b in zip(found.words, said.words, strict=True)]
+    voice.close()
+    if not late:
+        sys.exit("no sentence could be aligned")
+    ms = 1000 * np.array(late)
+    middle = np.median(ms)
+    low, high = np.percentile(ms, (25, 75))
+    print(
+        f"{asked.voice}: add {middle / 1000:+.3f} s to its offset; {len(ms)} words, half of them "
+        f"{low:.0f}..{high:.0f} ms, median deviation {np.median(abs(ms - middle)):.0f} ms"
+    )
+
+
+if __name__ == "__main__":
+    main()
