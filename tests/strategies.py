@@ -123,11 +123,16 @@ def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
         if spec.field != "id" and spec.value is not sync_ref and (spec.required or draw(st.booleans())):
             values[spec.field] = draw(attribute_values(spec.value))
     if cls in (Emotion, Mood):
-        # Named by a word, or by a place on the wheel.
-        word, angle = values.pop("name", None), values.pop("angle", None)
-        if word:
-            values.pop("activation", None)
-        values.update({"name": word} if word else {"angle": angle or 0.0})
+        # Named by a word, by a place on the wheel, or by valence and arousal.
+        ways = [("name",), ("angle", "activation"), ("valence", "arousal")]
+        way = next((way for way in ways if way[0] in values), ways[0])
+        for names in ways:
+            for name in names:
+                if names != way:
+                    values.pop(name, None)
+        values = {"name": "joy"} | values if way == ("name",) else values
+        if way == ("valence", "arousal"):
+            values.setdefault("arousal", 0.0)
     return values
 
 
