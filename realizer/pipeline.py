@@ -172,6 +172,7 @@ def realize(
     media: Path | None = None,
     expressions: Path | None = None,
     cooccurrence: str = "on",
+    prosody: bool = True,
     mapping: Path | None = None,
 ) -> Realization:
     """Play BML documents from start to end, without a clock.
@@ -188,6 +189,7 @@ def realize(
         media: the folder of the files that documents may name.
         expressions: a folder of expressions of the user's own, which documents may name.
         cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
+        prosody: nods, brows, blinks and looks that go with what is said; none without `idle`.
         mapping: a file of what AUs ask of FAPs; it goes before what the face says.
 
     Raises:
@@ -210,6 +212,7 @@ def realize(
         expressions=expressions,
         history=float("inf"),
         cooccurrence=cooccurrence,
+        prosody=prosody,
         takes=lambda _: takes(face, deformer=deformer),
     )
     accepted, refused = play(texts, player, voice)

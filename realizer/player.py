@@ -17,6 +17,7 @@ from bml_schema import Block, Feedback
 from realizer.animation.blend import blend
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle import idle_channels
+from realizer.animation.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float64
 from realizer.behaviours import KINDS
@@ -50,6 +51,7 @@ class Player:
         expressions: a folder of expressions of the user's own, before those that ship; None: there are none.
         history: seconds before the last `due` for which frames can still be asked for.
         cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
+        prosody: nods, brows, blinks and looks that go with what is said; part of what is idle.
         takes: index of a character -> what moves its face (`Face.takes`); None: that is not known.
 
     Attributes:
@@ -68,6 +70,7 @@ class Player:
         expressions: Path | None = None,
         history: float = HISTORY,
         cooccurrence: str = "on",
+        prosody: bool = True,
         takes: Callable[[int], Sequence[str]] | None = None,
     ) -> None:
         self.kinds = kinds
@@ -75,6 +78,7 @@ class Player:
         library = library_of(expressions)
         self.world = World(scene=scene, seed=seed, language=language, media=media, library=library)
         self.idle = idle
+        self.prosody = prosody
         self.history = history
         self.rules = chosen(cooccurrence)
         self._characters: list[Character] = [Character(None)]
@@ -195,7 +199,7 @@ class Player:
     def due(self, now: float) -> list[Feedback]:
         """Feedback whose time has come, in the order of report, each once."""
         out = self._blocks.due(now)
-        forgotten = self._blocks.forget(now - self.history - RELAX)
+        forgotten = self._blocks.forget(now - self.history - RELAX - AFTERMATH)
         if forgotten:
             for character in self._characters:
                 character.forget(now - self.history)
@@ -227,11 +231,16 @@ class Player:
         if not len(times):
             return blend((), times, self.rules)
         first, last = float(times[0]), float(times[-1])
-        channels = [c for p in self._blocks.cast.of(character) for c in p.moving()]
-        channels += self._characters[character].channels()
-        channels = [c for c in channels if c.span[0] <= last and c.span[1] >= first]
+        blocks = self._blocks.cast.of(character)
+        asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
+        asked += [Asked(c.span[0], c) for c in self._characters[character].channels()]
+        channels = [c for _, c in asked if c.span[0] <= last and c.span[1] >= first]
         if self.idle:
-            channels += idle_channels(first, last, self.world.seed + 7919 * character)
+            seed = self.world.seed + 7919 * character
+            said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
+            talks = [Talk(s.start, s.until, s.utterance) for s in said]
+            channels += idle_channels(first, last, seed, phrase_ends(talks))
+            channels += prosody_channels(talks, first, last, seed, asked)
         return blend(tuple(channels), times, self.rules)
 
     @property

@@ -159,6 +159,7 @@ class Settings:
     seed: int = _setting(0, _number(int, -(2**63), 2**63 - 1), "of idle motion")
     idle: bool = _setting(True, _flag, "blinks and small head motion")
     cooccurrence: str = _setting("on", _switch_or_file, "rules of AUs together: on, off, or a file of them")
+    prosody: bool = _setting(True, _flag, "nods, brows, blinks and looks that go with speech: on or off")
     mapping: Path | None = _setting(
         None, _optional(_file), "a file of what AUs ask of FAPs; none: as each face"
     )

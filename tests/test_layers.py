@@ -27,7 +27,8 @@ MAY: dict[str, set[str]] = {
     "realizer.tables": VALUES | {"realizer.tables"},
     "realizer.scheduling": VALUES | {"bml_schema", "realizer.scheduling"},
     "realizer.speech": VALUES | {"realizer.speech", "realizer.tables"},
-    "realizer.animation": VALUES | {"realizer.animation", "realizer.tables", "realizer.speech.utterance"},
+    "realizer.animation": VALUES
+    | {"realizer.animation", "realizer.speech.accents", "realizer.speech.utterance", "realizer.tables"},
     "realizer.behaviours": VALUES
     | {
         "bml_schema",

@@ -7,18 +7,22 @@ random about it from (seed, kind, k), so any two windows of time agree where the
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from realizer import tables
+from realizer.animation.chance import uniform
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
+from realizer.speech.accents import prosody_facts
 
-__all__ = ["Blink", "Fewer", "idle_channels"]
+__all__ = ["Blink", "Fewer", "PhraseEnd", "idle_channels"]
 
 # s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
 BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
@@ -58,12 +62,20 @@ class Fewer(Channel):
         return first, last + BLINK_TIMES[-1]
 
 
-def idle_channels(start: float, end: float, seed: int) -> list[Channel]:
+class PhraseEnd(NamedTuple):
+    """Where something said from `since` on pauses: blinks belong there. Seconds on the session clock."""
+
+    since: float
+    at: float
+
+
+def idle_channels(start: float, end: float, seed: int, ends: Sequence[PhraseEnd] = ()) -> list[Channel]:
     """Blinks (AU45), head sway (AU51-56) and saccades (AU61-64) of the idle layer.
 
     Args:
         start, end: seconds on the session clock; the channels are right from start to end, both included.
         seed: of the character.
+        ends: where its phrases end, in order of time; a blink that is due near one comes there instead.
 
     Returns:
         Channels on the session clock. Blend a window of time with its own channels only.
@@ -77,7 +89,7 @@ def idle_channels(start: float, end: float, seed: int) -> list[Channel]:
             source="idle",
             draw=draw,
         )
-        for at, draw in _blinks(start, end, seed)
+        for at, draw in _blinks(start, end, seed, ends)
         for lid in au(45)
     ]
     for kind, (sides, most) in enumerate(SWAY.items()):
@@ -122,20 +134,40 @@ def _poses(
     """
     first, last = math.floor(start / period) - 2, math.ceil(end / period) + 2
     k = np.arange(first, last + 1)
-    times = (k + 0.7 * _uniform(seed, kind, k)) * period
+    times = (k + 0.7 * uniform(seed, kind, k)) * period
     # The mean of two draws: small poses are more common than large ones.
     way = 100 + (kind if direction is None else direction)
-    degrees = most * (_uniform(seed, way, k) + _uniform(seed, way + 100, k) - 1.0)
+    degrees = most * (uniform(seed, way, k) + uniform(seed, way + 100, k) - 1.0)
     return times, degrees
 
 
-def _blinks(start: float, end: float, seed: int) -> list[tuple[float, float]]:
+def _blinks(start: float, end: float, seed: int, ends: Sequence[PhraseEnd]) -> list[tuple[float, float]]:
     """Onset and draw of the blinks that can be seen in start..end; the first comes after 0."""
+    moved = prosody_facts()["blinks"]["reach"] + prosody_facts()["blinks"]["delay"] if ends else 0.0
     count = 64
-    while (onsets := _onsets(seed, count))[-1] <= end:
+    while (onsets := _onsets(seed, count))[-1] <= end + moved:
         count *= 2
-    seen = np.flatnonzero((onsets + BLINK_TIMES[-1] >= start) & (onsets <= end))
-    return list(zip(onsets[seen].tolist(), _uniform(seed, 304, seen).tolist(), strict=True))
+    seen = np.flatnonzero((onsets + BLINK_TIMES[-1] + moved >= start) & (onsets - moved <= end))
+    late = uniform(seed, 305, seen).tolist()
+    placed = [_placed(at, part, ends) for at, part in zip(onsets[seen].tolist(), late, strict=True)]
+    draws = uniform(seed, 304, seen).tolist()
+    near = zip(placed, draws, strict=True)
+    return [(at, draw) for at, draw in near if at + BLINK_TIMES[-1] >= start and at <= end]
+
+
+def _placed(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
+    """When a blink comes that is due: at the nearest end of a phrase, if it is due since the speech began.
+
+    No blink depends on another one, so that what is forgotten changes nothing that is still to be seen.
+    """
+    facts = prosody_facts()["blinks"]
+    first = bisect_left(ends, at - facts["reach"], key=lambda end: end.at)
+    last = bisect_left(ends, at + facts["reach"], lo=first, key=lambda end: end.at)
+    near = [end for end in ends[first:last] if end.since <= at]
+    if not near:
+        return at
+    best = min(near, key=lambda end: abs(end.at - at))
+    return best.at + late * float(facts["delay"])
 
 
 @lru_cache(maxsize=256)
@@ -143,22 +175,7 @@ def _onsets(seed: int, count: int) -> Float64:
     """The first `count` blinks of a face: (count,) seconds, rising."""
     k = np.arange(count)
     # Box-Muller: two uniform numbers make a normal one.
-    normal = np.sqrt(-2.0 * np.log1p(-_uniform(seed, 301, k))) * np.cos(2.0 * np.pi * _uniform(seed, 302, k))
+    normal = np.sqrt(-2.0 * np.log1p(-uniform(seed, 301, k))) * np.cos(2.0 * np.pi * uniform(seed, 302, k))
     gaps = np.clip(BLINK_MEDIAN * np.exp(BLINK_SPREAD * normal), BLINK_LEAST, BLINK_MOST)
-    gaps[0] *= _uniform(seed, 303, k[:1])[0]  # nobody begins a session with a blink at the same time
+    gaps[0] *= uniform(seed, 303, k[:1])[0]  # nobody begins a session with a blink at the same time
     return np.cumsum(gaps)
-
-
-def _uniform(seed: int, kind: int, k: npt.NDArray[np.int64]) -> Float64:
-    """(n,) numbers in [0, 1) that depend on (seed, kind, k) alone; the mixing step of SplitMix64.
-
-    A generator of numpy is not promised to draw the same numbers in its next version.
-    """
-    mask = (1 << 64) - 1
-    z = k.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    z = z + np.uint64((seed * 0xD1B54A32D192ED03 + kind * 0x8CB92BA72F3D8DD7 + 0x632BE59BD9B4E019) & mask)
-    for _ in range(2):
-        z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        z = z ^ (z >> np.uint64(31))
-    return (z >> np.uint64(11)).astype(np.float64) * 2.0**-53

@@ -48,6 +48,13 @@ cooccurrence = click.option(
 )
 
 
+prosody = click.option(
+    "--prosody",
+    type=click.Choice(["on", "off"]),
+    help="Small nods, brows, blinks and looks that go with speech; none without idle motion.  [default: on]",
+)
+
+
 deformer = click.option(
     "--deformer",
     type=click.Choice(["mpeg4", "au"]),

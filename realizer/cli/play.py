@@ -30,6 +30,7 @@ def performing(command: options.Command) -> options.Command:
         options.playing,
         options.mapping,
         options.cooccurrence,
+        options.prosody,
         click.option("--no-idle", is_flag=True, help="No blinks, no small head motion."),
         click.option("--seed", type=int, help="Of idle motion: the same seed, the same bytes.  [default: 0]"),
         options.background,
@@ -88,6 +89,7 @@ def perform(
     seed: int | None,
     no_idle: bool,
     cooccurrence: str | None,
+    prosody: str | None,
     mapping: Path | None,
     voice: str | None,
     scene: str | None,
@@ -119,6 +121,7 @@ def perform(
         seed=seed,
         idle=False if no_idle else None,
         cooccurrence=cooccurrence,
+        prosody=prosody,
         mapping=mapping,
     )
     if writer is not None and writer.suffix in PICTURES:
@@ -149,6 +152,7 @@ def perform(
         media=chosen.media,
         expressions=chosen.expressions,
         cooccurrence=chosen.cooccurrence,
+        prosody=chosen.prosody,
         mapping=chosen.mapping,
     )
     if any(speaking.utterance.pcm is None for speaking in realization.speaking):

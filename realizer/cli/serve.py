@@ -37,6 +37,7 @@ __all__: list[str] = []
 @options.expressions
 @click.option("--seed", type=int, help="Of idle motion.  [default: 0]")
 @click.option("--idle/--no-idle", default=None, help="Blinks and small head motion.  [default: idle]")
+@options.prosody
 @options.cooccurrence
 @options.mapping
 @click.option(

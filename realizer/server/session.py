@@ -98,6 +98,7 @@ class Session:
             media=settings.media,
             expressions=settings.expressions,
             cooccurrence=settings.cooccurrence,
+            prosody=settings.prosody,
             takes=lambda index: self.face(index).takes,
         )
         self.load_face = load_face or (lambda name: _load_face(name, settings.deformer))

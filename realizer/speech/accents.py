@@ -1,0 +1,109 @@
+"""An utterance in, its phrases and the accents in them out: where a voice pauses and what it stresses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from realizer import tables
+from realizer.speech.utterance import Utterance
+
+__all__ = ["Accent", "Phrase", "phrases", "prosody_facts"]
+
+FILE = "prosody.toml"
+PRIMARY = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Accent:
+    """A syllable that stands out; `nuclear` where it is the last of its phrase, which stands out most."""
+
+    time: float
+    nuclear: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Phrase:
+    """What is said between two pauses, in seconds from the start of the utterance."""
+
+    start: float
+    end: float
+    accents: tuple[Accent, ...]
+
+
+@cache
+def prosody_facts() -> dict[str, Any]:
+    """prosody.toml, whole."""
+    return tables.read_toml(tables.text_of(FILE), FILE)
+
+
+# Long texts are looked at once, for as long as they are of interest to anybody.
+_known: WeakKeyDictionary[Utterance, tuple[Phrase, ...]] = WeakKeyDictionary()
+
+
+def phrases(utterance: Utterance) -> tuple[Phrase, ...]:
+    """The phrases of an utterance, in order; none where nothing is said.
+
+    A phrase ends where nothing sounds for a while, at commas too. Its accents are the phonemes of primary
+    stress, in their middle. Where the voice says nothing of stress, they are the words that are loudest, and
+    without sound the longest word.
+    """
+    found = _known.get(utterance)
+    if found is None:
+        found = _known[utterance] = tuple(_found(utterance))
+    return found
+
+
+def _found(utterance: Utterance) -> list[Phrase]:
+    sounds = [(p.start, p.end) for p in utterance.phonemes if p.ipa]
+    words = [(w.start, w.end) for w in utterance.words] or sounds
+    stressed = [(p.start + p.end) / 2 for p in utterance.phonemes if p.stress == PRIMARY and p.ipa]
+    spans: list[tuple[float, float]] = []
+    for start, end in sounds or words:
+        if spans and start - spans[-1][1] < prosody_facts()["phrases"]["pause"]:
+            spans[-1] = (spans[-1][0], end)
+        else:
+            spans.append((start, end))
+    found = []
+    for start, end in spans:
+        if stressed:
+            times = [t for t in stressed if start <= t < end]
+        else:
+            times = _standing_out(utterance, [w for w in words if start <= (w[0] + w[1]) / 2 < end])
+        accents = [Accent(time) for time in times]
+        if accents:
+            accents[-1] = replace(accents[-1], nuclear=True)
+        found.append(Phrase(start, end, tuple(accents)))
+    return found
+
+
+def _standing_out(utterance: Utterance, words: Sequence[tuple[float, float]]) -> list[float]:
+    """When the loudest words of a phrase are loudest, or the middle of the longest."""
+    if not words:
+        return []
+    heard = [_loudest(utterance, start, end) for start, end in words]
+    most = max(loudness for loudness, _ in heard)
+    if most == 0.0:
+        start, end = max(words, key=lambda word: word[1] - word[0])
+        return [(start + end) / 2]
+    return [time for loudness, time in heard if loudness >= prosody_facts()["accents"]["loud"] * most]
+
+
+def _loudest(utterance: Utterance, start: float, end: float) -> tuple[float, float]:
+    """The largest root mean square of a short window, and when it is; 0 where there is no sound."""
+    if utterance.pcm is None or not utterance.sample_rate:
+        return 0.0, start
+    rate, window = utterance.sample_rate, prosody_facts()["accents"]["window"]
+    samples = utterance.pcm[round(start * rate) : round(end * rate)].astype(np.float64)
+    size = max(1, round(window * rate))
+    count = len(samples) // size
+    if not count:
+        return 0.0, start
+    power = np.square(samples[: count * size]).reshape(count, size).mean(axis=1)
+    best = int(power.argmax())
+    return float(np.sqrt(power[best])), start + (best + 0.5) * size / rate
