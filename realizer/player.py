@@ -29,7 +29,7 @@ from realizer.composition.playing import Speaking
 from realizer.composition.reporting import State
 from realizer.expressions import library_of
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import Recording, Say, Utterance
 from realizer.tables.cooccurrence import chosen
 
 __all__ = ["Player", "Speaking"]
@@ -48,6 +48,7 @@ class Player:
         idle: blinks and small head motion between and under the behaviours.
         language: BCP-47 of speech that does not name its own.
         media: the folder of the files that documents may name; None: they may name none.
+        clips: id -> sound that documents may name as `clip:ID`; it may change while the player plays.
         expressions: a folder of expressions of the user's own, before those that ship; None: there are none.
         history: seconds before the last `due` for which frames can still be asked for.
         cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
@@ -67,6 +68,7 @@ class Player:
         idle: bool = True,
         language: str = "en-US",
         media: Path | None = None,
+        clips: Mapping[str, Recording] | None = None,
         expressions: Path | None = None,
         history: float = HISTORY,
         cooccurrence: str = "on",
@@ -76,7 +78,14 @@ class Player:
         self.kinds = kinds
         self._takes = takes
         library = library_of(expressions)
-        self.world = World(scene=scene, seed=seed, language=language, media=media, library=library)
+        self.world = World(
+            scene=scene,
+            seed=seed,
+            language=language,
+            media=media,
+            clips={} if clips is None else clips,
+            library=library,
+        )
         self.idle = idle
         self.prosody = prosody
         self.history = history

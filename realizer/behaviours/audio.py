@@ -1,4 +1,4 @@
-"""audiofile: a sound file of the media folder -> what sounds from start to end."""
+"""audiofile: a sound file of the media folder, or a clip a client sent -> what sounds from start to end."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 from bml_schema import AudioFile
 from realizer.animation.channel import Channel
 from realizer.arrays import Float64
-from realizer.behaviours import media
+from realizer.behaviours import recordings
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.sound_file import read_sound
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Utterance
 
@@ -33,7 +32,7 @@ def expand(node: AudioFile, times: Float64, world: World) -> tuple[Channel, ...]
 
 
 def check(node: AudioFile, world: World) -> tuple[Fault, ...]:
-    return media.faults(node.file_name, world, read_sound)
+    return recordings.faults(node.file_name, world)
 
 
 def sound(node: AudioFile, world: World) -> Utterance | None:
@@ -41,7 +40,7 @@ def sound(node: AudioFile, world: World) -> Utterance | None:
 
 
 def _sound(node: AudioFile, world: World) -> Utterance:
-    recording = media.load(node.file_name, world, read_sound)
+    recording = recordings.recording(node.file_name, world)
     return Utterance(len(recording.pcm) / recording.rate, (), (), {}, recording.rate, recording.pcm)
 
 

@@ -11,7 +11,7 @@ from realizer.animation.channel import Channel
 from realizer.arrays import Float64
 from realizer.expressions import Library, shipped
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import Recording, Say, Utterance
 
 __all__ = ["Act", "Activate", "Change", "Interrupt", "Kind", "World"]
 
@@ -29,6 +29,7 @@ class World:
         language: BCP-47 of speech without its own.
         seed: for anything random.
         media: the folder that holds the files documents may name; None: there are none.
+        clips: id -> sound that a client sent, which documents name as `clip:ID`.
         library: the expressions that documents may name.
         takes: () -> what moves the character's face (`Face.takes`); None where that is not known.
     """
@@ -38,6 +39,7 @@ class World:
     language: str = "en-US"
     seed: int = 0
     media: Path | None = None
+    clips: Mapping[str, Recording] = field(default_factory=dict)
     library: Library = field(default_factory=shipped)
     takes: Callable[[], Sequence[str] | None] = lambda: None
 

@@ -11,10 +11,9 @@ import numpy as np
 from bml_schema import AudioFile, Speech, Sync
 from realizer.animation.channel import Channel
 from realizer.arrays import Float64
-from realizer.behaviours import media
+from realizer.behaviours import recordings
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.media import MediaError
-from realizer.behaviours.sound_file import read_sound
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MOST_TEXT, Recording, Say, Utterance
 
@@ -40,13 +39,17 @@ class Spoken:
 def say(node: Speech, world: World) -> Say | None:
     """The description of highest priority that is SSML, or else the text with its syncs as marks.
 
-    A description that is an audio file says how it sounds; what is said in it stands in the others.
+    A description that is an audio file says how it sounds; what is said in it stands in the others, or came
+    with the clip. Where nobody tells, the mouth goes by loudness.
     """
+    recording = _recording(node, world)
     spoken = _spoken(node)
+    if spoken is None and recording is not None:
+        spoken = Spoken(escape(recording.text or ""), ())
     if spoken is None or len(spoken.ssml) > MOST_TEXT:
         return None
     language = spoken.language or world.language
-    return Say(spoken.ssml, spoken.marks, language=language, recording=_recording(node, world))
+    return Say(spoken.ssml, spoken.marks, language=language, recording=recording)
 
 
 def timing(node: Speech, world: World) -> Timing:
@@ -99,16 +102,20 @@ def check(node: Speech, world: World) -> tuple[Fault, ...]:
     What the voice could not say as it is written is one fault that is not fatal.
     """
     spoken = _spoken(node)
-    if spoken is None:
-        words = f"speech: wanted <text> or a description of type {SSML}, got none"
+    name = _audio_file(node)
+    faults = recordings.faults(name, world) if name is not None else ()
+    if spoken is None and name is not None and not faults:
+        spoken = Spoken("", ())
+    if spoken is None and faults:
+        words = f"speech: {faults[0].text}"
+    elif spoken is None:
+        words = f"speech: wanted <text>, a description of type {SSML} or a recording, got none"
     elif len(spoken.ssml) > MOST_TEXT:
         words = (
             f"speech: wanted a text of at most {MOST_TEXT} characters, got {len(spoken.ssml)}; "
             "say it in several behaviours"
         )
     else:
-        name = _audio_file(node)
-        faults = media.faults(name, world, read_sound) if name is not None else ()
         unsaid = world.utterances[node.id].warnings if node.id in world.utterances else ()
         if unsaid:
             words = f"speech: {'; '.join(unsaid)}"
@@ -151,7 +158,7 @@ def _recording(node: Speech, world: World) -> Recording | None:
     if name is None:
         return None
     try:
-        return media.load(name, world, read_sound)
+        return recordings.recording(name, world)
     except MediaError:
         return None
 

@@ -10,6 +10,7 @@ from realizer.behaviours import emotion
 from realizer.behaviours.kind import World
 from realizer.errors import FaceError, VoiceError
 from realizer.mapping import mapping_of
+from realizer.server.clips import ClipError
 from realizer.server.connection import (
     Connection,
     FeedbackFilter,
@@ -32,6 +33,7 @@ from realizer.server.messages import (
     Pong,
     SceneMessage,
     SetMessage,
+    SpeechMessage,
     StateMessage,
     StateQuery,
     Stop,
@@ -78,6 +80,9 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
                 _set(session, message, t)
             case Anticipate():
                 session.player.anticipate(message.id, message.syncs, t)
+            case SpeechMessage():
+                if message.clip is not None:
+                    session.clips.tell(message)
             case Stop():
                 wanted = None if message.blocks is None else set(message.blocks)
                 waiting = session.preparation.waiting
@@ -90,6 +95,8 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
     except Wrong as error:
         where = f"{message.type}.{error.where}"
         session.reply(connection.id, ErrorMessage(code="invalid", message=str(error), where=where))
+    except ClipError as error:
+        session.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
     except FaceError as error:
         where = f"{message.type}.face"
         session.reply(connection.id, ErrorMessage(code="face", message=str(error), where=where))

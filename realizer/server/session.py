@@ -19,6 +19,7 @@ from realizer.pipeline import as_it_is, warning_of, warped
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
+from realizer.server.clips import ClipError, Clips
 from realizer.server.connection import STUCK, Connection
 from realizer.server.control import MAX_CHARACTERS, follow
 from realizer.server.effects import Close, Effect, Move, Send, Speak
@@ -32,6 +33,7 @@ from realizer.server.messages import (
 )
 from realizer.server.preparation import Preparation, Waiting
 from realizer.server.streams import EPSILON
+from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
 from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Say, Utterance
@@ -89,6 +91,7 @@ class Session:
         self.closed = False
         self.ending = False  # the service ends: no new documents
         self.empty_since: float | None = now
+        self.clips = Clips()
         self.player = Player(
             kinds=KINDS,
             scene=scene,
@@ -96,6 +99,7 @@ class Session:
             idle=settings.idle,
             language=settings.language,
             media=settings.media,
+            clips=self.clips.recordings,
             expressions=settings.expressions,
             cooccurrence=settings.cooccurrence,
             prosody=settings.prosody,
@@ -158,12 +162,11 @@ class Session:
     # messages in --------------------------------------------------------------------------------
 
     def receive(self, connection: int, message: str | bytes, now: float) -> None:
-        """A WebSocket message: control where it starts with `{`, otherwise BML documents."""
+        """A WebSocket message: bytes are a sound clip; text is control if it starts with `{`, or else BML."""
         if self.closed or connection not in self._connections:
             return
         if isinstance(message, bytes):
-            text = f"wanted BML or JSON as a text message, got {len(message)} bytes of binary"
-            self.reply(connection, ErrorMessage(code="unsupported", message=text))
+            self._take_clip(connection, message)
         elif message.lstrip("\ufeff \t\r\n").startswith("{"):
             control = parse_control(message.lstrip("\ufeff \t\r\n"))
             if isinstance(control, ErrorMessage):
@@ -176,6 +179,14 @@ class Session:
         else:
             self._inbox.append(self._documents(message))
         self.tick(now)
+
+    def _take_clip(self, connection: int, message: bytes) -> None:
+        try:
+            self.clips.take(unpack_clip(message))
+        except WireError as error:
+            self.reply(connection, ErrorMessage(code="unsupported", message=str(error)))
+        except ClipError as error:
+            self.reply(connection, ErrorMessage(code="clip", message=str(error), where=error.where))
 
     def spoken(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
         """The voice's answer to a Speak. Where it failed, the silent voice takes over."""

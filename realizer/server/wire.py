@@ -12,7 +12,20 @@ import numpy as np
 from realizer.arrays import Float32, Int16, Int32
 from realizer.errors import RealizerError
 
-__all__ = ["FORGET", "VERSION", "FrameKind", "WireError", "WireFrame", "json_frame", "pack", "unpack"]
+__all__ = [
+    "FINAL",
+    "FORGET",
+    "VERSION",
+    "ClipPiece",
+    "FrameKind",
+    "WireError",
+    "WireFrame",
+    "json_frame",
+    "pack",
+    "pack_clip",
+    "unpack",
+    "unpack_clip",
+]
 
 VERSION = 1
 # u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
@@ -20,6 +33,10 @@ VERSION = 1
 HEADER = struct.Struct("<BBHId")
 # On a sound packet: forget every sample from this packet's time on; what follows replaces it.
 FORGET = 0x100
+# On a piece of a sound clip that comes in: it is the last one.
+FINAL = 0x200
+# Behind the header of such a piece: u32 rate, u8 length of the id, the id (UTF-8), then sound.
+CLIP = struct.Struct("<IB")
 
 
 class WireError(RealizerError):
@@ -93,6 +110,55 @@ def unpack(message: bytes) -> WireFrame:
     if kind not in FrameKind.__members__.values():
         raise WireError(f"wanted a kind in {[int(k) for k in FrameKind]}, got {kind}")
     return WireFrame(FrameKind(kind), frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FORGET))
+
+
+@dataclass(frozen=True, slots=True)
+class ClipPiece:
+    """A piece of a sound clip that a client sends: kind 4, as sound that goes out.
+
+    Attributes:
+        id: of the clip.
+        number: 0, 1, 2, ...: the header's `frame`; a 0 begins the clip anew.
+        rate: Hz of raw mono int16 PCM; 0 where the pieces together are a sound file.
+        sound: the bytes.
+        final: it is the last one.
+    """
+
+    id: str
+    number: int
+    rate: int
+    sound: bytes
+    final: bool = True
+
+
+def pack_clip(piece: ClipPiece) -> bytes:
+    """One binary message; the header's time is 0 and not looked at."""
+    flags, id = FINAL if piece.final else 0, piece.id.encode()
+    head = HEADER.pack(FrameKind.SOUND, VERSION, flags, piece.number, 0.0)
+    return head + CLIP.pack(piece.rate, len(id)) + id + piece.sound
+
+
+def unpack_clip(message: bytes) -> ClipPiece:
+    """A binary message from a client taken apart.
+
+    Raises:
+        WireError: it is no piece of a sound clip.
+    """
+    frame = unpack(message)
+    if frame.kind is not FrameKind.SOUND:
+        raise WireError(f"wanted a sound clip (kind {FrameKind.SOUND:d}), got kind {frame.kind:d}")
+    if len(frame.payload) < CLIP.size:
+        raise WireError(f"wanted a rate and an id behind the header, got {len(frame.payload)} bytes")
+    rate, length = CLIP.unpack_from(frame.payload)
+    id, sound = frame.payload[CLIP.size : CLIP.size + length], frame.payload[CLIP.size + length :]
+    if not 0 < length == len(id):
+        raise WireError(f"wanted an id of {max(1, length)} bytes, got {len(id)}")
+    try:
+        name = id.decode()
+    except UnicodeDecodeError:
+        raise WireError(f"wanted an id in UTF-8, got {id!r}") from None
+    final = bool(struct.unpack_from("<H", message, 2)[0] & FINAL)
+    return ClipPiece(name, frame.frame, rate, sound, final)
 
 
 def json_frame(

@@ -25,6 +25,7 @@ def test_every_supported_type_is_understood() -> None:
         "unsubscribe": ',"stream":"fap"',
         "scene": ',"objects":{"cup":{"x":0.2,"y":0,"z":1}}',
         "character": ',"id":"Ada"',
+        "speech": ',"id":"turn","append":"Hello. "',
         "anticipate": ',"id":"clock","syncs":{"beat":2.5}',
     }
     for kind in SUPPORTED:
@@ -42,7 +43,7 @@ def test_every_supported_type_is_understood() -> None:
         ("{}", "unsupported", "type", "hello, subscribe"),
         ('{"type":"dance"}', "unsupported", "type", '"dance"'),
         ('{"type":["hello"]}', "unsupported", "type", "hello"),
-        ('{"type":"speech"}', "unsupported", "type", "hello"),
+        ('{"type":"speak"}', "unsupported", "type", "hello"),
         ('{"type":"anticipate"}', "invalid", "anticipate.id", "required"),
         ('{"type":"anticipate","id":"a:b","syncs":{}}', "invalid", "anticipate.id", "pattern"),
         ('{"type":"subscribe","stream":"arkit"}', "unsupported", "subscribe.stream", "fap, au"),
@@ -67,6 +68,26 @@ def test_a_bad_message_is_told_what_was_wanted(text, code, where, says) -> None:
 @given(st.text(max_size=200))
 def test_any_text_gives_a_message_or_an_error(text) -> None:
     parse_control("{" + text)
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ("", "the id of a speech, or a clip"),
+        (',"clip":"c","append":"Hello"', "the id of the speech"),
+        (',"id":"t","words":[]', ""),
+        (',"id":"t","text":"Hello"', "the clip that this is said in"),
+        (',"clip":"c","phonemes":[{"start":0,"ipa":"p"}],"visemes":[{"start":0,"viseme":1}]', "got both"),
+        (',"clip":"c","words":[{"start":-1,"text":"a"}]', "greater than or equal to 0"),
+        (',"id":"t 1","append":"x"', "pattern"),
+    ],
+)
+def test_a_speech_says_what_it_lacks(fields, says) -> None:
+    message = parse_control('{"type":"speech"' + fields + "}")
+    assert isinstance(message, ErrorMessage) == bool(says)
+    if isinstance(message, ErrorMessage):
+        assert message.code == "invalid"
+        assert says in message.message
 
 
 def test_a_subscription_has_the_defaults_of_the_protocol() -> None:

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.wire import FrameKind, WireError, json_frame, pack, unpack
+from realizer.server.wire import (
+    ClipPiece,
+    FrameKind,
+    WireError,
+    json_frame,
+    pack,
+    pack_clip,
+    unpack,
+    unpack_clip,
+)
 
 
 @given(
@@ -74,3 +84,27 @@ def test_a_json_frame_says_its_stream_number_and_time() -> None:
         "values": [1, 2],
     }
     assert json.loads(json_frame("au", 0, 0.0, [], "Ada"))["character"] == "Ada"
+
+
+def test_a_piece_of_a_clip_comes_back_as_it_was() -> None:
+    piece = ClipPiece("müsli", 7, 22050, b"\x01\x02\x03", final=False)
+    message = pack_clip(piece)
+    assert message[:8] == bytes([4, 1, 0, 0, 7, 0, 0, 0])
+    assert unpack_clip(message) == piece
+    assert unpack_clip(pack_clip(replace(piece, final=True))).final
+
+
+@pytest.mark.parametrize(
+    ("message", "says"),
+    [
+        (b"\x04\x01", "header"),
+        (pack(FrameKind.FAP, 0, 0.0, b""), "kind 1"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"abc"), "rate and an id"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"\x00\x00\x00\x00\x05ab"), "id of 5 bytes"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"\x00\x00\x00\x00\x00ab"), "id of 1 bytes"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"\x00\x00\x00\x00\x02\xff\xfe"), "UTF-8"),
+    ],
+)
+def test_what_is_no_clip_says_why(message, says) -> None:
+    with pytest.raises(WireError, match=says):
+        unpack_clip(message)
