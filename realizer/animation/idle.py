@@ -166,7 +166,8 @@ def _placed(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
     near = [end for end in ends[first:last] if end.since <= at]
     if not near:
         return at
-    best = min(near, key=lambda end: abs(end.at - at))
+    # What is said later may not take a blink from where it was shown already.
+    best = min(near, key=lambda end: (end.since, abs(end.at - at)))
     return best.at + late * float(facts["delay"])
 
 

@@ -6,7 +6,7 @@ function of the seed, of what is said and when it starts, and of time, not of th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import NamedTuple
@@ -150,22 +150,26 @@ def _accents(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gest
     for phrase in said:
         for accent in phrase.accents:
             chance = "nuclear" if accent.nuclear else "others"
-            strength = 1.0 if accent.nuclear else nod["other"]
             # What comes too early in a text for its attack peaks a little later: nothing moves before it.
             time = start + max(accent.time, nod["attack"])
-            room = accent.nuclear or phrase.accents[-1].time - accent.time >= nod["apart"]
-            nods_now = room and nods[k] < nod[chance] and time - nodded >= nod["apart"]
+            # The last accent of the phrase goes first, and shows in one way or the other.
+            left = np.inf if accent.nuclear else phrase.accents[-1].time - accent.time
+            may_nod = min(left, time - nodded) >= nod["apart"]
+            may_raise = min(left, time - raised) >= brows["apart"]
+            nods_now = may_nod and (nods[k] < nod[chance] or (accent.nuclear and not may_raise))
+            raises_now = may_raise and (raises[k] < brows[chance] or (accent.nuclear and not nods_now))
             if nods_now:
                 nodded = time
-                part = strength * (nod["least"] + (1.0 - nod["least"]) * sizes[k])
-                yield _nod(time, nod["most"] * part)
-            raise_now = raises[k] < brows[chance] or (accent.nuclear and not nods_now)
-            if raise_now and time - raised >= brows["apart"]:
+                yield _nod(time, _size(nod, sizes[k], accent.nuclear))
+            if raises_now:
                 raised = time
-                strength = 1.0 if accent.nuclear else brows["other"]
-                part = strength * (brows["least"] + (1.0 - brows["least"]) * sizes[k])
-                yield _raise(time, brows["most"] * part)
+                yield _raise(time, _size(brows, sizes[k], accent.nuclear))
             k += 1
+
+
+def _size(facts: Mapping[str, float], draw: float, nuclear: bool) -> float:
+    part = facts["least"] + (1.0 - facts["least"]) * draw
+    return facts["most"] * part * (1.0 if nuclear else facts["other"])
 
 
 def _nod(time: float, degrees: float) -> Gesture:

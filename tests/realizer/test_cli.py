@@ -194,6 +194,16 @@ def test_a_target_that_is_not_there_is_no_dropped_behaviour(tmp_path: Path) -> N
     assert "NO_SUCH_TARGET" in done.stderr
 
 
+def test_prosody_can_be_switched_off() -> None:
+    talk = '<bml id="b"><speech id="s"><text>Remember the tower</text></speech></bml>'
+    lively, still, wrong = (
+        run("realize", "-", "--voice", "silent", "--prosody", word, stdin=talk)
+        for word in ("on", "off", "some")
+    )
+    assert json.loads(lively.stdout)["au"] != json.loads(still.stdout)["au"]
+    assert wrong.returncode == 2
+
+
 def test_a_file_of_rules_that_cannot_be_read_is_wrong_usage(tmp_path: Path) -> None:
     (tmp_path / "rules.toml").write_text("[domination]\nrules = ['5<99']\n")
     done = run("realize", "-", "--cooccurrence", str(tmp_path / "rules.toml"), stdin=GOOD)

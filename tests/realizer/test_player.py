@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bml_schema import Block, parse
@@ -253,3 +253,70 @@ def test_however_often_it_is_asked_the_feedback_is_the_same(asked: list[float]) 
         return [f.to_xml() for now in times for f in player.due(now)]
 
     assert told([*sorted(asked), 100.0]) == told([100.0])
+
+
+# What a face moves by itself: brows, lids, head, eyes.
+OWN = ("1L", "1R", "2L", "2R", "45L", "45R", *map(str, range(51, 57)), *map(str, range(61, 65)))
+WORDS = "Whoever follows the river to the tower, will discover a little door."
+TALK = f'<speech id="t"><text>{WORDS}</text></speech>'
+
+
+def test_without_prosody_a_face_that_speaks_is_as_idle_as_one_that_is_silent() -> None:
+    times = np.arange(0.0, 8.0, 0.04)
+    own = np.array([name in OWN for name in AU_NAMES()])
+    silent, still, lively = Player(seed=4), Player(seed=4, prosody=False), Player(seed=4)
+    submit(still, TALK)
+    submit(lively, TALK)
+    np.testing.assert_array_equal(still.frames(times).aus[:, own], silent.frames(times).aus[:, own])
+    assert not np.array_equal(lively.frames(times).aus[:, own], silent.frames(times).aus[:, own])
+
+
+def test_without_idle_motion_there_is_no_prosody() -> None:
+    times = np.arange(0.0, 8.0, 0.04)
+    one, other = Player(idle=False), Player(idle=False, prosody=False)
+    submit(one, TALK)
+    submit(other, TALK)
+    np.testing.assert_array_equal(one.frames(times).values, other.frames(times).values)
+
+
+def test_a_face_that_keeps_still_does_so_while_it_speaks() -> None:
+    times = np.arange(0.2, 8.0, 0.04)
+    still = '<own:idle id="i" blinks="0" motion="0" start="0" end="0.1"/>'
+    player = Player()
+    submit(player, still + TALK, "b", 'xmlns:own="urn:bml-realizer:1"')
+    own = [AU_NAMES().index(name) for name in OWN]
+    assert player.frames(times).aus[:, own].max() == 0.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_nod_that_a_document_asks_for_is_the_same_while_the_face_speaks(seed: int) -> None:
+    nod = '<head id="n" lexeme="NOD" start="1.5" end="3"/>'
+    lively, still = Player(seed=seed), Player(seed=seed, prosody=False)
+    for player in (lively, still):
+        submit(player, TALK + nod)
+    heads = [AU_NAMES().index(str(number)) for number in range(51, 57)]
+    during = np.arange(1.5, 3.001, 0.02)
+    shown, wanted = (p.frames(during).aus[:, heads] for p in (lively, still))
+    np.testing.assert_array_equal(shown, wanted)
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 1000), st.lists(st.floats(0.0, 12.0), min_size=1, max_size=3), st.floats(0.0, 12.0))
+def test_a_face_that_is_looked_at_as_it_speaks_moves_as_one_that_is_played_back(
+    seed: int, starts: list[float], nod: float
+) -> None:
+    """Blocks that have ended are forgotten by and by; what was shown and what comes stay what they are."""
+    live, played = Player(seed=seed), Player(seed=seed, history=float("inf"))
+    todo = sorted([(start, TALK) for start in starts] + [(nod, '<head id="n" lexeme="NOD"/>')])
+    own = [AU_NAMES().index(name) for name in OWN]
+    seen = []
+    times = np.arange(0.0, 26.0, 0.16)
+    for number, now in enumerate(times):
+        while todo and todo[0][0] <= now:
+            _, content = todo.pop(0)
+            for player in (live, played):
+                submit(player, content, f"b{number}-{len(todo)}", now=float(now))
+        for player in (live, played):
+            player.due(float(now))
+        seen.append(live.frames(np.array([now])).aus[0, own])
+    np.testing.assert_array_equal(np.array(seen), played.frames(times).aus[:, own])

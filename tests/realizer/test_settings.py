@@ -51,6 +51,7 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
         ("fps", "0"),
         ("fps", "fast"),
         ("idle", "maybe"),
+        ("prosody", "loud"),
         ("face", ""),
         ("media", "no/such/folder"),
         ("max_blocks", "-1"),
@@ -62,8 +63,9 @@ def test_what_cannot_be_is_refused_with_what_was_wanted(name: str, value: str) -
 
 
 def test_words_of_the_environment_become_what_they_mean() -> None:
-    words = {"IDLE": "off", "SEED": "7", "SCENE": "a/b", "VOICE": ""}
+    words = {"IDLE": "off", "PROSODY": "off", "SEED": "7", "SCENE": "a/b", "VOICE": ""}
     words |= {"ASAP_PORTS": "7500, 7501", "STOMP": "[::1]:61613", "STOMP_VHMSG": ""}
     settings = Settings.read(environment={f"REALIZER_{name}": word for name, word in words.items()})
     assert (settings.asap_ports, settings.stomp, settings.stomp_vhmsg) == ((7500, 7501), "[::1]:61613", None)
     assert (settings.idle, settings.seed, settings.scene, settings.voice) == (False, 7, Path("a/b"), None)
+    assert not settings.prosody
