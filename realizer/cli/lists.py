@@ -21,6 +21,7 @@ def outputs() -> None:
     """List what `realize -o` can write, by suffix."""
     from realizer.outputs import OUTPUTS
 
+    width, kinds = (max(map(len, column)) for column in (OUTPUTS, (o.media_type for o in OUTPUTS.values())))
     for suffix, output in sorted(OUTPUTS.items()):
         needs = f"  (needs bml-realizer[{output.needs}])" if output.needs else ""
-        click.echo(f"{suffix:<6} {output.media_type:<18} {output.says}{needs}")
+        click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.says}{needs}")

@@ -10,7 +10,7 @@ from realizer.outputs.output import Drawing, Output
 
 __all__ = ["OUTPUTS", "Drawing", "Output", "output_for"]
 
-MODULES = ("fap_text", "json_text", "csv_table", "vtt", "wav", "png", "film")
+MODULES = ("fap_text", "json_text", "csv_table", "vtt", "wav", "png", "film", "arkit_csv")
 
 OUTPUTS: Mapping[str, Output] = {
     output.suffix: output for name in MODULES for output in import_module(f"realizer.outputs.{name}").OUTPUTS
@@ -18,12 +18,13 @@ OUTPUTS: Mapping[str, Output] = {
 
 
 def output_for(path: str | Path) -> Output:
-    """The encoding of a path's suffix, either case.
+    """The encoding of a path's suffix, either case; the longest that fits: `x.arkit.csv` is no `.csv`.
 
     Raises:
         ValueError: no or an unknown suffix; the text lists the known ones.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in OUTPUTS:
-        raise ValueError(f"{path}: wanted a suffix of {' '.join(OUTPUTS)}, got {suffix or 'none'}")
-    return OUTPUTS[suffix]
+    parts = [part.lower() for part in Path(path).suffixes]
+    for k in range(len(parts)):
+        if "".join(parts[k:]) in OUTPUTS:
+            return OUTPUTS["".join(parts[k:])]
+    raise ValueError(f"{path}: wanted a suffix of {' '.join(OUTPUTS)}, got {parts[-1] if parts else 'none'}")

@@ -1,0 +1,190 @@
+"""AUFrames in, the 52 weights of ARKit's blend shapes and the turns of head and eyes out."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames
+from realizer.animation.mapping import FapMapping
+from realizer.animation.targets import AU_NAMES, axis, presence
+from realizer.arrays import Float32, Float64
+from realizer.tables import faps, read_csv, text_of
+from realizer.units import ANGLE_UNIT
+
+__all__ = ["ARKIT_NAMES", "ArkitFrames", "arkit", "arkit_faps"]
+
+# About how many millimetres a unit is on a grown-up's face; of an angle, on an eyeball of 12 mm.
+MILLIMETRES = {
+    "none": 0.0, "MNS": 0.022, "MW": 0.05, "ENS": 0.044, "ES": 0.06, "IRISD": 0.011, "angle_unit": 1.2e-4,
+}  # fmt: skip
+# Of the head and the tongue inside the mouth no shape tells; what is dilated or stretched there neither.
+UNTOLD = (29, 30, 43, 44, 46, 47, 48, 49, 50)
+RIDGE = 0.15  # mm^2: of two ways to the same face, the one nearer to what the action units say
+STEPS, NEAR = 400, 1e-4
+RELAXED = 1.6  # over 1: faster
+JAW = (3, 14, 15)
+CLOSE, OPEN = "mouthClose", "jawOpen"
+CHUNK = 4096  # frames at once
+
+
+@dataclass(frozen=True, slots=True)
+class _Slide:
+    name: str
+    fap: int
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class ArkitFrames:
+    """What an ARKit head is moved by.
+
+    Attributes:
+        times: (n,) float64 seconds.
+        weights: (n, 52) float32, 0..1; columns as `ARKIT_NAMES()`.
+        head: (n, 3) float32 radians: yaw to the character's left, pitch down, roll to its right.
+        eyes: (n, 2, 2) float32 radians: left and right eye; yaw to the character's left, pitch down.
+    """
+
+    times: Float64
+    weights: Float32
+    head: Float32
+    eyes: Float32
+
+
+@cache
+def ARKIT_NAMES() -> tuple[str, ...]:
+    """ARKit's names of its 52 shapes, such as "jawOpen", alphabetically."""
+    from realizer.face.arkit.names import shapes
+
+    return tuple(sorted(shapes()))
+
+
+def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
+    """The weights that show what the frames show, each frame by itself.
+
+    Shapes that are action units get these (`arkit.csv`), as far as speech leaves them the lips. What they do
+    not tell (speech, FAPs of clients, action units without a shape) is what remains of the FAPs: the weights
+    within 0..1 are sought that come nearest to it in millimetres at the feature points, by least squares with
+    a ridge towards the weights of the action units. There is one minimum; the alternating direction method of
+    multipliers (Boyd et al. 2011, 5.2) finds it for all frames at once.
+
+    Args:
+        frames: n frames.
+        mapping: what AUs ask of FAPs; None is the one that ships.
+    """
+    whole = to_fap(frames, mapping).values
+    columns, share, owned = _from_aus(mapping)
+    lips = frames.values[:, presence("lips").column, None]
+    moving = frames.moving.T
+    first = moving @ share * (1 - owned * lips)
+    told = frames.values.copy()
+    told[:, : len(AU_NAMES()) + 68] = 0
+    told[:, columns] = moving[:, columns]
+    rest = whole - to_fap(AUFrames(frames.times, told, held=frames.held), mapping).values
+    weights = np.empty((len(whole), len(ARKIT_NAMES())), np.float32)
+    for start in range(0, len(whole), CHUNK):
+        part = slice(start, start + CHUNK)
+        weights[part] = _nearest(first[part].astype(np.float64), rest[part], mapping)
+    turns = whole * np.float32(ANGLE_UNIT)
+    return ArkitFrames(
+        frames.times,
+        weights,
+        np.ascontiguousarray(turns[:, [48, 47, 49]]),
+        np.stack([turns[:, [22, 24]], turns[:, [23, 25]]], axis=1),
+    )
+
+
+def arkit_faps(weights: Float32, mapping: FapMapping | None = None) -> Float32:
+    """The way back: (n, 68) FAPs, in FAPU, that weights (n, 52) amount to; the head's are 0."""
+    return np.asarray(weights @ _effects(mapping), np.float32)
+
+
+def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float64:
+    """(n, 52) within 0..1, nearest to what `first` shows and `rest` besides."""
+    moves, scale, inverse, rho = _system(mapping)
+    first = np.clip(first, 0, 1)
+    aim = rest * scale @ moves.T
+    out = first.copy()
+    # Where nothing is left to tell, not a bit changes.
+    busy = np.flatnonzero(np.abs(aim).max(axis=1, initial=0) > 1e-9)
+    low, high, aim = -first[busy], 1 - first[busy], aim[busy]
+    change, dual = np.zeros_like(aim), np.zeros_like(aim)
+    for _ in range(STEPS):
+        free = (aim + rho * (change - dual)) @ inverse
+        free = RELAXED * free + (1 - RELAXED) * change
+        before, change = change, np.clip(free + dual, low, high)
+        dual += free - change
+        if max(np.abs(change - before).max(initial=0), np.abs(free - change).max(initial=0)) < NEAR:
+            break
+    out[busy] = np.clip(first[busy] + change, 0, 1)
+    return out
+
+
+@cache
+def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, float]:
+    """Moves (52, 68) in millimetres of each shape; scale (68,); what `_nearest` divides by, and its rho."""
+    scale = np.array([0.0 if row.fap in UNTOLD else MILLIMETRES[row.unit] for row in faps()])
+    moves = _effects(mapping) * scale
+    square = moves @ moves.T + RIDGE * np.eye(len(moves))
+    sizes = np.linalg.eigvalsh(square)
+    rho = float(np.sqrt(sizes[0] * sizes[-1]))
+    return moves, scale, np.linalg.inv(square + rho * np.eye(len(square))), rho
+
+
+@cache
+def _from_aus(mapping: FapMapping | None) -> tuple[list[int], Float32, Float32]:
+    """The AUs that shapes show, what each adds to each shape (n_au, 52), and what speech owns of a shape."""
+    from realizer.face.arkit.names import shapes
+
+    share = np.zeros((len(AU_NAMES()), len(ARKIT_NAMES())), np.float32)
+    for k, name in enumerate(ARKIT_NAMES()):
+        for column in _columns(shapes()[name].au, shapes()[name].side):
+            # A shape of both sides shows the mean of them.
+            share[column, k] = 1 / len(_columns(shapes()[name].au, shapes()[name].side))
+    effects = np.abs(_effects(mapping)) * [MILLIMETRES[row.unit] for row in faps()]
+    own = np.array([row.speech_owns for row in faps()])
+    size = effects.sum(axis=1)
+    return (
+        np.flatnonzero(share.any(axis=1)).tolist(),
+        share,
+        np.divide(effects @ own, size, out=np.zeros_like(size), where=size > 0).astype(np.float32),
+    )
+
+
+def _columns(au: int, side: str) -> list[int]:
+    """The columns of an action unit that a shape of that side shows; none of AU 0."""
+    names = [f"{au}", f"{au}{side}"] if side else [f"{au}", f"{au}L", f"{au}R"]
+    return [axis()[name].column for name in names if name in AU_NAMES()]
+
+
+@cache
+def _beside(side: str) -> Float32:
+    """(68,) how much of a FAP a shape of that side moves: all of its own, half of the middle's."""
+    sides = [re.search(r"_([lr])m?(_|$)", row.name) for row in faps()]
+    return np.array([0.5 if found is None else found[1] == side.lower() for found in sides], np.float32)
+
+
+@cache
+def _effects(mapping: FapMapping | None) -> Float32:
+    """(52, 68) FAPU: what each shape at weight 1 does, as the mapping has it of its action unit."""
+    from realizer.face.arkit.names import shapes
+
+    names = ARKIT_NAMES()
+    values = np.zeros((len(names), len(axis())), np.float32)
+    for row, name in zip(values, names, strict=True):
+        row[_columns(shapes()[name].au, shapes()[name].side)] = shapes()[name].intensity
+    effects = to_fap(AUFrames(np.zeros(len(names)), values), mapping).values
+    for k, name in enumerate(names):
+        if shapes()[name].side:
+            effects[k] *= _beside(shapes()[name].side)
+    for slide in read_csv(text_of("arkit_slides.csv"), _Slide, "arkit_slides.csv"):
+        effects[names.index(slide.name), slide.fap - 1] = slide.value
+    lips = -effects[names.index(OPEN)]
+    lips[[fap - 1 for fap in JAW]] = 0
+    effects[names.index(CLOSE)] = lips
+    return effects

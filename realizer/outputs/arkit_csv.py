@@ -1,0 +1,72 @@
+"""A realization as ARKit's weights (.arkit.csv): a row a frame, in the layout of the app Live Link Face."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realizer.outputs.arkit import ARKIT_NAMES, ArkitFrames, arkit
+from realizer.outputs.files import write_text
+from realizer.outputs.output import Drawing, Output
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["COLUMNS", "OUTPUTS", "encode_arkit_csv", "write_arkit_csv"]
+
+_EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
+# In the order of the app's files.
+SHAPES = (
+    *(f"Eye{word}{side}" for side in ("Left", "Right") for word in _EYE),
+    *(f"Jaw{word}" for word in ("Forward", "Right", "Left", "Open")),
+    *(f"Mouth{word}" for word in ("Close", "Funnel", "Pucker", "Right", "Left")),
+    *(f"Mouth{word}{side}" for word in ("Smile", "Frown", "Dimple", "Stretch") for side in ("Left", "Right")),
+    *(f"Mouth{word}{lip}" for word in ("Roll", "Shrug") for lip in ("Lower", "Upper")),
+    *(f"Mouth{word}{side}" for word in ("Press", "LowerDown", "UpperUp") for side in ("Left", "Right")),
+    *("BrowDownLeft", "BrowDownRight", "BrowInnerUp", "BrowOuterUpLeft", "BrowOuterUpRight"),
+    *("CheekPuff", "CheekSquintLeft", "CheekSquintRight", "NoseSneerLeft", "NoseSneerRight", "TongueOut"),
+)
+TURNS = tuple(
+    f"{part}{turn}" for part in ("Head", "LeftEye", "RightEye") for turn in ("Yaw", "Pitch", "Roll")
+)
+COLUMNS = ("Timecode", "BlendShapeCount", *SHAPES, *TURNS)
+
+
+def encode_arkit_csv(frames: ArkitFrames, fps: float) -> str:
+    """The text: `HH:MM:SS:FF.fff` at `fps`, 61, weights 0..1, turns in radians.
+
+    Yaw goes to the character's left, pitch down, roll to its right, as ARKit's pose of a face that is not
+    mirrored comes out of Unreal. Eyes do not roll.
+    """
+    order = [ARKIT_NAMES().index(name[0].lower() + name[1:]) for name in SHAPES]
+    eyes = np.pad(frames.eyes, ((0, 0), (0, 0), (0, 1))).reshape(len(frames.times), 6)
+    rows = np.concatenate([frames.weights[:, order], frames.head, eyes], axis=1) + 0.0  # no -0
+    buffer = io.StringIO()
+    table = csv.writer(buffer, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for time, row in zip(frames.times.tolist(), rows.tolist(), strict=True):
+        table.writerow([_timecode(time, fps), len(row), *(f"{value:.6f}" for value in row)])
+    return buffer.getvalue()
+
+
+def write_arkit_csv(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """The first character's frames."""
+    write_text(path, encode_arkit_csv(arkit(realization.aus, realization.mapping), realization.fps))
+
+
+def _timecode(seconds: float, fps: float) -> str:
+    thousandths = round(seconds * 1000 * fps)  # of a frame
+    whole, rest = divmod(thousandths, round(1000 * fps))
+    return f"{whole // 3600:02}:{whole // 60 % 60:02}:{whole % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
+
+
+OUTPUTS = (
+    Output(
+        ".arkit.csv", "text/csv", "a row a frame: ARKit's 52 weights as Live Link Face writes them",
+        write_arkit_csv,
+    ),
+)  # fmt: skip

@@ -1,0 +1,161 @@
+"""ARKit's weights: what they say of a face, and the file that Live Link Face would write."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from realizer.animation.frames import AUFrames
+from realizer.animation.targets import AU_NAMES, axis, fap
+from realizer.outputs import OUTPUTS, Drawing, output_for
+from realizer.outputs.arkit import ARKIT_NAMES, arkit, arkit_faps
+from realizer.pipeline import realize
+from realizer.tables import faps
+
+SAYS = "Hello my beautiful world, four blue boats have a very good view of the sea."
+SPEECH = (
+    '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
+    f'<speech id="s"><text>{SAYS}</text></speech></bml>'
+)
+# The header of the app's files, as it stands in recordings.
+HEADER = (
+    "Timecode,BlendShapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,EyeLookUpLeft,"
+    "EyeSquintLeft,EyeWideLeft,EyeBlinkRight,EyeLookDownRight,EyeLookInRight,EyeLookOutRight,EyeLookUpRight,"
+    "EyeSquintRight,EyeWideRight,JawForward,JawRight,JawLeft,JawOpen,MouthClose,MouthFunnel,MouthPucker,"
+    "MouthRight,MouthLeft,MouthSmileLeft,MouthSmileRight,MouthFrownLeft,MouthFrownRight,MouthDimpleLeft,"
+    "MouthDimpleRight,MouthStretchLeft,MouthStretchRight,MouthRollLower,MouthRollUpper,MouthShrugLower,"
+    "MouthShrugUpper,MouthPressLeft,MouthPressRight,MouthLowerDownLeft,MouthLowerDownRight,MouthUpperUpLeft,"
+    "MouthUpperUpRight,BrowDownLeft,BrowDownRight,BrowInnerUp,BrowOuterUpLeft,BrowOuterUpRight,CheekPuff,"
+    "CheekSquintLeft,CheekSquintRight,NoseSneerLeft,NoseSneerRight,TongueOut,HeadYaw,HeadPitch,HeadRoll,"
+    "LeftEyeYaw,LeftEyePitch,LeftEyeRoll,RightEyeYaw,RightEyePitch,RightEyeRoll"
+)
+UNITS = {"MNS": 0.022, "MW": 0.05, "ENS": 0.044, "IRISD": 0.011}  # about how many mm
+
+
+def one(**shown: float) -> AUFrames:
+    values = np.zeros((1, len(axis())), np.float32)
+    for name, value in shown.items():
+        values[0, axis()[name.removeprefix("AU")].column] = value
+    return AUFrames(np.zeros(1), values)
+
+
+def weights(frames: AUFrames) -> dict[str, float]:
+    return dict(zip(ARKIT_NAMES(), arkit(frames).weights[0].tolist(), strict=True))
+
+
+def seen(frames: AUFrames) -> dict[str, float]:
+    return {name: weight for name, weight in weights(frames).items() if weight > 0.02}
+
+
+@pytest.fixture(scope="module")
+def spoken():
+    return realize(SPEECH, idle=False, voice="silent")
+
+
+def test_a_face_at_rest_is_no_shape():
+    assert not arkit(one()).weights.any()
+
+
+@pytest.mark.parametrize(
+    ("shown", "wanted"),
+    [
+        ({"AU12L": 0.7}, {"mouthSmileLeft": 0.7}),
+        ({"AU6R": 0.5}, {"cheekSquintRight": 0.5}),
+        ({"AU1L": 0.4, "AU1R": 0.8}, {"browInnerUp": 0.6}),
+        ({"AU45L": 1.0}, {"eyeBlinkLeft": 1.0}),
+        ({"AU27": 0.5}, {"jawOpen": 0.5}),
+        ({"AU24": 0.6}, {"mouthPressLeft": 0.6, "mouthPressRight": 0.6}),
+    ],
+)
+def test_an_action_unit_with_a_shape_is_that_shape(shown, wanted):
+    assert seen(one(**shown)) == pytest.approx(wanted, abs=0.01)
+
+
+def test_an_action_unit_without_a_shape_is_shown_by_those_that_come_nearest():
+    dropped = seen(one(AU26=1.0))
+    assert 0.4 < dropped["jawOpen"] < 0.7  # the jaw falls half as far as at its widest
+    closed = seen(one(AU43L=1.0))
+    assert closed["eyeBlinkLeft"] > 0.95
+
+
+def test_eyes_and_head_turn_as_the_faps_say():
+    values = one().values.copy()
+    for number, angle in ((23, 0.2), (24, 0.2), (25, -0.1), (26, -0.1), (48, 0.3), (49, -0.2), (50, 0.1)):
+        values[0, fap(number).column] = angle * 1e5
+    found = arkit(AUFrames(np.zeros(1), values))
+    np.testing.assert_allclose(found.head, [[-0.2, 0.3, 0.1]], atol=1e-5)
+    np.testing.assert_allclose(found.eyes, [[[0.2, -0.1], [0.2, -0.1]]], atol=1e-5)
+    shown = dict(zip(ARKIT_NAMES(), found.weights[0].tolist(), strict=True))
+    assert shown["eyeLookOutLeft"] > 0.2  # to the character's left
+    assert shown["eyeLookInRight"] > 0.2
+    assert shown["eyeLookUpLeft"] > 0.1
+    assert shown["eyeLookInLeft"] == shown["eyeLookOutRight"] == shown["eyeLookDownLeft"] == 0
+
+
+def test_speech_that_goes_out_and_comes_back_has_nearly_the_same_faps(spoken):
+    back = arkit_faps(arkit(spoken.aus, spoken.mapping).weights, spoken.mapping)
+    scale = np.array([UNITS.get(row.unit, 0.0) for row in faps()])
+    wanted, off = spoken.faps.values * scale, (back - spoken.faps.values) * scale
+    mouth = [row.fap - 1 for row in faps() if row.group in (2, 8) and row.fap not in (14, 15)]
+    assert np.abs(wanted[:, 2]).max() > 3  # mm: the jaw moves
+    assert np.abs(off[:, 2]).max() < 0.2
+    # Half a millimetre at the points of the mouth, which move by five.
+    assert np.sqrt((off[:, mouth] ** 2).mean()) < 0.5
+    assert np.abs(off[:, mouth]).max() < 2
+    inner = [3, 4, 7, 8, 9, 10]
+    assert np.sqrt((off[:, inner] ** 2).mean()) < 0.2 * np.abs(wanted[:, inner]).max()
+
+
+def test_the_lips_leave_a_smile_as_far_as_speech_has_them(spoken):
+    values = spoken.aus.values.copy()
+    values[:, [AU_NAMES().index("12L"), AU_NAMES().index("12R")]] = 1
+    smiling = arkit(AUFrames(spoken.aus.times, values), spoken.mapping).weights
+    column = ARKIT_NAMES().index("mouthSmileLeft")
+    lips = values[:, axis()["lips"].column]
+    assert smiling[lips == 0, column].min() > 0.99
+    assert 0.1 < smiling[lips > 0.9, column].mean() < 0.9
+
+
+def test_weights_are_of_their_frame_alone(spoken):
+    whole = arkit(spoken.aus, spoken.mapping).weights
+    alone = [
+        arkit(AUFrames(spoken.aus.times[k : k + 1], spoken.aus.values[k : k + 1]), spoken.mapping).weights[0]
+        for k in (0, 20, 40)
+    ]
+    np.testing.assert_allclose(alone, whole[[0, 20, 40]], atol=2e-3)
+    assert whole.min() >= 0
+    assert whole.max() <= 1
+
+
+def test_the_file_has_the_columns_of_live_link_face(spoken, tmp_path):
+    path = tmp_path / "Take.ARKit.csv"
+    output = output_for(path)
+    assert output is OUTPUTS[".arkit.csv"]
+    output.write(spoken, path, Drawing())
+    reader = csv.DictReader(io.StringIO(path.read_text("utf-8")))
+    rows = list(reader)
+    assert ",".join(reader.fieldnames) == HEADER
+    assert len(rows) == spoken.frames
+    assert {row["BlendShapeCount"] for row in rows} == {"61"}
+    assert [row["Timecode"] for row in rows[:2]] == ["00:00:00:00.000", "00:00:00:01.000"]
+    assert rows[30]["Timecode"] == "00:00:01:05.000"
+    found = arkit(spoken.aus, spoken.mapping).weights
+    for name in ("jawOpen", "mouthFunnel", "mouthSmileRight"):
+        column = [float(row[name[0].upper() + name[1:]]) for row in rows]
+        np.testing.assert_allclose(column, found[:, ARKIT_NAMES().index(name)], atol=1e-6)
+
+
+def test_a_rate_that_is_no_whole_number_has_timecodes_that_go_up(tmp_path):
+    quiet = realize(SPEECH, idle=False, voice="silent", fps=29.97)
+    OUTPUTS[".arkit.csv"].write(quiet, tmp_path / "x.arkit.csv", Drawing())
+    codes = [line.split(",")[0] for line in (tmp_path / "x.arkit.csv").read_text().splitlines()[1:]]
+    assert codes == sorted(codes)
+    assert len(set(codes)) == len(codes) == quiet.frames
+
+
+def test_other_csv_files_are_what_they_were():
+    assert output_for("x.csv") is OUTPUTS[".csv"]
+    assert output_for("my.take.csv") is OUTPUTS[".csv"]
