@@ -63,7 +63,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
         return ()
     first, last = phonemes[0].start, max(phonemes[-1].end, phonemes[0].start + 2 / facts["rate"])
     times = np.linspace(first, last, int(np.ceil((last - first) * facts["rate"])) + 1)
-    taken = _presence(track, times, facts["pauses"])
+    taken = _presence(track, times, facts)
     mouth = _dominance(track, times, facts) * taken[:, None]
     _constrain(mouth, track, times, taken, facts)
     mouth[[0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
@@ -112,19 +112,32 @@ def _track(phonemes: Sequence[Phoneme], facts: dict[str, Any]) -> Track | None:
     )
 
 
-def _presence(track: Track, times: Float64, pauses: dict[str, float]) -> Float64:
-    """(n,) 0..1: how far speech has the lips; 0 at the ends and in long pauses."""
+def _presence(track: Track, times: Float64, facts: dict[str, Any]) -> Float64:
+    """(n,) 0..1: how far speech has the lips; 0 at the ends and in long pauses.
+
+    Whole from the first sound that closes the lips to the last: an expression would part them.
+    """
+    pauses = facts["pauses"]
     ends = np.zeros(len(track.rest), bool)
     ends[[0, -1]] = True
     let_go = track.rest & (ends | (track.end - track.begin > pauses["released"]))
+    middle = (track.begin + track.end) / 2
+    closing = track.mix[:, list(facts["closure"]["visemes"])].sum(axis=1) > 0.5
+    half = np.maximum(facts["closure"]["hold"], track.end - track.begin) / 2
     taken = np.zeros(len(times))
     for run in np.split(np.arange(len(let_go)), np.flatnonzero(np.diff(let_go)) + 1):
         if let_go[run[0]]:
             continue
         rise = max(times[0], track.begin[run[0]] - pauses["attack"])
         fall = min(times[-1], track.end[run[-1]] + pauses["release"])
-        up = _smoothstep((times - rise) / min(pauses["attack"], (fall - rise) / 2))
-        down = _smoothstep((fall - times) / min(pauses["release"], (fall - rise) / 2))
+        attack, release = (min(pauses[name], (fall - rise) / 2) for name in ("attack", "release"))
+        shut = run[closing[run]]
+        if len(shut):
+            before = middle[shut[0]] - half[shut[0]] - rise
+            after = fall - middle[shut[-1]] - half[shut[-1]]
+            attack = max(min(attack, before), pauses["least"])
+            release = max(min(release, after), pauses["least"])
+        up, down = _smoothstep((times - rise) / attack), _smoothstep((fall - times) / release)
         taken = np.maximum(taken, np.minimum(up, down))
     return taken
 
@@ -172,8 +185,7 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     shapes, _ = shape_table()
     column = {name: k for k, name in enumerate(SHAPE)}
     pad = facts["articulators"]["lips"]["smooth"]
-    closed = _held(track, BILABIAL, times, facts["closure"]["hold"], pad)
-    bitten = _held(track, LABIODENTAL, times, facts["closure"]["hold"], pad)
+    closed, bitten = _held(track, times, facts["closure"], pad)
     upper, lower, jaw = mouth[:, column["upper"]], mouth[:, column["lower"]], mouth[:, column["jaw"]]
     speed = facts["speed"]["lips"]
     # The upper lip clears the teeth for f v: raised where it is lower, then lowered wherever p b m close.
@@ -197,17 +209,31 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     lower[:] = np.maximum(lower, least - upper)
 
 
-def _held(track: Track, viseme: int, times: Float64, hold: float, pad: float) -> Bool:
-    """(n,) whether a closing sound holds the lips at each time."""
-    which = track.mix[:, viseme] > 0.5
-    if not which.any():
-        return np.zeros(len(times), bool)
-    middle = (track.begin[which] + track.end[which]) / 2
-    half = np.maximum(hold, track.end[which] - track.begin[which] - 2 * pad) / 2 + pad
-    opens = np.searchsorted(np.sort(middle - half), times, "right")
-    closes = np.searchsorted(np.sort(middle + half), times, "left")
-    held: Bool = opens > closes
-    return held
+def _held(track: Track, times: Float64, closure: dict[str, Any], pad: float) -> tuple[Bool, Bool]:
+    """(n,) each: whether a sound that closes the lips, or bites the lower one, holds them at each time.
+
+    Two different ones that stand close together part as far as a frame allows, and share what is between.
+    """
+    which = np.flatnonzero(track.mix[:, [BILABIAL, LABIODENTAL]].max(axis=1) > 0.5)
+    bites = track.mix[which, LABIODENTAL] > 0.5
+    length = (track.end - track.begin)[which]
+    middle = (track.begin + track.end)[which] / 2
+    differ = np.flatnonzero(bites[1:] != bites[:-1])
+    near = np.clip((closure["apart"] - np.diff(middle)[differ]) / 2, 0.0, closure["moved"])
+    np.subtract.at(middle, differ, near)
+    np.add.at(middle, differ + 1, near)
+    half = np.maximum(closure["hold"], length - 2 * pad) / 2 + pad
+    opens, closes = middle - half, middle + half
+    for k in differ:
+        if closes[k] > opens[k + 1]:
+            # Lips that part need time, which the closure gives: pressed lips are closed for longer.
+            border = (closes[k] + opens[k + 1]) / 2 + (1 if bites[k] else -1) * closure["gives"]
+            closes[k], opens[k + 1] = max(border, opens[k]), min(border, closes[k + 1])
+    held = np.zeros((2, len(times)), bool)
+    for row, mine in zip(held, (~bites, bites), strict=True):
+        begun = np.searchsorted(np.sort(opens[mine]), times, "right")
+        row[:] = begun > np.searchsorted(np.sort(closes[mine]), times, "left")
+    return held[0], held[1]
 
 
 def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
