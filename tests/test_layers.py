@@ -123,6 +123,17 @@ MAY: dict[str, set[str]] = {
         "realizer.speech",
         "realizer.tables",
     },
+    "realizer.checking": VALUES
+    | {
+        "bml_schema",
+        "realizer.behaviours",
+        "realizer.checking",
+        "realizer.pipeline",
+        "realizer.player",
+        "realizer.scheduling.timing",
+        "realizer.speech",
+        "realizer.tables",
+    },
     "realizer.client": VALUES | {"bml_schema", "realizer.server.wire", "realizer.server.messages"},
     "realizer.server": {"*"},
     "realizer.cli": {"*"},

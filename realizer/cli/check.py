@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +17,6 @@ from realizer.cli.timeline import advice_on, faults_in, is_timeline
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bml_schema import Behaviour, Block
-    from realizer.player import Player
-    from realizer.scheduling.timing import Schedule, Warning
-    from realizer.speech.utterance import Utterance
     from realizer.tables.knowledge import Mood, Role
 
 __all__: list[str] = []
@@ -64,16 +59,11 @@ def check(
     that last, follow each other or go with words otherwise than people's do, as who talks or listens.
     A .toml or .json file is a timeline (`realizer timeline`).
     """
-    from bml_schema import Block, read
     from bml_schema.source import Source
-    from realizer.behaviours import VOCABULARY
-    from realizer.cli.advice import advice
-    from realizer.cli.diagnostics import Finding, one_line, render
-    from realizer.cli.findings import finding_of
+    from realizer.checking import Finding, advice, checked
+    from realizer.cli.diagnostics import one_line, render
     from realizer.cli.habits import habits
-    from realizer.pipeline import speak, warning_of
     from realizer.player import Player
-    from realizer.speech import SilentVoice
 
     long = sys.stdout.isatty() if long is None else long
     width = shutil.get_terminal_size((100, 24)).columns
@@ -104,23 +94,16 @@ def check(
         )
         source = Source(text)
         blocks = found = 0
-        voice = SilentVoice()
-        for item in read(text, VOCABULARY):
-            if isinstance(item, Block):
-                blocks += 1
-                said = speak(player.wants(item), voice)
-                schedule, warnings = examine(item, player, said)
-            else:
-                schedule, warnings = None, [warning_of(item)]
-            found += len(warnings)
-            findings = [finding_of(name, source, warning, VOCABULARY) for warning in warnings]
-            for finding in sorted(findings, key=lambda finding: finding.spot or (0,)):
+        for part in checked(name, source, text, player):
+            blocks += part.block is not None
+            found += len(part.findings)
+            for finding in part.findings:
                 show(finding, source)
-            if isinstance(item, Block) and schedule is not None and not context.obj["quiet"]:
-                slips = advice(name, source, item, schedule, player)
-                unusual = habits(name, source, item, schedule, said, role, mood, lists)
+            if part.block is not None and part.schedule is not None and not context.obj["quiet"]:
+                slips = advice(name, source, part.block, part.schedule, player)
+                unusual = habits(name, source, part.block, part.schedule, part.said, role, mood, lists)
                 if context.obj["verbose"]:
-                    tell_unknown(lists, languages_in(item, lists), told_languages)
+                    tell_unknown(lists, languages_in(part.block, lists), told_languages)
                 for finding in islice(chain(slips, unusual), MOST_ADVICE):
                     show(finding, source, err=True)
         if not found and not context.obj["quiet"]:
@@ -144,51 +127,6 @@ def _check_timeline(
             click.echo(f"{name}: ADVICE {words}", err=True)
         click.echo(f"{name}: no fault in this timeline", err=True)
     return len(faults)
-
-
-def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tuple[Schedule, list[Warning]]:
-    """The schedule of a block, and everything that is wrong with it, also where one fault ends it all.
-
-    Args:
-        said: what the silent voice made of its speeches.
-    """
-    from dataclasses import replace
-
-    from realizer.pipeline import submitted
-    from realizer.scheduling.timing import Warning
-    from realizer.speech import SilentVoice
-
-    warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
-    world = replace(player.world, utterances=dict(said))
-    bad: set[str] = set()
-    for node in block.behaviours:
-        kind = player.kinds.get(node.tag)
-        faults = kind.check(node, world) if kind is not None else ()
-        where = block.places.get(node.id)
-        place = f"line {where.line}, {where.path}: " if where else ""
-        warnings += [Warning(f"{block.id}:{node.id}", fault.type, place + fault.text) for fault in faults]
-        if any(fault.fatal for fault in faults):
-            bad.add(node.id)
-    # What was told must not end the block before its constraints are looked at.
-    whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
-    schedule = submitted(player, whole, SilentVoice())
-    told = {(warning.id, warning.text) for warning in warnings}
-    return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
-
-
-def _loosened(block: Block, bad: set[str]) -> Iterator[Any]:
-    """The children of a block, with the bad behaviours of <required> outside of it."""
-    from dataclasses import replace
-
-    from bml_schema import Required
-
-    for child in block.children:
-        if not isinstance(child, Required):
-            yield child
-            continue
-        loose: list[Behaviour] = [c for c in child.children if getattr(c, "id", None) in bad]  # type: ignore[misc]
-        yield replace(child, children=tuple(c for c in child.children if c not in loose))
-        yield from loose
 
 
 def _coloured(stream: Any) -> bool:

@@ -10,52 +10,14 @@ from textwrap import wrap
 
 import click
 
-from bml_schema.source import Source, Spot
+from bml_schema.source import Source
+from realizer.checking.finding import Finding, Label
 
-__all__ = ["Finding", "Label", "one_line", "render"]
+__all__ = ["one_line", "render"]
 
 _TAB = 4  # columns, wherever the tab stands: what counts is that the mark is below the right character
 _CUT = "..."
 _LEAST = 20  # columns of source that are shown however narrow the terminal is
-
-
-@dataclass(frozen=True, slots=True)
-class Label:
-    """Words for a place; `primary` where the fault is, else for what it clashes with."""
-
-    spot: Spot
-    text: str = ""
-    primary: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A fault of a document, or advice.
-
-    Attributes:
-        file: as the user named it.
-        type: BML warning type, or "ADVICE".
-        id: of the block, "block:behaviour", or a constraint's.
-        path: of the element, "" where there is none.
-        text: all of it in one line.
-        head: the same where labels and notes tell the rest.
-        labels: the first primary one says the line and column of the whole.
-        notes: sentences below the source, such as "help: did you mean ...?".
-    """
-
-    file: str
-    type: str
-    id: str
-    path: str
-    text: str
-    head: str
-    labels: tuple[Label, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def spot(self) -> Spot | None:
-        first = next((label for label in self.labels if label.primary), None)
-        return first.spot if first else None
 
 
 def one_line(finding: Finding, text: str | None = None) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from bml_schema import Block, Speech
 from bml_schema.source import Source
-from realizer.cli.advice import ADVICE
-from realizer.cli.diagnostics import Finding, Label
+from realizer.checking.advice import ADVICE
+from realizer.checking.finding import Finding, Label
 from realizer.knowledge.advise import Seen, advise
 from realizer.knowledge.enrich import template_of
 from realizer.speech.words import words_in

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from bml_schema.scan import Element
 from bml_schema.source import Source
-from realizer.cli.diagnostics import Label
+from realizer.checking.finding import Label
 
 __all__ = ["Draft"]
 

@@ -11,8 +11,8 @@ import numpy as np
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, SyncRef
 from bml_schema.shape import local, shape_of
 from bml_schema.source import Source
-from realizer.cli.diagnostics import Finding, Label
-from realizer.cli.findings import near
+from realizer.checking.finding import Finding, Label
+from realizer.checking.findings import near
 
 if TYPE_CHECKING:
     from realizer.player import Player

@@ -12,9 +12,9 @@ from bml_schema import Block
 from bml_schema.scan import Element
 from bml_schema.shape import Attribute, local, shape_of
 from bml_schema.source import Source, Spot
-from realizer.cli.clashes import explain_clash
-from realizer.cli.diagnostics import Finding, Label
-from realizer.cli.draft import Draft
+from realizer.checking.clashes import explain_clash
+from realizer.checking.draft import Draft
+from realizer.checking.finding import Finding, Label
 from realizer.scheduling.timing import Warning
 
 __all__ = ["finding_of", "near"]

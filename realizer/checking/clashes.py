@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 from bml_schema.scan import Element
 from bml_schema.source import Spot
-from realizer.cli.diagnostics import Label
-from realizer.cli.draft import Draft
+from realizer.checking.draft import Draft
+from realizer.checking.finding import Label
 from realizer.scheduling.timing import Clause, Warning
 
 __all__ = ["explain_clash"]

@@ -1,0 +1,94 @@
+"""A document in, every fault of it out, block by block, also where one fault ends it all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from bml_schema import Behaviour, Block, Required, read
+from bml_schema.source import Source
+from realizer.behaviours import VOCABULARY
+from realizer.checking.finding import Finding
+from realizer.checking.findings import finding_of
+from realizer.pipeline import speak, submitted, warning_of
+from realizer.player import Player
+from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech import SilentVoice
+from realizer.speech.utterance import Utterance
+
+__all__ = ["Checked", "checked"]
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A block, or a stretch of text that is none, and its faults.
+
+    Attributes:
+        findings: in order of their places.
+        block, schedule: None where nothing could be read.
+        said: what the silent voice made of its speeches.
+    """
+
+    findings: tuple[Finding, ...]
+    block: Block | None = None
+    schedule: Schedule | None = None
+    said: Mapping[str, Utterance] = field(default_factory=dict)
+
+
+def checked(file: str, source: Source, text: bytes | str, player: Player) -> Iterator[Checked]:
+    """All blocks of a document, in order.
+
+    Args:
+        file: as the user named it.
+        source: of the text.
+        player: gets every block, so that later ones may refer to earlier ones.
+    """
+    voice = SilentVoice()
+    for item in read(text, VOCABULARY):
+        if isinstance(item, Block):
+            said = speak(player.wants(item), voice)
+            schedule, warnings = examine(item, player, said)
+            yield Checked(_explained(file, source, warnings), item, schedule, said)
+        else:
+            yield Checked(_explained(file, source, [warning_of(item)]))
+
+
+def _explained(file: str, source: Source, warnings: list[Warning]) -> tuple[Finding, ...]:
+    findings = [finding_of(file, source, warning, VOCABULARY) for warning in warnings]
+    return tuple(sorted(findings, key=lambda finding: finding.spot or (0,)))
+
+
+def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tuple[Schedule, list[Warning]]:
+    """The schedule of a block, and everything that is wrong with it, also where one fault ends it all.
+
+    Args:
+        said: what the silent voice made of its speeches.
+    """
+    warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
+    world = replace(player.world, utterances=dict(said))
+    bad: set[str] = set()
+    for node in block.behaviours:
+        kind = player.kinds.get(node.tag)
+        faults = kind.check(node, world) if kind is not None else ()
+        where = block.places.get(node.id)
+        place = f"line {where.line}, {where.path}: " if where else ""
+        warnings += [Warning(f"{block.id}:{node.id}", fault.type, place + fault.text) for fault in faults]
+        if any(fault.fatal for fault in faults):
+            bad.add(node.id)
+    # What was told must not end the block before its constraints are looked at.
+    whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
+    schedule = submitted(player, whole, SilentVoice())
+    told = {(warning.id, warning.text) for warning in warnings}
+    return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
+
+
+def _loosened(block: Block, bad: set[str]) -> Iterator[Any]:
+    """The children of a block, with the bad behaviours of <required> outside of it."""
+    for child in block.children:
+        if not isinstance(child, Required):
+            yield child
+            continue
+        loose: list[Behaviour] = [c for c in child.children if getattr(c, "id", None) in bad]  # type: ignore[misc]
+        yield replace(child, children=tuple(c for c in child.children if c not in loose))
+        yield from loose

@@ -1,0 +1,48 @@
+"""What is wrong with a document, or looks like it: words, the places they are about, what may help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bml_schema.source import Spot
+
+__all__ = ["Finding", "Label"]
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """Words for a place; `primary` where the fault is, else for what it clashes with."""
+
+    spot: Spot
+    text: str = ""
+    primary: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A fault of a document, or advice.
+
+    Attributes:
+        file: as the user named it.
+        type: BML warning type, or "ADVICE".
+        id: of the block, "block:behaviour", or a constraint's.
+        path: of the element, "" where there is none.
+        text: all of it in one line.
+        head: the same where labels and notes tell the rest.
+        labels: the first primary one says the line and column of the whole.
+        notes: sentences below the source, such as "help: did you mean ...?".
+    """
+
+    file: str
+    type: str
+    id: str
+    path: str
+    text: str
+    head: str
+    labels: tuple[Label, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def spot(self) -> Spot | None:
+        first = next((label for label in self.labels if label.primary), None)
+        return first.spot if first else None
