@@ -1,0 +1,125 @@
+"""Phonemes with their times in, how much each sound has to say at a time out: dominance functions.
+
+Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.animation.visemes import SHAPE, VISEMES, coarticulation, shape_table, sounds
+from realizer.arrays import Bool, Float64
+from realizer.speech.utterance import Phoneme
+
+__all__ = ["CLASSES", "Track", "dominances", "key_times", "track_of"]
+
+CLASSES = {"jaw": ("jaw",), "lips": ("upper", "lower"), "shape": SHAPE[3:7], "tongue": SHAPE[7:]}
+STRESS = {0: "none", 1: "primary", 2: "secondary"}
+
+Index = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The sounds of an utterance in order, without the short pauses between them.
+
+    Attributes:
+        begin, end: (m,) float64 seconds.
+        mix: (m, 15) float64, part of each viseme.
+        vowel: (m,) whether it is a vowel.
+        size: (m,) float64, how much of its shape it reaches.
+        rest: (m,) whether it is a pause.
+    """
+
+    begin: Float64
+    end: Float64
+    mix: Float64
+    vowel: Bool
+    size: Float64
+    rest: Bool
+
+
+def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
+    """The sounds of phonemes (in order, "" is a pause); None where nothing is said."""
+    facts = coarticulation()
+    rows: list[tuple[float, float, tuple[tuple[int, float], ...], bool, float]] = []
+    for phoneme in phonemes:
+        parts = sounds(phoneme.ipa)
+        if not parts:
+            if not rows or rows[-1][2] != ((0, 1.0),):
+                rows.append((phoneme.start, phoneme.end, ((0, 1.0),), False, 1.0))
+            else:  # two pauses are one
+                rows[-1] = (rows[-1][0], phoneme.end, *rows[-1][2:])
+            continue
+        at, length = phoneme.start, phoneme.end - phoneme.start
+        for part in parts:
+            size = facts["stress"][STRESS.get(phoneme.stress, "none")] if part.vowel else 1.0
+            rows.append((at, at + part.share * length, part.mix, part.vowel, size))
+            at += part.share * length
+    silent = ((0, 1.0),)
+    if all(row[2] in (silent, ()) for row in rows):
+        return None
+    # A short pause between sounds does not bring the mouth to rest; at the ends it always does.
+    inner = range(1, len(rows) - 1)
+    rows = [
+        row
+        for k, row in enumerate(rows)
+        if not (k in inner and row[2] == silent and row[1] - row[0] < facts["pauses"]["absorbed"])
+    ]
+    begin, end = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or reach to the middle of what was absorbed
+    mix = np.zeros((len(rows), VISEMES))
+    for k, row in enumerate(rows):
+        for viseme, amount in row[2]:
+            mix[k, viseme] = amount
+    return Track(
+        begin=np.concatenate((begin[:1], middle)),
+        end=np.concatenate((middle, end[-1:])),
+        mix=mix,
+        vowel=np.array([row[3] for row in rows]),
+        size=np.array([row[4] for row in rows]),
+        rest=np.array([row[2] == silent for row in rows]),
+    )
+
+
+def key_times(phonemes: Sequence[Phoneme]) -> Float64:
+    """(n,) seconds from the first phoneme to the last, at the rate of the table (at least two)."""
+    rate = coarticulation()["rate"]
+    first, last = phonemes[0].start, max(phonemes[-1].end, phonemes[0].start + 2 / rate)
+    return np.linspace(first, last, int(np.ceil((last - first) * rate)) + 1)
+
+
+def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, tuple[str, ...]]]:
+    """How much the sounds around each time have to say, for each class of articulators.
+
+    Yields:
+        Which sounds, (n, k); their parts, (n, k), which add to a little less than 1: the rest is the neutral
+        mouth's; the columns of `SHAPE` that the class moves.
+    """
+    facts = coarticulation()
+    rule = facts["dominance"]
+    length = np.maximum(track.end - track.begin, 1e-3)
+    base = np.where(track.vowel, rule["base_vowel"], rule["base_consonant"])
+    rate = base * (rule["length"] / length) ** rule["exponent"]
+    strength = np.where(track.vowel, rule["strength_vowel"], rule["strength_consonant"])
+    weight = (track.mix @ shape_table()[1]) * strength[:, None]
+    # A pause is at rest over its whole length but its edges; a sound is strongest in its middle part.
+    edge = np.where(track.rest, np.minimum(0.1, length / 3), length * (1 - rule["core"]) / 2)
+    core_begin, core_end = track.begin + edge, track.end - edge
+
+    # Sounds further away than `neighbours` add nothing that can be seen: a band, not a matrix.
+    band = np.arange(-rule["neighbours"], rule["neighbours"] + 1)
+    near = np.searchsorted(track.begin, times, "right")[:, None] - 1 + band
+    there = (near >= 0) & (near < len(length))
+    near = np.clip(near, 0, len(length) - 1)
+    before = rate[near] * np.maximum(core_begin[near] - times[:, None], 0)
+    after = rate[near] * np.maximum(times[:, None] - core_end[near], 0)
+
+    for column, (name, members) in enumerate(CLASSES.items()):
+        pace = facts["articulators"][name]
+        d = np.exp(-(pace["before"] * before + pace["after"] * after)) * weight[near, column] * there
+        yield near, d / (d.sum(1) + rule["rest"])[:, None], members
