@@ -21,10 +21,10 @@ from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Float32, Int16
+from realizer.arrays import Float32, Float64, Int16
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
-from realizer.composition.playing import Speaking
+from realizer.composition.playing import HUSH, Speaking
 from realizer.errors import RealizerError, VoiceError
 from realizer.mapping import mapping_of
 from realizer.player import Player
@@ -127,6 +127,26 @@ class Realization:
 
         return poses(self.aus, takes(self.face_name, deformer=self.deformer), self.mapping)
 
+    def visemes(self, character: int = 0) -> Float64:
+        """(n, 15) float64: how much of each MPEG-4 viseme a character says; column 0 is none, rows add to 1.
+
+        Args:
+            character: its place in `characters`.
+        """
+        from realizer.animation.viseme_weights import viseme_weights
+        from realizer.animation.visemes import lip_shapes
+
+        times = self.aus.times
+        weights = np.eye(1, len(lip_shapes())).repeat(len(times), axis=0)
+        for speaking in self.speaking:
+            if speaking.character == character:
+                said = viseme_weights(speaking.utterance.phonemes, times - speaking.start)
+                left = np.clip(1 - (times - speaking.until) / HUSH, 0, 1)
+                weights[:, 1:] = np.maximum(weights[:, 1:], said[:, 1:] * left[:, None])
+        weights[:, 1:] /= np.maximum(weights[:, 1:].sum(axis=1, keepdims=True), 1.0)
+        weights[:, 0] = np.maximum(1 - weights[:, 1:].sum(axis=1), 0.0)
+        return weights
+
     def sound(self, rate: int = 22050) -> Int16:
         """(round(duration x rate),) int16 mono: all that is said, mixed; silence where nobody speaks."""
         mix = np.zeros(round(self.duration * rate), np.float32)
@@ -149,12 +169,14 @@ class Realization:
             "duration": round(self.duration, 6),
             "face": self.face_name,
             "schedule": [s.to_json() for s in self.schedules],
-            **_performance_json(first[1]),
+            **_performance_json(first[1], self.visemes()),
             "feedback": list(self.feedback),
             "warnings": [w.to_json() for w in self.warnings],
         }
         if others:
-            out["characters"] = {str(name): _performance_json(p) for name, p in others}
+            out["characters"] = {
+                str(name): _performance_json(p, self.visemes(k)) for k, (name, p) in enumerate(others, 1)
+            }
         return out
 
 
@@ -434,7 +456,9 @@ def parse_scene(text: str) -> dict[str, Position]:
     return scene
 
 
-def _performance_json(performance: Performance) -> dict[str, Any]:
+def _performance_json(performance: Performance, visemes: Float64) -> dict[str, Any]:
+    from realizer.animation.viseme_weights import oculus_visemes, oculus_weights
+
     return {
         "fap": {
             "names": [row.name for row in faps()],
@@ -444,5 +468,9 @@ def _performance_json(performance: Performance) -> dict[str, Any]:
         "au": {
             "names": list(AU_NAMES()),
             "values": [[round(v, 4) for v in row] for row in performance.aus.aus.tolist()],
+        },
+        "visemes": {
+            "names": [row.name for row in oculus_visemes()],
+            "values": [[round(v, 3) for v in row] for row in oculus_weights(visemes).tolist()],
         },
     }

@@ -24,8 +24,8 @@ PICTURES = (".png", ".mp4", ".webm")
 TRANSPARENT = "transparent"
 
 
-def performing(command: options.Command) -> options.Command:
-    """What can be asked of a performance that is written to a file."""
+def performance(command: options.Command) -> options.Command:
+    """What can be asked of any performance: how documents are played, and how they are drawn."""
     for option in (
         options.playing,
         options.mapping,
@@ -42,13 +42,25 @@ def performing(command: options.Command) -> options.Command:
         options.deformer,
         click.option("--face", metavar="NAME", help="A face of `realizer faces list`."),
         click.option(
+            "--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.  [default: 25]"
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def performing(command: options.Command) -> options.Command:
+    """What can be asked of a performance that is written to a file."""
+    for option in (
+        performance,
+        click.option(
+            "--visemes", is_flag=True, help="With .fap: FAP 1 too, the two visemes that are said most."
+        ),
+        click.option(
             "--at",
             type=options.Number(0),
             metavar="SECONDS",
             help="With .png: the picture of that instant.",
-        ),
-        click.option(
-            "--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.  [default: 25]"
         ),
         click.option(
             "-o",
@@ -90,6 +102,7 @@ def perform(
     no_idle: bool,
     cooccurrence: str | None,
     prosody: str | None,
+    visemes: bool,
     mapping: Path | None,
     voice: str | None,
     scene: str | None,
@@ -132,8 +145,10 @@ def perform(
             "can be transparent",
             param_hint="--background",
         )
+    if visemes and (writer is None or writer.suffix != ".fap"):
+        raise click.BadParameter("wanted a .fap file to write FAP 1 into", param_hint="--visemes")
     texts = read()
-    drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)
+    drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background, visemes=visemes)
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)
     # What planning needs is imported while the drawing process gets ready.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realizer.animation.fap_clip import FAPClip
+from realizer.animation.viseme_weights import fap_1
 from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
@@ -44,10 +46,17 @@ def encode(clip: FAPClip) -> str:
 
 
 def write_fap(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """The first character's frames. The name in the header is the first block's id, never the path's."""
+    """The first character's frames. The name in the header is the first block's id, never the path's.
+
+    Where visemes are asked for, FAP 1 says what is spoken beside the FAPs that show it.
+    """
     blocks = [schedule.block for schedule in realization.schedules]
-    name = blocks[0] if blocks else "realizer"
-    write_text(path, encode(FAPClip.of(realization.faps, realization.fps, name)))
+    clip = FAPClip.of(realization.faps, realization.fps, blocks[0] if blocks else "realizer")
+    if drawing.visemes:
+        mask = clip.mask.copy()
+        mask[0] = True
+        clip = replace(clip, mask=mask, visemes=fap_1(realization.visemes()))
+    write_text(path, encode(clip))
 
 
 def _word(name: str) -> str:

@@ -16,13 +16,14 @@ __all__ = ["Drawing", "Output"]
 
 @dataclass(frozen=True)
 class Drawing:
-    """How pictures are drawn: what `realize --size --camera --at --light --background` say."""
+    """How it is drawn or written: what `realize --size --camera --at --light --background --visemes` say."""
 
     size: tuple[int, int] = (512, 512)  # width, height
     camera: str = "front"
     at: float | None = None  # seconds; None: the whole span
     light: str | None = None  # a preset; None: as `realizer.render.Renderer` takes it, as is
     background: str | None = None  # "#rrggbb", or of one picture "transparent"
+    visemes: bool = False  # whether a .fap file has FAP 1 beside the FAPs of the lips
     begun: Renderer | None = None  # what draws, where `Output.begin` started it
 
     def renderer(self, realization: Realization, size: tuple[int, int], *, alpha: bool = False) -> Renderer:

@@ -14,7 +14,7 @@ from realizer import realize, schedule
 from realizer.examples import examples
 from realizer.pipeline import Realization, Speaking, parse_scene
 from realizer.speech import SilentVoice
-from realizer.speech.utterance import Utterance
+from realizer.speech.utterance import Phoneme, Utterance
 from realizer.tables import faps
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -42,6 +42,8 @@ def test_the_json_holds_what_it_promises() -> None:
     assert len(out["fap"]["values"]) == len(out["au"]["values"]) == out["frames"]
     assert all(isinstance(v, int) for v in out["fap"]["values"][0])
     assert all(0 <= v <= 1 for row in out["au"]["values"] for v in row)
+    assert len(out["visemes"]["names"]) == 15
+    assert [sum(row) for row in out["visemes"]["values"]] == pytest.approx([1] * out["frames"], abs=0.01)
     assert out["schedule"][0]["block"] == "greeting"
     assert out["feedback"][0].startswith("<predictionFeedback")
 
@@ -104,6 +106,19 @@ def test_sound_is_mixed_where_it_belongs() -> None:
     assert sound[int(1.1 * 16000)] == 1000
     assert sound[int(1.25 * 16000)] == 2000
     assert sound[int(1.4 * 16000)] == 1000
+
+
+def test_visemes_are_those_of_their_character_and_end_where_the_speech_is_cut_off() -> None:
+    played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False, fps=50)
+    vowel = Utterance(1.0, (), (Phoneme(0.0, 1.0, "ɑ"),), {})
+    object.__setattr__(
+        played, "speaking", (Speaking(0.5, float("inf"), vowel, 1), Speaking(1.0, 1.4, vowel, 0))
+    )
+    said = played.visemes()
+    assert (said[:51, 0] == 1).all()
+    assert said[65, 10] > 0.9
+    assert (said[77:, 0] == 1).all()
+    assert played.visemes(1)[50, 10] > 0.9
 
 
 def test_a_scene_is_read_from_lines_or_json() -> None:

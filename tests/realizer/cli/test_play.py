@@ -152,3 +152,13 @@ def test_json_in_detail_has_the_fixed_keys_and_more() -> None:
 def test_detail_without_json_is_wrong_usage() -> None:
     with pytest.raises(click.UsageError, match="wanted --json"):
         schedule("-", "--detail", text=TALK)
+
+
+def test_visemes_are_for_fap_files_alone(tmp_path: Path) -> None:
+    for out, status in (("clip.fap", 0), ("clip.json", 2)):
+        path = tmp_path / out
+        arguments = ["-q", "realize", "-", "-o", str(path), "--voice", "silent", "--visemes"]
+        done = CliRunner().invoke(cli, arguments, input=TALK)
+        assert done.exit_code == status
+        assert path.exists() == (status == 0)
+        assert ("wanted a .fap file" in done.stderr) == (status == 2)

@@ -7,6 +7,7 @@ import io
 import json
 import re
 import wave
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ import pytest
 from realizer.animation.fap_reader import read_fap
 from realizer.animation.targets import AU_NAMES
 from realizer.outputs import OUTPUTS, Drawing, output_for
+from realizer.outputs.fap_text import write_fap
+from realizer.speech.utterance import Phoneme
 from realizer.tables import faps
 
 TEXTS = (".fap", ".json", ".csv", ".vtt", ".wav")
@@ -93,6 +96,23 @@ def test_json_is_the_realization(realization, tmp_path):
     assert json.loads(written(realization, tmp_path, ".json")) == json.loads(
         json.dumps(realization.to_json())
     )
+
+
+def test_fap_1_is_written_where_it_is_asked_for(realization, tmp_path):
+    sounds = (Phoneme(0.0, 0.3, ""), Phoneme(0.3, 0.5, "p"), Phoneme(0.5, 0.8, "a"), Phoneme(0.8, 1.0, ""))
+    (speaking,) = realization.speaking
+    said = replace(speaking, utterance=replace(speaking.utterance, phonemes=sounds))
+    spoken = replace(realization, speaking=(said,))
+    path = tmp_path / "clip.fap"
+    write_fap(spoken, path, Drawing(visemes=True))
+    clip = read_fap(path.read_text())
+    assert clip.mask[0]
+    assert np.array_equal(clip.values, realization.faps.integers())
+    assert clip.visemes[round(25 * (said.start + 0.4))].tolist() == [1, 0, 63, 0]
+    assert clip.visemes[round(25 * (said.start + 0.65))][0] == 10
+    assert clip.visemes[[0, -1]].tolist() == [[0, 0, 63, 0]] * 2
+    write_fap(spoken, path, Drawing())
+    assert not read_fap(path.read_text()).mask[0]
 
 
 def test_csv_has_a_row_a_frame_and_a_column_an_au_and_a_fap(realization, tmp_path):
