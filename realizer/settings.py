@@ -128,6 +128,9 @@ class Settings:
     asap_ports: tuple[int, int] | None = _setting(
         None, _optional(_ports), "of Asap's TCP: BML in, feedback to this port of the client; none: no door"
     )
+    xface_port: int | None = _setting(
+        None, _optional(_number(int, 0, 65535)), "of Xface's TCP: tasks for a player; none: no door"
+    )
     stomp: str | None = _setting(None, _optional(_address), "HOST:PORT of a message broker; none: no door")
     stomp_login: str | None = _setting(None, _optional(_text), "for the broker")
     stomp_password: str | None = _setting(None, _optional(_text), "for the broker")
@@ -169,6 +172,7 @@ class Settings:
     max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of one document")
     max_behaviours: int = _setting(10_000, _number(int, 1, 10**6), "behaviours in one block")
     max_blocks: int = _setting(1_000, _number(int, 1, 10**6), "blocks playing or waiting in one session")
+    max_connections: int = _setting(512, _number(int, 1, 10**6), "WebSockets open from one address")
     max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service")
     max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
 

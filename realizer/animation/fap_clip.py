@@ -46,6 +46,11 @@ class FAPClip:
             name, fps, values, mask, np.zeros((count, 4), np.int32), np.zeros((count, 6), np.int32)
         )
 
+    def since(self, frame: int) -> FAPClip:
+        """What is left of it from a frame on."""
+        parts = (self.values[frame:], self.mask, self.visemes[frame:], self.expressions[frame:])
+        return FAPClip(self.name, self.fps, *parts, self.notes)
+
     def frames(self) -> FAPFrames:
         """The values on a clock that starts at 0; FAP 1 and 2 are left out: frames have no place for them."""
         mask = self.mask.copy()

@@ -22,6 +22,12 @@ __all__: list[str] = []
     metavar="BML FEEDBACK",
     help="Serve clients of Asap's TCP: BML on our first port, feedback to their second one, as in 7500 7501.",
 )
+@click.option(
+    "--xface-port",
+    type=int,
+    metavar="PORT",
+    help="Serve clients of an Xface player, whose port is 50011: FAP files, playback, scripts of BML.",
+)
 @click.option("--stomp", metavar="HOST:PORT", help="Serve clients of this STOMP broker: ASAP JSON, VHMSG.")
 @click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
 @options.deformer

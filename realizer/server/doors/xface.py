@@ -1,0 +1,185 @@
+"""The Xface TCP door: clients that push FAPs to an Xface player, and scripts, find one here."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import socket
+from collections.abc import Iterable
+
+from realizer.errors import RealizerError
+from realizer.server.doors.dialect import Leave, ToSession
+from realizer.server.doors.xface_brought import Brought, prepare
+from realizer.server.doors.xface_reader import Content, Fault, TaskReader
+from realizer.server.doors.xface_tasks import ERROR, Answer, Desk
+from realizer.server.doors.xface_wire import Task
+from realizer.server.hub import HubError
+from realizer.server.shell import Shell
+from realizer.settings import Settings
+
+__all__ = ["XfaceDoor"]
+
+log = logging.getLogger(__name__)
+
+READ = 64 * 1024  # bytes
+# Of one task: some ten minutes of FAP text, as much as is read of a file.
+LIMIT = 8 * 2**20  # bytes
+MOST_CLIENTS = 64  # a player is steered by one or two; each may hold a task that has not come to its end
+# What is understood at once; more of it goes to a thread, so that the frames of others are not late.
+SMALL = 16 * 1024  # characters
+FEEDBACK = (
+    '{"type":"subscribe","stream":"feedback",'
+    '"elements":["predictionFeedback","blockProgress","warningFeedback"]}'
+)
+
+
+class XfaceDoor:
+    """Listens on `settings.host` and `settings.xface_port`; `port` is the one that is open after `start`.
+
+    Each client has its own number, its own loaded file and its own queue, as several have in the player. The
+    clients of one address share a face: that of the session `xface-ADDRESS`, which viewers can join.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings) -> None:
+        assert settings.xface_port is not None
+        self.port = settings.xface_port
+        self._host = settings.host
+        self._media = settings.media
+        self._shell = shell
+        self._server: asyncio.Server | None = None
+        self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
+        self._count = 0
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return (f"xface: tasks at {host}:{self.port}, session xface-ADDRESS",)
+
+    async def start(self) -> None:
+        self._server = await asyncio.start_server(self._serve, self._host, self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def ready(self) -> None:
+        return
+
+    def shut(self) -> None:
+        if self._server is not None:
+            self._server.close()
+
+    async def close(self) -> None:
+        self.shut()
+        for writer in self._clients.values():
+            writer.transport.abort()
+        await asyncio.gather(*self._clients, return_exceptions=True)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One client, from its opening to its end."""
+        task = asyncio.current_task()
+        assert task is not None
+        self._clients[task] = writer
+        peer = writer.get_extra_info("peername")
+        try:
+            if peer is not None:  # otherwise it has gone again
+                # Nobody says good-bye, least of all a machine that loses its power.
+                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+                await self._talk(peer[0].removeprefix("::ffff:"), reader, writer)
+        except OSError:
+            pass  # it is gone
+        except Exception:
+            log.exception("xface: %s is let go of: its connection failed", peer[0])
+        finally:
+            writer.transport.abort()
+            del self._clients[task]
+
+    async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._count += 1
+        seat = _Seat(self._shell, Desk(self._count), writer)
+        try:
+            if len(self._clients) > MOST_CLIENTS:
+                raise HubError(503, f"{MOST_CLIENTS} clients are connected: wanted fewer")
+            number = self._shell.join(seat, "xface-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host)[:58])
+        except HubError as error:
+            log.warning("xface: %s is not let in: %s", host, error)
+            writer.write(ERROR)
+            await writer.drain()
+            writer.close()
+            return
+        seat.sit(number)
+        try:
+            await self._read(reader, writer, seat)
+        finally:
+            self._shell.leave(number)
+
+    async def _read(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, seat: _Seat) -> None:
+        tasks = TaskReader(LIMIT)
+        while data := await reader.read(READ):
+            for found in tasks.feed(data):
+                match found:
+                    case Fault(text):
+                        log.info("xface: client %d: %s", seat.desk.owner, text)
+                        seat.do([ERROR])
+                    case Task():
+                        seat.do(seat.desk.accept(found))
+                        brought = await self._prepared(found)
+                        seat.do(seat.desk.run(found, brought, asyncio.get_running_loop().time()))
+                    case Content():
+                        pass  # of a task that has been answered
+                if seat.left:
+                    return
+                # A read full of tasks must not hold up the frames of others, nor pile up notes unread.
+                await asyncio.sleep(0)
+                await writer.drain()
+
+    async def _prepared(self, task: Task) -> Brought:
+        try:
+            if sum(map(len, task.params)) < SMALL and task.name != "LOAD_FAP":
+                return prepare(task, self._media)
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(None, prepare, task, self._media)
+        except RealizerError as error:
+            return error
+        except OSError as error:
+            return RealizerError(str(error.strerror or error))
+
+
+class _Seat:
+    """One client in its session."""
+
+    def __init__(self, shell: Shell, desk: Desk, writer: asyncio.StreamWriter) -> None:
+        self.desk = desk
+        self.left = False
+        self._shell = shell
+        self._writer = writer
+        self._number = 0
+
+    def sit(self, number: int) -> None:
+        """It has joined its session."""
+        self._number = number
+        self._shell.receive(number, FEEDBACK)
+        self._writer.write(self.desk.greeting)
+
+    def do(self, answers: Iterable[Answer]) -> None:
+        """Carry out what the desk wants, in order."""
+        for answer in answers:
+            match answer:
+                case ToSession(text):
+                    self.left = self.left or not self._shell.receive(self._number, text)
+                case Leave():
+                    self.left = True
+                case note:
+                    self._writer.write(note)
+
+    @property
+    def waiting(self) -> int:
+        return self._writer.transport.get_write_buffer_size()
+
+    def send(self, data: str | bytes) -> None:
+        if isinstance(data, str):
+            loop = asyncio.get_running_loop()
+            # What the desk wants of the session now would come back here before this has been told.
+            loop.call_soon(lambda: self.do(self.desk.told(data, loop.time())))
+
+    def end(self, code: int, reason: str) -> None:
+        log.warning("xface: client %d is let go of: %s", self.desk.owner, reason)
+        self._writer.transport.abort()

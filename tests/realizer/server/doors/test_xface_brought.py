@@ -1,0 +1,75 @@
+"""What a task brings: a clip, documents, or why neither."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from realizer.animation.fap_clip import FAPClip
+from realizer.errors import RealizerError
+from realizer.server.doors.xface_brought import Empty, Script, prepare
+from realizer.server.doors.xface_wire import Task
+
+MASK = " ".join("1" if fap == 3 else "0" for fap in range(1, 69))
+FAP = f"2.1 x 25 1\n{MASK}\n0 5\n"
+BML = '<bml id="a"><wait id="w" duration="1"/></bml>'
+
+
+def test_an_upload_is_a_clip() -> None:
+    clip = prepare(Task("UPLOAD_FAP", params=(FAP,)), None)
+    assert isinstance(clip, FAPClip)
+    assert clip.values[0, 2] == 5
+
+
+def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None:
+    (tmp_path / "x.fap").write_text(FAP)
+    assert isinstance(prepare(Task("LOAD_FAP", params=("x.fap",)), tmp_path), FAPClip)
+
+
+@pytest.mark.parametrize(
+    ("text", "blocks"),
+    [
+        (BML, ("a",)),
+        (BML + BML.replace('"a"', '"b"'), ("a", "b")),
+        (BML.replace("<", "&lt;").replace(">", "&gt;"), ("a",)),
+        ("<bml" + BML, ("a",)),
+    ],
+)
+@pytest.mark.parametrize("processor", ["BML", " bml\n"])
+def test_a_script_is_documents_and_the_ids_of_their_blocks(
+    text: str, blocks: tuple[str, ...], processor: str
+) -> None:
+    script = prepare(Task("UPLOAD_SCRIPT", params=(text, processor)), None)
+    assert isinstance(script, Script)
+    assert script.blocks == blocks
+
+
+@pytest.mark.parametrize("name", ["STOP_PLAYBACK", "RESUME_PLAYBACK", "DANCE"])
+def test_other_tasks_bring_nothing(name: str) -> None:
+    assert prepare(Task(name, params=("x",)), None) is None
+
+
+@pytest.mark.parametrize(
+    ("task", "says"),
+    [
+        (Task("UPLOAD_FAP", params=("hello world",)), "line 1: wanted a header"),
+        (Task("UPLOAD_FAP", params=("2.1 x 25 0\n",)), "wanted frames, got none"),
+        (Task("LOAD_FAP", params=("x.fap",)), "media"),
+        (Task("UPLOAD_SCRIPT", params=(BML, "SMIL-Agent")), "wanted the processor BML, got 'SMIL-Agent'"),
+        (Task("UPLOAD_SCRIPT", params=("<bml/>", "BML")), "wanted BML, got"),
+        (Task("UPLOAD_SCRIPT", params=("x", "BML")), "wanted BML, got"),
+    ],
+)
+def test_what_cannot_be_understood_is_said(task: Task, says: str) -> None:
+    with pytest.raises(RealizerError, match=re.escape(says)) as raised:
+        prepare(task, None)
+    assert not isinstance(raised.value, Empty)
+
+
+@pytest.mark.parametrize("name", ["UPLOAD_FAP", "LOAD_FAP", "UPLOAD_SCRIPT"])
+@pytest.mark.parametrize("params", [(), ("",), (" \n",)])
+def test_a_task_without_what_it_should_bring_is_told_apart(name: str, params: tuple[str, ...]) -> None:
+    with pytest.raises(Empty, match="wanted params, got none, or empty ones"):
+        prepare(Task(name, params=params), None)
