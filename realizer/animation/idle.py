@@ -92,14 +92,16 @@ def idle_channels(start: float, end: float, seed: int, ends: Sequence[PhraseEnd]
         for at, draw in _blinks(start, end, seed, ends)
         for lid in au(45)
     ]
-    for kind, (sides, most) in enumerate(SWAY.items()):
-        times, degrees = _poses(start, end, seed, kind + 1, SWAY_PERIOD, most)
+    sways = _poses(
+        start, end, seed, [(kind, kind, most) for kind, most in enumerate(SWAY.values(), 1)], SWAY_PERIOD
+    )
+    for sides, (times, degrees) in zip(SWAY, sways, strict=True):
         channels += _turn(sides, times, degrees)
         if sides in COUNTER:
             channels += _turn(COUNTER[sides], times, degrees)
-    for kind, (sides, most) in enumerate(SACCADE.items()):
-        # Both directions jump at the same instants: a saccade is one movement.
-        times, degrees = _poses(start, end, seed, 10, SACCADE_PERIOD, most, direction=11 + kind)
+    # Both directions jump at the same instants: a saccade is one movement.
+    jumps = [(10, 11 + kind, most) for kind, most in enumerate(SACCADE.values())]
+    for sides, (times, degrees) in zip(SACCADE, _poses(start, end, seed, jumps, SACCADE_PERIOD), strict=True):
         held = np.repeat(times, 2)[1:]
         held[1::2] = times[1:] + SACCADE_TIME
         channels += _turn(sides, held, np.repeat(degrees, 2)[:-1])
@@ -126,19 +128,21 @@ def _degrees(number: int) -> float:
 
 
 def _poses(
-    start: float, end: float, seed: int, kind: int, period: float, most: float, direction: int | None = None
-) -> tuple[Float64, Float64]:
-    """Times (k,) and degrees (k,) of the poses around start..end, at uneven times about `period` apart.
+    start: float, end: float, seed: int, movements: Sequence[tuple[int, int, float]], period: float
+) -> list[tuple[Float64, Float64]]:
+    """Times (k,) and degrees (k,) of the poses of movements around start..end, about `period` apart.
 
-    `kind` draws the times, `direction` (the same, if not given) the degrees.
+    Args:
+        movements: of each, the kind that draws its times, the kind that draws its degrees, the most of these.
     """
     first, last = math.floor(start / period) - 2, math.ceil(end / period) + 2
     k = np.arange(first, last + 1)
-    times = (k + 0.7 * uniform(seed, kind, k)) * period
+    kinds = [kind for times, way, _ in movements for kind in (times, 100 + way, 200 + way)]
+    late, one, other = uniform(seed, kinds, k).reshape(len(movements), 3, len(k)).transpose(1, 0, 2)
+    times = (k + 0.7 * late) * period
     # The mean of two draws: small poses are more common than large ones.
-    way = 100 + (kind if direction is None else direction)
-    degrees = most * (uniform(seed, way, k) + uniform(seed, way + 100, k) - 1.0)
-    return times, degrees
+    degrees = np.array([most for _, _, most in movements])[:, None] * (one + other - 1.0)
+    return list(zip(times, degrees, strict=True))
 
 
 def _blinks(start: float, end: float, seed: int, ends: Sequence[PhraseEnd]) -> list[tuple[float, float]]:
@@ -148,9 +152,8 @@ def _blinks(start: float, end: float, seed: int, ends: Sequence[PhraseEnd]) -> l
     while (onsets := _onsets(seed, count))[-1] <= end + moved:
         count *= 2
     seen = np.flatnonzero((onsets + BLINK_TIMES[-1] + moved >= start) & (onsets - moved <= end))
-    late = uniform(seed, 305, seen).tolist()
+    draws, late = uniform(seed, (304, 305), seen).tolist()
     placed = [_placed(at, part, ends) for at, part in zip(onsets[seen].tolist(), late, strict=True)]
-    draws = uniform(seed, 304, seen).tolist()
     near = zip(placed, draws, strict=True)
     return [(at, draw) for at, draw in near if at + BLINK_TIMES[-1] >= start and at <= end]
 

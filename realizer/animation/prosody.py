@@ -215,7 +215,7 @@ def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> li
     The first of them stay what they are where more is appended to a text, or its timing turns out otherwise.
     """
     k = round(start * 1000.0) * 65536 + np.arange(count, dtype=np.int64)
-    return [uniform(seed, kind + i, k) for i in range(kinds)]
+    return list(uniform(seed, range(kind, kind + kinds), k))
 
 
 def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> Iterator[Channel]:

@@ -19,6 +19,11 @@ def test_a_number_has_the_same_draw_whatever_is_drawn_beside_it(seed: int, kind:
     assert ((many >= 0.0) & (many < 1.0)).all()
 
 
+def test_several_kinds_are_drawn_together_as_each_of_them_alone() -> None:
+    k = np.arange(5)
+    assert (uniform(7, (3, 1, 2), k) == [uniform(7, kind, k) for kind in (3, 1, 2)]).all()
+
+
 def test_draws_are_evenly_spread_and_kinds_have_nothing_to_do_with_each_other() -> None:
     one, other = uniform(7, 1, np.arange(20_000)), uniform(7, 2, np.arange(20_000))
     counts, _ = np.histogram(one, 10, (0.0, 1.0))
