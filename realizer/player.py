@@ -15,10 +15,11 @@ import numpy as np
 
 from bml_schema import Block, Feedback
 from realizer.animation.blend import blend
+from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle import idle_channels
 from realizer.animation.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
-from realizer.animation.targets import AU_NAMES
+from realizer.animation.targets import AU_NAMES, axis
 from realizer.arrays import Float64
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
@@ -237,9 +238,11 @@ class Player:
                 last `due`.
         """
         times = np.asarray(times, np.float64)
-        if not len(times):
-            return blend((), times, self.rules)
-        first, last = float(times[0]), float(times[-1])
+        channels = self._channels(float(times[0]), float(times[-1]), character) if len(times) else []
+        return blend(channels, times, self.rules)
+
+    def _channels(self, first: float, last: float, character: int) -> list[Channel]:
+        """All that moves a face between two times."""
         blocks = self._blocks.cast.of(character)
         asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
         asked += [Asked(c.span[0], c) for c in self._characters[character].channels()]
@@ -250,7 +253,7 @@ class Player:
             talks = [Talk(s.start, s.until, s.utterance) for s in said]
             channels += idle_channels(first, last, seed, phrase_ends(talks))
             channels += prosody_channels(talks, first, last, seed, asked)
-        return blend(tuple(channels), times, self.rules)
+        return channels
 
     @property
     def end(self) -> float:
@@ -268,17 +271,7 @@ class Player:
         return self._blocks.cast.latest(schedule)
 
     def state(self, now: float) -> dict[str, Any]:
-        """What is playing and which AUs are up, as plain data."""
-        names = AU_NAMES()
-        faces = []
-        for index, character in enumerate(self._characters):
-            aus = self.frames(np.array([now]), index).aus[0]
-            faces.append(
-                {
-                    "character": character.id,
-                    "aus": {n: round(float(v), 3) for n, v in zip(names, aus, strict=True) if v > 0.005},
-                }
-            )
+        """What is playing, which AUs are up and what each layer asks for, as plain data."""
         blocks: list[dict[str, Any]] = []
         for p in self._blocks.cast.alive():
             if p.end <= now:
@@ -287,7 +280,25 @@ class Player:
             blocks.append({"id": p.block.id, "character": p.block.character_id, "status": status.value})
             if p.start < float("inf"):
                 blocks[-1] |= {"start": p.start, "end": p.end}
+                spans = ((b, t + p.start) for b, t in p.schedule.times.items() if len(t))
+                blocks[-1]["behaviours"] = [b for b, t in spans if t[0] <= now < t[-1]]
+        faces = [self._face_state(now, index) for index in range(len(self._characters))]
         return {"time": now, "blocks": blocks, "characters": faces}
+
+    def _face_state(self, now: float, character: int) -> dict[str, Any]:
+        times = np.array([now])
+        channels = self._channels(now, now, character)
+        fap_names = list(axis())[len(AU_NAMES()) : len(AU_NAMES()) + 68]
+        layers = {}
+        for layer in Layer:
+            own = blend([c for c in channels if c.layer is layer], times)
+            # Below 0.005 nothing is seen of an AU, and of a FAP below half a unit.
+            values = zip(fap_names, own.faps[0].tolist(), strict=True)
+            faps = {name: round(value) for name, value in values if abs(value) >= 0.5}
+            if (aus := _up(own)) or faps:
+                layers[layer.name.lower()] = {"aus": aus, "faps": faps}
+        shown = _up(blend(channels, times, self.rules))
+        return {"character": self._characters[character].id, "aus": shown, "layers": layers}
 
     # inside -------------------------------------------------------------------------------------
 
@@ -303,3 +314,9 @@ class Player:
             return 0
         self._characters.append(Character(wanted))
         return len(self._characters) - 1
+
+
+def _up(frames: AUFrames) -> dict[str, float]:
+    """The AUs of the first frame that are not 0."""
+    shown = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
+    return {name: round(value, 3) for name, value in shown if value > 0.005}

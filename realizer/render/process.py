@@ -1,4 +1,4 @@
-"""Poses in, pixels or JPEG out, by a drawing process that is started, watched and replaced here."""
+"""Poses in, pixels or encoded pictures out, by a drawing process that is started and replaced here."""
 
 from __future__ import annotations
 
@@ -125,15 +125,22 @@ class Renderer:
                 for _ in range(waiting):  # the caller left early: at most two answers are still to come
                     process.receive()
 
-    def jpeg(self, pose: Float32, quality: int = 85) -> bytes:
-        """JPEG bytes of one pose, (k,). Errors as `draw`."""
-        from realizer.render.wire import Jpeg
+    def encoded(self, pose: Float32, form: str = "jpeg", quality: int = 85) -> bytes:
+        """The bytes of a picture of one pose, (k,).
+
+        Args:
+            form: "jpeg", "png" or "webp"; the latter two are transparent where the background is.
+            quality: 1..100, of a JPEG or a WebP.
+
+        Errors as `draw`.
+        """
+        from realizer.render.wire import Encode
 
         (row,) = self._rows(np.asarray(pose)[None])
         with self._lock:
             process = self._ready()
             try:
-                process.send(Jpeg(row, quality))
+                process.send(Encode(row, form, quality))
                 encoded: bytes = process.receive()
             except RenderError:
                 self._drop()

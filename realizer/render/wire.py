@@ -14,7 +14,7 @@ import numpy as np
 from realizer.arrays import Float32, UInt8
 from realizer.face.model import Face
 
-__all__ = ["Draw", "Failed", "Jpeg", "Open", "Pixels"]
+__all__ = ["Draw", "Encode", "Failed", "Open", "Pixels"]
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,11 @@ class Draw:
 
 
 @dataclass(frozen=True)
-class Jpeg:
-    """Draw one pose (k,); answered with JPEG bytes."""
+class Encode:
+    """Draw one pose (k,); answered with the bytes of a file of that form: "jpeg", "png" or "webp"."""
 
     row: Float32
+    form: str
     quality: int
 
 
@@ -55,7 +56,7 @@ class Failed:
     says: str
 
 
-Message = Open | Draw | Jpeg
+Message = Open | Draw | Encode
 
 
 class Pixels:

@@ -22,9 +22,12 @@ from realizer.server.connection import (
 from realizer.server.effects import Look
 from realizer.server.messages import (
     PROTOCOL,
+    PICTURES,
     STREAMS,
     Anticipate,
+    BlockState,
     CharacterMessage,
+    CharacterState,
     Control,
     ErrorMessage,
     Feeling,
@@ -40,7 +43,9 @@ from realizer.server.messages import (
     Subscribe,
     Subscribed,
     Unsubscribe,
+    VoiceState,
 )
+from realizer.server.streams import arkit_names
 from realizer.tables import faps
 
 if TYPE_CHECKING:
@@ -107,7 +112,9 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
 
 def _hello(session: Session, connection: Connection, message: Hello, t: float) -> None:
     if message.version != PROTOCOL:
-        raise Wrong("version", f"wanted protocol version {PROTOCOL}, got {message.version}")
+        words = f"wanted version {PROTOCOL} of the protocol, got {message.version}"
+        session.reply(connection.id, ErrorMessage(code="version", message=words, where="hello.version"))
+        return
     if message.session not in (None, session.id):
         assert message.session is not None
         session.move(connection.id, message.session, message.seen)
@@ -149,9 +156,9 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
             subscription = old  # what was sent ahead is not sent again
         told |= {"rate": message.rate, "frame": subscription.next, "fps": 50.0}
     elif stream == "video":
-        subscription = session.broadcast.pictures(index, fps, _look(session, message), t)
+        subscription = session.broadcast.pictures(index, fps, _look(session, message, index), t)
         told |= {"fps": fps, "frame": subscription.next, "size": message.size}
-        told |= {"face": session.face_name(index), "media_type": "image/jpeg"}
+        told |= {"face": session.face_name(index), "media_type": PICTURES[message.format]}
     else:
         if stream == "mesh":
             told |= _mesh_of(session, index)
@@ -165,11 +172,14 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
             told["names"] = [row.name for row in faps()]
         elif stream == "au":
             told["names"] = list(AU_NAMES())
+        elif stream == "arkit":
+            told["names"] = arkit_names()
     connection.subscriptions[stream, message.character] = subscription
     session.reply(connection.id, Subscribed(character=message.character, **told))
 
 
-def _look(session: Session, message: Subscribe) -> Look:
+def _look(session: Session, message: Subscribe, index: int) -> Look:
+    from realizer.render.cameras import camera_names
     from realizer.render.light import presets
 
     settings = session.settings
@@ -178,14 +188,21 @@ def _look(session: Session, message: Subscribe) -> Look:
         raise Wrong("size", f"wanted sides of 16..{largest} pixels, got {list(message.size)}")
     if message.light is not None and message.light not in presets():
         raise Wrong("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
-    # A JPEG is opaque: the service's own "transparent" means the light's backdrop.
-    behind = message.background or (settings.background if settings.background != "transparent" else None)
+    face = session.face(index)
+    if message.camera is not None and message.camera not in camera_names(face):
+        raise Wrong("camera", f"wanted one of {', '.join(camera_names(face))}, got {message.camera!r}")
+    behind = message.background or settings.background
+    if message.format == "jpeg" and behind == "transparent":
+        if message.background is not None:
+            raise Wrong("background", "wanted the format png or webp for what is transparent, got jpeg")
+        behind = None  # the service's own: a JPEG has the light's backdrop instead
     return Look(
         size=message.size,
         camera=message.camera or settings.camera,
         light=message.light or settings.light,
         background=behind,
         quality=message.quality,
+        form=message.format,
     )
 
 
@@ -257,18 +274,19 @@ def _feeling(asked: Feeling | None) -> dict[str, float]:
 def _state(session: Session, connection: Connection, t: float) -> StateMessage:
     state = session.player.state(t)
     preparing = [
-        {"id": w.block.id, "character": w.block.character_id, "status": "IN_PREP"}
+        BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
         for w in session.preparation.waiting
     ]
-    voice: dict[str, Any] = {"name": session.settings.voice}
-    if session.voice_fault is not None:
-        voice["fault"] = session.voice_fault
+    faces = [
+        CharacterState(face=session.face_name(index), voice=session.voices.get(index), **face)
+        for index, face in enumerate(state["characters"])
+    ]
     return StateMessage(
         session=session.id,
         time=t,
-        blocks=[*state["blocks"], *preparing],
-        characters=state["characters"],
-        voice=voice,
+        blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
+        characters=faces,
+        voice=VoiceState(name=session.settings.voice, fault=session.voice_fault),
         connections=len(session.connections),
         dropped=connection.dropped,
     )

@@ -28,18 +28,24 @@ class Speak:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How pictures are drawn: `size` is width, height; the rest as `realizer.render.Renderer` takes it."""
+    """How pictures are drawn: `size` is width, height; the rest as `realizer.render.Renderer` takes it.
+
+    Attributes:
+        quality: of a JPEG or a WebP.
+        form: "jpeg", "png" or "webp".
+    """
 
     size: tuple[int, int]
     camera: str
     light: str | None
     background: str | None
-    quality: int  # of the JPEG
+    quality: int
+    form: str = "jpeg"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draw:
-    """Draw one picture and answer `session.drawn(id, jpeg or error, now)`.
+    """Draw one picture and answer `session.drawn(id, its bytes or error, now)`.
 
     `pose` is (k,) float32, a column for each thing the face takes.
     """

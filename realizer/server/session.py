@@ -25,9 +25,14 @@ from realizer.server.control import MAX_CHARACTERS, follow
 from realizer.server.effects import Close, Effect, Move, Send, Speak
 from realizer.server.feedback_log import FeedbackLog
 from realizer.server.messages import (
+    MAX_CONTROL,
+    MAX_FPS,
+    PICTURES,
     STREAMS,
+    Capabilities,
     ErrorMessage,
     Gap,
+    Limits,
     Welcome,
     parse_control,
 )
@@ -199,7 +204,7 @@ class Session:
         self.tick(now)
 
     def drawn(self, draw: int, result: bytes | RealizerError, now: float) -> None:
-        """The renderer's answer to a Draw: a JPEG. Where it failed, pictures end with an error."""
+        """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
         if self.closed:
             return
         picture = result if isinstance(result, bytes) else None
@@ -409,20 +414,26 @@ class Session:
     def welcome(self, connection: int, now: float) -> None:
         """Tell a client where it is and what there is."""
         s = self.settings
-        limits = {
-            "message": s.max_message,
-            "document": s.max_document,
-            "behaviours": s.max_behaviours,
-            "blocks": s.max_blocks,
-            "characters": MAX_CHARACTERS,
-            "picture": s.max_size,
-            "keep": s.keep,
-        }
+        limits = Limits(
+            message=s.max_message,
+            document=s.max_document,
+            control=MAX_CONTROL,
+            behaviours=s.max_behaviours,
+            blocks=s.max_blocks,
+            characters=MAX_CHARACTERS,
+            connections=s.max_connections,
+            picture=s.max_size,
+            fps=MAX_FPS,
+            keep=s.keep,
+        )
+        streams = {stream: list(encodings) for stream, encodings in STREAMS.items()}
         reply = Welcome(
             session=self.id,
             time=now - self.opened,
             seq=self.log.newest,
-            capabilities={"streams": STREAMS, "fps": s.fps, **self.capabilities},
+            capabilities=Capabilities(
+                streams=streams, pictures=list(PICTURES), fps=s.fps, **self.capabilities
+            ),
             limits=limits,
         )
         self.reply(connection, reply)

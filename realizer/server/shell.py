@@ -76,7 +76,7 @@ class Shell:
         )
         mapping_of(self.settings.face, self.settings.mapping)
         library_of(self.settings.expressions)
-        self._capabilities = await self._loop.run_in_executor(None, _capabilities)
+        self._capabilities = await self._loop.run_in_executor(None, _capabilities, self.settings)
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
 
     def end(self) -> None:
@@ -224,14 +224,25 @@ class Shell:
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
 
 
-def _capabilities() -> dict[str, Any]:
-    """What `welcome` tells beside streams: elements, faces and voices."""
+def _capabilities(settings: Settings) -> dict[str, Any]:
+    """What `welcome` tells beside streams; names, as documents and messages take them."""
+    from realizer.animation.targets import AU_NAMES
     from realizer.behaviours import KINDS
-    from realizer.face import list_faces
+    from realizer.emotion.words import known_words
+    from realizer.face import list_faces, load_face
+    from realizer.render.cameras import camera_names
+    from realizer.render.light import presets
     from realizer.speech import voices
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
 
     return {
         "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
+        "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},
+        "emotions": sorted(known_words()),
+        "expressions": sorted(library_of(settings.expressions)),
+        "aus": list(AU_NAMES()),
         "faces": [face.name for face in list_faces()],
         "voices": [voice.name for voice in voices() if voice.available],
+        "cameras": list(camera_names(load_face(settings.face, deformer=settings.deformer))),
+        "lights": list(presets()),
     }

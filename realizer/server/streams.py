@@ -14,6 +14,7 @@ from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
 from realizer.arrays import Float32, Int16, Int32
+from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.pipeline import CUT, heard
 from realizer.player import Player, Speaking
 from realizer.server.wire import FrameKind, json_frame, pack
@@ -29,6 +30,11 @@ WINDOW = 2.0  # s
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
 AHEAD = 0.1  # s
+# What follows the 52 weights of a frame of the stream arkit, in radians.
+TURNS = (
+    *("headYaw", "headPitch", "headRoll"),
+    *("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch"),
+)
 # Rounding of k / fps, and of times that go from one clock to another and back, on a clock of days.
 EPSILON = 1e-6  # s
 
@@ -78,6 +84,13 @@ class Window:
     def asked(self) -> Float32:
         """(n, n_au) float32, 0..1: as asked for, before the rules of co-occurrence."""
         return np.ascontiguousarray(self.aus.asked.astype("<f4"))
+
+    @cached_property
+    def arkit(self) -> Float32:
+        """(n, 59) float32: the weights, 0..1, and `TURNS` in radians; columns as `arkit_names()`."""
+        shown = arkit(self.aus, self._mapping)
+        eyes = shown.eyes.reshape(len(shown.times), 4)
+        return np.ascontiguousarray(np.concatenate([shown.weights, shown.head, eyes], axis=1).astype("<f4"))
 
     @cached_property
     def poses(self) -> Float32:
@@ -148,19 +161,28 @@ class Wanted(Protocol):
     asked: bool
 
 
+def arkit_names() -> list[str]:
+    """What the values of a frame of the stream arkit are."""
+    return [*ARKIT_NAMES(), *TURNS]
+
+
 def encode(window: Window, wanted: Wanted, frame: int) -> str | bytes:
     """Frame `frame` of the window as one WebSocket message."""
-    row, time, stream = frame - window.first, frame / window.fps, wanted.stream
-    aus = window.asked if wanted.asked else window.intensities
+    rows: Float32 | Int32 | Int16
+    match wanted.stream:
+        case "fap":
+            kind, rows = FrameKind.FAP, window.integers
+        case "au":
+            kind, rows = FrameKind.AU, window.asked if wanted.asked else window.intensities
+        case "arkit":
+            kind, rows = FrameKind.ARKIT, window.arkit
+        case _:
+            kind, rows = FrameKind.MESH, window.mesh
+    row, time = rows[frame - window.first], frame / window.fps
     if wanted.encoding == "json":
-        if stream == "fap":
-            return json_frame("fap", frame, time, window.integers[row].tolist(), wanted.name)
-        return json_frame("au", frame, time, [round(v, 4) for v in aus[row].tolist()], wanted.name)
-    if stream == "fap":
-        return pack(FrameKind.FAP, frame, time, window.integers[row].tobytes(), character=wanted.index)
-    if stream == "au":
-        return pack(FrameKind.AU, frame, time, aus[row].tobytes(), character=wanted.index)
-    return pack(FrameKind.MESH, frame, time, window.mesh[row].tobytes(), character=wanted.index)
+        values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
+        return json_frame(wanted.stream, frame, time, values, wanted.name)
+    return pack(kind, frame, time, row.tobytes(), character=wanted.index)
 
 
 class Sound:

@@ -1,4 +1,4 @@
-"""Voices and renderers behind threads: a Speak or a Draw in, an utterance or a JPEG out. Blocks."""
+"""Voices and renderers behind threads: a Speak or a Draw in, an utterance or a picture out. Blocks."""
 
 from __future__ import annotations
 
@@ -52,13 +52,14 @@ class Studio:
             return VoiceError(f"the voice failed: {error}")
 
     def draw(self, order: Draw) -> bytes | RealizerError:
-        """A JPEG; or why there is none."""
+        """Bytes of the picture; or why there are none."""
         try:
+            look = order.look
             try:
-                return self._renderer(order).jpeg(order.pose, order.look.quality)
+                return self._renderer(order).encoded(order.pose, look.form, look.quality)
             except RenderError:
                 # A drawing process that died is started anew by the next call; one that cannot fails again.
-                return self._renderer(order).jpeg(order.pose, order.look.quality)
+                return self._renderer(order).encoded(order.pose, look.form, look.quality)
         except RealizerError as error:
             return error
         except Exception as error:
@@ -84,7 +85,7 @@ class Studio:
     def _renderer(self, order: Draw) -> Renderer:
         from realizer.render import Renderer
 
-        look = replace(order.look, quality=0)  # which needs no other process
+        look = replace(order.look, quality=0, form="jpeg")  # which need no other process
         key = (order.face, look)
         if key not in self._renderers:
             if len(self._renderers) >= RENDERERS:

@@ -48,9 +48,10 @@ class FrameKind(IntEnum):
 
     FAP = 1  # 68 int32, column = FAP - 1
     AU = 2  # float32, 0..1, columns as named by `subscribed`
-    PICTURE = 3  # a JPEG
+    PICTURE = 3  # a JPEG, PNG or WebP
     SOUND = 4  # mono int16 PCM, 20 ms
     MESH = 5  # (n, 3) int16; vertex in metres = int16 x scale + offset, both in `subscribed`
+    ARKIT = 6  # 59 float32: ARKit's 52 weights, then the turns of head and eyes in radians
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class WireFrame:
 
     @property
     def values(self) -> Int32 | Float32 | Int16:
-        """The payload as numbers: (68,) int32, (n,) float32, (samples,) int16 or (n, 3) int16.
+        """The payload as numbers: (68,) int32, (n,) or (59,) float32, (samples,) int16 or (n, 3) int16.
 
         Raises:
             WireError: a picture has none.
@@ -74,13 +75,13 @@ class WireFrame:
         match self.kind:
             case FrameKind.FAP:
                 return np.frombuffer(self.payload, "<i4")
-            case FrameKind.AU:
+            case FrameKind.AU | FrameKind.ARKIT:
                 return np.frombuffer(self.payload, "<f4")
             case FrameKind.SOUND:
                 return np.frombuffer(self.payload, "<i2")
             case FrameKind.MESH:
                 return np.frombuffer(self.payload, "<i2").reshape(-1, 3)
-        raise WireError("a picture has no values: wanted a frame of FAPs, AUs, sound or a mesh")
+        raise WireError("a picture has no values: wanted a frame of numbers")
 
 
 def pack(

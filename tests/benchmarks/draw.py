@@ -28,7 +28,7 @@ from realizer.render.light import Shader, preset
 from realizer.render.offscreen import Canvas
 from realizer.render.onboard import OnboardCanvas
 from realizer.render.ways import WAYS
-from realizer.render.worker import encode_jpeg
+from realizer.render.worker import encode
 
 # Spoken by the silent voice in about ten seconds.
 TEXT = (
@@ -90,10 +90,11 @@ def main() -> None:
         canvas.close()
     else:
         print(f"by OpenGL: {missing}")
-    line("JPEG, quality 85", median(lambda: encode_jpeg(picture, 85), 60))
+    for form in ("jpeg", "png", "webp"):
+        line(f"written as {form}", median(lambda form=form: encode(picture, form, 85), 20))
 
     with Renderer(chosen.face, size, way=chosen.way) as renderer:
-        line("Renderer.jpeg, one row, all of it", median(lambda: renderer.jpeg(rows[0]), 40))
+        line("Renderer.encoded, JPEG of one row, all of it", median(lambda: renderer.encoded(rows[0]), 40))
         each = median(lambda: renderer.draw(rows), 3) / len(rows)
         line("Renderer.draw, a frame of a long call", each)
         for suffix, form in FORMATS.items():

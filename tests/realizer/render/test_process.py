@@ -53,10 +53,10 @@ def test_no_rows_give_no_pictures(renderer):
 @pytest.mark.gl
 def test_jpeg_is_the_same_picture(renderer):
     (picture,) = renderer.draw(rows(1))
-    encoded = np.asarray(Image.open(io.BytesIO(renderer.jpeg(rows(1)[0], quality=95))))
+    encoded = np.asarray(Image.open(io.BytesIO(renderer.encoded(rows(1)[0], quality=95))))
     assert encoded.shape == (80, 96, 3)
     assert np.abs(encoded.astype(int) - picture).mean() < 3
-    assert len(renderer.jpeg(rows(1)[0], quality=20)) < len(renderer.jpeg(rows(1)[0], quality=95))
+    assert len(renderer.encoded(rows(1)[0], quality=20)) < len(renderer.encoded(rows(1)[0], quality=95))
 
 
 @pytest.mark.gl
@@ -79,7 +79,7 @@ def test_a_killed_process_is_an_error_once_and_replaced_at_the_next_call(call):
         killed = renderer.pid
         os.kill(killed, signal.SIGKILL)
         with pytest.raises(RenderError, match=r"ended .*-9.*; the next call starts a new one"):
-            renderer.draw(rows(1)) if call == "draw" else renderer.jpeg(rows(1)[0])
+            renderer.draw(rows(1)) if call == "draw" else renderer.encoded(rows(1)[0])
         assert np.array_equal(renderer.draw(rows(1)), first)
         assert renderer.pid != killed
 
@@ -255,12 +255,21 @@ def test_jpeg_without_simplejpeg_is_written_by_pillow(tmp_path):
     code = (
         "import sys; sys.modules['simplejpeg'] = None\n"
         "import numpy as np\n"
-        "from realizer.render.worker import encode_jpeg\n"
-        "sys.stdout.buffer.write(encode_jpeg(np.full((20, 30, 3), 90, np.uint8)[::-1], 85))\n"
+        "from realizer.render.worker import encode\n"
+        "sys.stdout.buffer.write(encode(np.full((20, 30, 3), 90, np.uint8)[::-1], 'jpeg', 85))\n"
     )
     env = {**os.environ, "PYTHONPATH": str(Path(realizer.__path__[0]).parent)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=env)
     assert np.asarray(Image.open(io.BytesIO(done.stdout))).shape == (20, 30, 3)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("form", ["jpeg", "png", "webp"])
+def test_a_picture_is_written_in_every_form(renderer, form):
+    (picture,) = renderer.draw(rows(1))
+    written = Image.open(io.BytesIO(renderer.encoded(rows(1)[0], form, 95)))
+    assert written.format == form.upper()
+    assert np.abs(np.asarray(written).astype(int) - picture).mean() < (0.01 if form == "png" else 3)
 
 
 @pytest.mark.gl
@@ -272,7 +281,9 @@ def test_a_transparent_picture_is_the_opaque_one_without_its_backdrop(way):
         black = renderer.draw(rows(2)).astype(int)
     with Renderer("default", SIZE, background="transparent", way=way) as renderer:
         clear = renderer.draw(rows(2)).astype(int)
-        assert Image.open(io.BytesIO(renderer.jpeg(rows(1)[0]))).mode == "RGB"
+        assert Image.open(io.BytesIO(renderer.encoded(rows(1)[0]))).mode == "RGB"
+        for form in ("png", "webp"):
+            assert Image.open(io.BytesIO(renderer.encoded(rows(1)[0], form))).mode == "RGBA"
     assert clear.shape == (2, 80, 96, 4)
     assert clear[0, 0, 0, 3] == 0
     assert np.abs(clear[..., :3] * clear[..., 3:] / 255 - black).max() <= 2

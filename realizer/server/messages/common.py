@@ -1,0 +1,61 @@
+"""What all messages share: the protocol's version, its streams with their encodings, the bases."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+__all__ = [
+    "MAX_CONTROL",
+    "MAX_FPS",
+    "PICTURES",
+    "PROTOCOL",
+    "STREAMS",
+    "Encoding",
+    "Message",
+    "Picture",
+    "Reply",
+    "Stream",
+]
+
+# Version of the protocol that `hello` and `welcome` name.
+PROTOCOL = 1
+
+# Longest control message: a scene of a few thousand objects.
+MAX_CONTROL = 256 * 1024  # bytes
+# The highest rate of frames; ten times as fast as a film.
+MAX_FPS = 240
+
+Stream = Literal["feedback", "fap", "au", "arkit", "mesh", "audio", "video", "schedule"]
+Encoding = Literal["binary", "json", "text"]
+Picture = Literal["jpeg", "png", "webp"]
+# stream -> the encodings it has, the default first.
+STREAMS: dict[str, tuple[str, ...]] = {
+    "feedback": ("text",),
+    "fap": ("binary", "json"),
+    "au": ("binary", "json"),
+    "arkit": ("binary", "json"),
+    "mesh": ("binary",),
+    "audio": ("binary",),
+    "video": ("binary",),
+    "schedule": ("json",),
+}
+# What pictures of the stream `video` are, the default first -> their media type.
+PICTURES: dict[str, str] = {"jpeg": "image/jpeg", "png": "image/png", "webp": "image/webp"}
+
+
+class Message(BaseModel):
+    """A message in: no unknown fields, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Reply(BaseModel):
+    """A message out."""
+
+    model_config = ConfigDict(frozen=True)
+
+    def text(self) -> str:
+        """As it goes over the wire; fields that are None are left out."""
+        return self.model_dump_json(exclude_none=True)
