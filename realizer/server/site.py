@@ -1,4 +1,4 @@
-"""What the service's port answers over HTTP: the page, faces as GLB, the light, the examples, its health."""
+"""What the service's port answers over HTTP: the page and what its tools ask, faces as GLB, its health."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from importlib.resources import files
 from urllib.parse import parse_qs, unquote
 
 from realizer.errors import FaceError, RealizerError
+from realizer.settings import Settings
 
 __all__ = ["Answer", "Site"]
 
@@ -42,17 +43,12 @@ class Site:
 
     Args:
         health: what `/healthz` tells beside "ok".
-        light, background: how the page begins, as `realizer.render.Renderer` takes them.
+        settings: the service's; its light and background are how the page begins.
     """
 
-    def __init__(
-        self,
-        health: Callable[[], dict[str, object]],
-        light: str | None = None,
-        background: str | None = None,
-    ) -> None:
+    def __init__(self, health: Callable[[], dict[str, object]], settings: Settings | None = None) -> None:
         self._health = health
-        self._light, self._background = light, background
+        self._settings = settings or Settings()
         self._static = files("realizer.server").joinpath("static")
 
     def answer(self, target: str) -> Answer:
@@ -63,11 +59,29 @@ class Site:
             return Answer(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
         if path == "/examples.json":
             return Answer(200, JSON, _examples())
+        if path == "/vocabulary.json":
+            from realizer.server.vocabulary import vocabulary
+
+            return Answer(200, JSON, vocabulary())
+        if path in ("/feeling.json", "/pose.fap"):
+            return self._desk(path, {name: values[-1] for name, values in parse_qs(query).items()})
         if path == "/look.json":
             return self._look(parse_qs(query).get("face", ["default"])[0])
         if path.startswith("/faces/"):
             return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
         return self._file("index.html" if path == "/" else path[1:])
+
+    def _desk(self, path: str, query: dict[str, str]) -> Answer:
+        from realizer.server import desk
+
+        try:
+            if path == "/feeling.json":
+                return Answer(200, JSON, desk.feeling(query.get("of", "")).encode())
+            pose = desk.pose(query.get("set", ""), query.get("face"), self._settings)
+            named = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
+            return Answer(200, "text/x-fap", pose.encode(), named)
+        except desk.DeskError as error:
+            return Answer(400, TEXT, f"{error}\n".encode())
 
     def _face(self, name: str) -> Answer:
         try:
@@ -79,7 +93,7 @@ class Site:
 
     def _look(self, name: str) -> Answer:
         try:
-            return Answer(200, JSON, _look(name, self._light, self._background))
+            return Answer(200, JSON, _look(name, self._settings.light, self._settings.background))
         except FaceError as error:
             return Answer(404, TEXT, f"{error}\n".encode())
 

@@ -1,4 +1,4 @@
-"""The WebSocket door: messages in and out of sessions at /ws, HTTP beside it on the same port."""
+"""The WebSocket door: messages in and out of sessions at /ws, faults of texts at /check, HTTP beside them."""
 
 from __future__ import annotations
 
@@ -30,9 +30,10 @@ class WebSocketDoor:
         self.port = settings.port
         self._shell = shell
         self._settings = settings
-        self._site = Site(shell.health, shell.settings.light, shell.settings.background)
+        self._site = Site(shell.health, settings)
         self._socket: SocketServer | None = None
         self._closing: set[asyncio.Task[None]] = set()
+        self._checking = asyncio.Lock()
 
     @property
     def url(self) -> str:
@@ -82,14 +83,17 @@ class WebSocketDoor:
         """Everything but a WebSocket at /ws is answered here."""
         path = urlsplit(request.path).path
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
+        if path == "/check" and upgrade:
+            return None
         if path == "/ws" and upgrade:
             try:
                 self._shell.check(_query(request)[0])
             except HubError as error:
                 return _response(Answer(error.status, "text/plain; charset=utf-8", f"{error}\n".encode()))
             return None
-        if path == "/ws" or upgrade:
-            words = f"wanted a WebSocket at /ws, got {'a WebSocket' if upgrade else 'plain HTTP'} at {path}\n"
+        if path in ("/ws", "/check") or upgrade:
+            got = "a WebSocket" if upgrade else "plain HTTP"
+            words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
             return _response(Answer(426 if not upgrade else 404, "text/plain; charset=utf-8", words.encode()))
         loop = asyncio.get_running_loop()
         return _response(await loop.run_in_executor(None, self._site.answer, request.path))
@@ -97,6 +101,9 @@ class WebSocketDoor:
     async def _handle(self, socket: ServerConnection) -> None:
         """One WebSocket, from its opening to its end."""
         assert socket.request is not None
+        if urlsplit(socket.request.path).path == "/check":
+            await self._check(socket)
+            return
         client = _Client(socket)
         try:
             number = self._shell.join(client, *_query(socket.request))
@@ -116,6 +123,21 @@ class WebSocketDoor:
             writer.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await writer
+
+    async def _check(self, socket: ServerConnection) -> None:
+        """An editor's own WebSocket: a text in, its faults out, one after the other."""
+        from realizer.server.desk import faults
+
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(ConnectionClosed):
+            async for text in socket:
+                if isinstance(text, bytes):
+                    await socket.close(1003, "wanted text")
+                    return
+                # One text at a time, whoever asks: those that play come first.
+                async with self._checking:
+                    told = await loop.run_in_executor(None, faults, text, self._settings)
+                await socket.send(told)
 
     @property
     def _host(self) -> str:

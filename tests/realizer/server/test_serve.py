@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from websockets.asyncio.client import connect
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.server.serve import Server
@@ -174,6 +174,20 @@ def test_http_is_answered_on_the_same_port() -> None:
         assert json.loads(body)["status"] == "ok"
         assert (await asyncio.to_thread(fetch, server.page + "nothing"))[0] == 404
         assert (await asyncio.to_thread(fetch, server.page + "ws"))[0] == 426
+
+    serving(test)
+
+
+def test_an_editor_s_texts_are_checked_one_after_the_other() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url.removesuffix("/ws") + "/check") as editor:
+            for lexeme in ("NOD", "NIX"):
+                await editor.send(f'<bml id="a"><head id="n" lexeme="{lexeme}"/></bml>')
+            answers = [json.loads(await editor.recv()) for _ in range(2)]
+            assert [len(answer["faults"]) for answer in answers] == [0, 1]
+            await editor.send(b"<bml/>")
+            with pytest.raises(ConnectionClosed, match="wanted text"):
+                await editor.recv()
 
     serving(test)
 

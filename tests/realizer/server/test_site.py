@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from urllib.parse import quote
 
 import pytest
 
@@ -66,3 +67,14 @@ def test_without_a_bundle_the_page_says_how_to_get_one(tmp_path, monkeypatch) ->
     monkeypatch.setattr(site, "_static", tmp_path / "static")
     answer = site.answer("/")
     assert (answer.status, answer.body) == (503, NOT_BUILT.encode())
+
+
+def test_the_page_s_tools_are_answered_and_what_is_wrong_is_said() -> None:
+    assert json.loads(SITE.answer("/vocabulary.json").body)["elements"]
+    shown = SITE.answer("/feeling.json?of=" + quote('{"name": "joy"}'))
+    assert json.loads(shown.body)["values"]
+    file = SITE.answer("/pose.fap?face=ada&set=" + quote('{"type": "set", "aus": {"12": 0.5}}'))
+    assert file.body.startswith(b"2.1 pose 25 1\n")
+    assert "pose.fap" in dict(file.headers)["Content-Disposition"]
+    for target in ("/feeling.json", "/pose.fap", "/pose.fap?set=x", "/feeling.json?of=%00"):
+        assert SITE.answer(target).status == 400
