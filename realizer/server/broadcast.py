@@ -100,35 +100,51 @@ class Broadcast:
 
     def due(self, connections: Iterable[Connection], now: float) -> list[Effect]:
         """Every frame, packet and drawing whose time has come."""
-        connections = list(connections)
+        plans: list[tuple[Connection, PlanSubscription]] = []
+        sounds: list[tuple[Connection, SoundSubscription]] = []
+        frames: list[tuple[Connection, FrameSubscription]] = []
+        pictures: list[PictureSubscription] = []
+        for connection in connections:
+            for s in connection.subscriptions.values():
+                if isinstance(s, FrameSubscription):
+                    frames.append((connection, s))
+                elif isinstance(s, SoundSubscription):
+                    sounds.append((connection, s))
+                elif isinstance(s, PlanSubscription):
+                    plans.append((connection, s))
+                else:
+                    pictures.append(s)
         effects: list[Effect] = []
-        self._send_plans(connections, now, effects)
-        self._send_sound(connections, now, effects)
-        self._send_frames(connections, now, effects)
-        self._draw(connections, now, effects)
+        self._send_plans(plans, now, effects)
+        for connection, sound in sounds:
+            self._send_packets(connection, sound, now, effects)
+        if frames:
+            self._send_frames(frames, now, effects)
+        self._draw(pictures, now, effects)
         return effects
 
     def next_deadline(self, connections: Iterable[Connection]) -> float | None:
         """When `due` will next have something; None where nobody gets anything."""
-        deadlines: list[float] = []
+        first = math.inf
         plans: list[PlanSubscription] = []
         for connection in connections:
-            for subscription in connection.subscriptions.values():
-                match subscription:
-                    case FrameSubscription(timeline=timeline, next=number):
-                        deadlines.append(number / timeline.fps)
-                    case SoundSubscription():
-                        deadlines += self._sound_deadline(subscription)
-                    case PlanSubscription():
-                        plans.append(subscription)
-                    case PictureSubscription(view=view):
-                        busy = view.busy is not None
-                        deadlines.append(
-                            view.begun + DRAW_DEADLINE if busy else view.next / view.timeline.fps
-                        )
-        changed = bool(plans) and self._plans.have_changed()
-        deadlines += [s.again for s in plans if s.behind or changed]
-        return min(deadlines, default=None)
+            for s in connection.subscriptions.values():
+                if isinstance(s, FrameSubscription):
+                    first = min(first, s.next / s.timeline.fps)
+                elif isinstance(s, SoundSubscription):
+                    first = min(first, self._sound_deadline(s))
+                elif isinstance(s, PlanSubscription):
+                    plans.append(s)
+                else:
+                    view = s.view
+                    waits = (
+                        view.begun + DRAW_DEADLINE if view.busy is not None else view.next / view.timeline.fps
+                    )
+                    first = min(first, waits)
+        if plans:
+            changed = self._plans.have_changed()
+            first = min([first, *(s.again for s in plans if s.behind or changed)])
+        return None if first == math.inf else first
 
     def drawn(
         self, draw: int, picture: bytes | None, connections: Iterable[Connection]
@@ -159,14 +175,10 @@ class Broadcast:
 
     # inside -------------------------------------------------------------------------------------
 
-    def _send_plans(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
+    def _send_plans(
+        self, looking: list[tuple[Connection, PlanSubscription]], now: float, effects: list[Effect]
+    ) -> None:
         """What has changed, to all who know the rest; all of it to those who do not."""
-        looking = [
-            (connection, s)
-            for connection in connections
-            for s in connection.subscriptions.values()
-            if isinstance(s, PlanSubscription)
-        ]
         if not looking:
             self._plans.forget()
             return
@@ -184,19 +196,19 @@ class Broadcast:
             elif news:
                 effects.append(Send(connection.id, message(now, ",".join(news), s.name, whole=False)))
 
-    def _send_frames(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
-        groups: dict[int, list[tuple[Connection, FrameSubscription]]] = {}
-        for connection in connections:
-            for subscription in connection.subscriptions.values():
-                if isinstance(subscription, FrameSubscription):
-                    oldest = first_at(now - LATE, subscription.timeline.fps)
-                    if subscription.next < oldest:
-                        connection.dropped += oldest - subscription.next
-                        subscription.next = oldest
-                    if subscription.next <= last_at(now, subscription.timeline.fps):
-                        groups.setdefault(id(subscription.timeline), []).append((connection, subscription))
-        for group in groups.values():
-            timeline = group[0][1].timeline
+    def _send_frames(
+        self, wanted: list[tuple[Connection, FrameSubscription]], now: float, effects: list[Effect]
+    ) -> None:
+        groups: dict[Timeline, list[tuple[Connection, FrameSubscription]]] = {}
+        for connection, s in wanted:
+            fps = s.timeline.fps
+            oldest = first_at(now - LATE, fps)
+            if s.next < oldest:
+                connection.dropped += oldest - s.next
+                s.next = oldest
+            if s.next <= last_at(now, fps):
+                groups.setdefault(s.timeline, []).append((connection, s))
+        for timeline, group in groups.items():
             newest = last_at(now, timeline.fps)
             window = timeline.window(min(s.next for _, s in group), newest)
             messages: dict[tuple[str, str, str | None, bool, int], str | bytes] = {}
@@ -211,12 +223,6 @@ class Broadcast:
                         messages[key] = encode(window, s, number)
                     effects.append(Send(connection.id, messages[key]))
                 s.next = newest + 1
-
-    def _send_sound(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
-        for connection in connections:
-            for subscription in connection.subscriptions.values():
-                if isinstance(subscription, SoundSubscription):
-                    self._send_packets(connection, subscription, now, effects)
 
     def _send_packets(
         self, connection: Connection, subscription: SoundSubscription, now: float, effects: list[Effect]
@@ -255,22 +261,16 @@ class Broadcast:
             effects.append(Send(connection.id, data))
         subscription.next = last + 1
 
-    def _sound_deadline(self, subscription: SoundSubscription) -> list[float]:
-        span = subscription.sound.span()
+    def _sound_deadline(self, subscription: SoundSubscription) -> float:
         if subscription.revision != self.player.revision:
-            return [-math.inf]
+            return -math.inf
+        span = subscription.sound.span()
         if span is None or span[1] <= subscription.next * PACKET:
-            return []
-        return [max(subscription.next * PACKET, math.floor(span[0] / PACKET) * PACKET) - AHEAD]
+            return math.inf
+        return max(subscription.next * PACKET, math.floor(span[0] / PACKET) * PACKET) - AHEAD
 
-    def _draw(self, connections: list[Connection], now: float, effects: list[Effect]) -> None:
-        wanted = {
-            s.view.key: s.view
-            for c in connections
-            for s in c.subscriptions.values()
-            if isinstance(s, PictureSubscription)
-        }
-        self._views = wanted
+    def _draw(self, pictures: list[PictureSubscription], now: float, effects: list[Effect]) -> None:
+        wanted = self._views = {s.view.key: s.view for s in pictures}
         for view in wanted.values():
             fps = view.timeline.fps
             if view.busy is not None and now + EPSILON >= view.begun + DRAW_DEADLINE:
