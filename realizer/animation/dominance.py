@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,7 @@ class Track:
         mix: (m, 15) float64, part of each viseme.
         vowel: (m,) whether it is a vowel.
         size: (m,) float64, how much of its shape it reaches.
+        effort: (m,) float64, how much further than that jaw and lips open; 1 is usual.
         rest: (m,) whether it is a pause.
     """
 
@@ -40,50 +42,82 @@ class Track:
     mix: Float64
     vowel: Bool
     size: Float64
+    effort: Float64
     rest: Bool
+
+
+class _Row(NamedTuple):
+    begin: float
+    end: float
+    mix: tuple[tuple[int, float], ...]
+    vowel: bool = False
+    size: float = 1.0
+    effort: float = 1.0
+
+
+SILENT = ((0, 1.0),)
 
 
 def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
     """The sounds of phonemes (in order, "" is a pause); None where nothing is said."""
     facts = coarticulation()
-    rows: list[tuple[float, float, tuple[tuple[int, float], ...], bool, float]] = []
+    rows: list[_Row] = []
     for phoneme in phonemes:
         parts = sounds(phoneme.ipa)
         if not parts:
-            if not rows or rows[-1][2] != ((0, 1.0),):
-                rows.append((phoneme.start, phoneme.end, ((0, 1.0),), False, 1.0))
-            else:  # two pauses are one
-                rows[-1] = (rows[-1][0], phoneme.end, *rows[-1][2:])
+            if rows and rows[-1].mix == SILENT:  # two pauses are one
+                rows[-1] = rows[-1]._replace(end=phoneme.end)
+            else:
+                rows.append(_Row(phoneme.start, phoneme.end, SILENT))
             continue
         at, length = phoneme.start, phoneme.end - phoneme.start
         for part in parts:
-            size = facts["stress"][STRESS.get(phoneme.stress, "none")] if part.vowel else 1.0
-            rows.append((at, at + part.share * length, part.mix, part.vowel, size))
-            at += part.share * length
-    silent = ((0, 1.0),)
-    if all(row[2] in (silent, ()) for row in rows):
+            row = _Row(at, at + part.share * length, part.mix, part.vowel)
+            if part.vowel:
+                row = row._replace(size=_size(phoneme, row.end - at), effort=_effort(phoneme))
+            rows.append(row)
+            at = row.end
+    if all(row.mix in (SILENT, ()) for row in rows):
         return None
     # A short pause between sounds does not bring the mouth to rest; at the ends it always does.
     inner = range(1, len(rows) - 1)
+    absorbed = facts["pauses"]["absorbed"]
     rows = [
         row
         for k, row in enumerate(rows)
-        if not (k in inner and row[2] == silent and row[1] - row[0] < facts["pauses"]["absorbed"])
+        if not (k in inner and row.mix == SILENT and row.end - row.begin < absorbed)
     ]
-    begin, end = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    begin, end = np.array([row.begin for row in rows]), np.array([row.end for row in rows])
     middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or reach to the middle of what was absorbed
     mix = np.zeros((len(rows), VISEMES))
     for k, row in enumerate(rows):
-        for viseme, amount in row[2]:
+        for viseme, amount in row.mix:
             mix[k, viseme] = amount
     return Track(
         begin=np.concatenate((begin[:1], middle)),
         end=np.concatenate((middle, end[-1:])),
         mix=mix,
-        vowel=np.array([row[3] for row in rows]),
-        size=np.array([row[4] for row in rows]),
-        rest=np.array([row[2] == silent for row in rows]),
+        vowel=np.array([row.vowel for row in rows]),
+        size=np.array([row.size for row in rows]),
+        effort=np.array([row.effort for row in rows]),
+        rest=np.array([row.mix == SILENT for row in rows]),
     )
+
+
+def _size(phoneme: Phoneme, length: float) -> float:
+    """How much of its shape a vowel of that length reaches: what is missing falls off exponentially.
+
+    Source: Lindblom 1963, "Spectrographic study of vowel reduction", of formants; here of the mouth.
+    """
+    short = coarticulation()["undershoot"]
+    stress: float = coarticulation()["stress"][STRESS.get(phoneme.stress, "none")]
+    return stress * float(1 - short["lost"] * np.exp(-length / short["decay"]))
+
+
+def _effort(phoneme: Phoneme) -> float:
+    """How much further a vowel opens because it is loud."""
+    facts = coarticulation()["loudness"]
+    return float(np.clip(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"], facts["most"]))
 
 
 def key_times(phonemes: Sequence[Phoneme]) -> Float64:

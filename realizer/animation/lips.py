@@ -17,6 +17,8 @@ from realizer.speech.utterance import Phoneme
 
 __all__ = ["lip_channels"]
 
+OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # what opens further when speech is loud
+
 
 def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ...]:
     """How the mouth says `phonemes`: channels of the speech layer, in FAPU, and the presence "lips" 0..1.
@@ -49,6 +51,8 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
 def _mouth(track: Track, times: Float64) -> Float64:
     """(n, 10) float64: the weighted mean of the sounds around each time; columns `SHAPE`."""
     target = (track.mix @ shape_table()[0]) * track.size[:, None]
+    opening = [SHAPE.index(name) for name in OPENING]
+    target[:, opening] *= track.effort[:, None]
     mouth = np.empty((len(times), len(SHAPE)))
     for near, parts, members in dominances(track, times):
         for member in members:

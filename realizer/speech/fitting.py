@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from realizer.speech.loudness import with_volumes
 from realizer.speech.utterance import WARP, Say, Utterance, Voice
 
 __all__ = ["fitted", "near", "stretched"]
@@ -29,7 +30,11 @@ def fitted(voice: Voice, say: Say) -> Utterance:
     if say.recording is not None:
         from realizer.speech.given import played
 
-        return played(say, say.recording)
+        return with_volumes(say, played(say, say.recording))
+    return with_volumes(say, _spoken(voice, say))
+
+
+def _spoken(voice: Voice, say: Say) -> Utterance:
     utterance = voice.say(replace(say, seconds=None))
     if say.seconds is None or not utterance.duration:
         return utterance

@@ -68,12 +68,19 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Phoneme:
-    """One phoneme; `ipa` is "" for a pause, `stress` 0 none, 1 primary, 2 secondary."""
+    """One phoneme.
+
+    Attributes:
+        ipa: "" for a pause.
+        stress: 0 none, 1 primary, 2 secondary.
+        volume: how loud it is meant, on the amplitude; 1 is the voice's own way.
+    """
 
     start: float
     end: float
     ipa: str
     stress: int = 0
+    volume: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from realizer.speech.prosody import PLAIN
+from realizer.speech.prosody import PLAIN, Prosody
 from realizer.speech.ssml import Break, Mark, Script
 
 __all__ = ["Item", "Pause", "PlacedMark", "Spelled", "items", "words_in"]
@@ -28,6 +28,7 @@ class Spelled:
     text: str
     place: int
     rate: float = 1.0
+    volume: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,7 @@ def items(script: Script, phrase: str) -> tuple[Item, ...]:
     """Words, pauses and marks in the order of the text, for a voice that has no engine.
 
     Args:
-        script: the parts; <prosody rate> scales the words inside it, <sub alias> replaces its text.
+        script: the parts; <prosody> scales the words inside it, <sub alias> replaces its text.
         phrase: the characters that make a pause; a run of them is one.
     """
     found: list[Item] = []
@@ -72,7 +73,7 @@ def items(script: Script, phrase: str) -> tuple[Item, ...]:
     for part in script.parts:
         if isinstance(part, str):
             if not hidden:
-                found += _spelled(part, place, manners[-1].rate, phrase)
+                found += _spelled(part, place, manners[-1], phrase)
             place += len(part)
         elif isinstance(part, Mark):
             found.append(part)
@@ -85,17 +86,17 @@ def items(script: Script, phrase: str) -> tuple[Item, ...]:
             values = dict(part.attributes)
             manners.append(manners[-1].within(values) if part.name == "prosody" else manners[-1])
             if part.name == "sub":
-                found += _spelled(values.get("alias", ""), place, manners[-1].rate, phrase)
+                found += _spelled(values.get("alias", ""), place, manners[-1], phrase)
                 hidden += 1
     return tuple(found)
 
 
-def _spelled(text: str, place: int, rate: float, phrase: str) -> Iterator[Item]:
+def _spelled(text: str, place: int, manner: Prosody, phrase: str) -> Iterator[Item]:
     at = 0
     for word, start in [*words_in(text), ("", len(text))]:
         signs = "".join(c for c in text[at:start] if c in phrase)
         if signs:
             yield Pause(signs)
         if word:
-            yield Spelled(word, place + start, rate)
+            yield Spelled(word, place + start, manner.rate, manner.volume)
         at = start + len(word)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -132,6 +134,53 @@ def test_stressed_vowels_reach_further() -> None:
     strong = gap(lip_channels(say("_ t ɑ t _"), 0.0)).max()
     weak = gap(lip_channels(say("_ t ɑ t _", stressed=False), 0.0)).max()
     assert 0.7 * strong < weak < 0.95 * strong
+
+
+@pytest.mark.parametrize("vowel", ["ɑ", "ɛ", "i", "u"])
+def test_the_shorter_a_vowel_is_the_less_of_its_shape_it_reaches(vowel: str) -> None:
+    """Undershoot: what is missing grows as vowels get shorter, and faster the shorter they are."""
+    lengths = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27)
+    opened, jaw, width = np.array(
+        [
+            (gap(said).max(), values(said, 3).max(), np.abs(values(said, 6)).max())
+            for said in (lip_channels(say(f"_ t {vowel} t {vowel} t _", length), 0.0) for length in lengths)
+        ]
+    ).T
+    for reached in (opened, jaw, width):
+        assert (np.diff(reached) > 0).all()
+        assert (np.diff(np.diff(reached) / np.diff(lengths)) < 0).all()
+        assert 0.5 < reached[1] / reached[-1] < 0.85
+
+
+def test_quick_speech_closes_its_lips_all_the_same() -> None:
+    for length in (0.03, 0.05, 0.1):
+        assert gap(lip_channels(say("_ ɑ p ɑ _", length), 0.0))[30:].min() <= 0
+
+
+def loud(text: str, volume: float) -> tuple[Channel, ...]:
+    return lip_channels(tuple(replace(p, volume=volume) for p in say(text)), 0.0)
+
+
+def test_loud_vowels_open_jaw_and_lips_further_and_soft_ones_less() -> None:
+    volumes = (0.0, 0.5, 1.0, 1.4, 2.0, 4.0)
+    said = [loud("_ t ɑ t _", volume) for volume in volumes]
+    for reached in ([gap(s).max() for s in said], [values(s, 3).max() for s in said]):
+        assert reached == sorted(reached)
+        assert reached[1] < 0.9 * reached[2]
+        assert reached[4] > 1.15 * reached[2]
+    assert gap(said[0]).max() > 0.5 * gap(said[2]).max()  # a whisper is still seen
+    assert gap(said[-1]).max() < 20 * 46
+
+
+@pytest.mark.parametrize("volume", [0.0, 0.25, 4.0])
+def test_loudness_leaves_rounding_and_closures_as_they_are(volume: float) -> None:
+    usual, other = loud("_ u p ɑ f ɑ _", 1.0), loud("_ u p ɑ f ɑ _", volume)
+    for fap in (16, 17, 53):
+        assert np.array_equal(values(usual, fap), values(other, fap))
+    p, f = slice(44, 47), slice(64, 67)
+    assert gap(other)[p].max() <= 0
+    assert values(other, 5)[f].min() > 50
+    assert np.allclose(gap(usual)[f], gap(other)[f], atol=25)
 
 
 def test_long_pauses_let_go_of_the_lips_and_short_ones_do_not() -> None:

@@ -1,0 +1,37 @@
+"""What was asked for and what a voice made of it in, its phonemes as loud as the text wants them out."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import replace
+
+from realizer.speech.ssml import read_script
+from realizer.speech.utterance import Say, Utterance
+from realizer.speech.words import Spelled, items
+
+__all__ = ["with_volumes"]
+
+
+def with_volumes(say: Say, utterance: Utterance) -> Utterance:
+    """The utterance, each phoneme with the volume of the <prosody> elements around its word.
+
+    By the text and not by the sound: how loud a voice or a recording is of itself says nothing of effort.
+    Where the voice has other words than the text, they lie over each other evenly.
+    """
+    if "volume" not in say.ssml or not utterance.words:
+        return utterance
+    volumes = [item.volume for item in items(read_script(say), "") if isinstance(item, Spelled)]
+    if all(volume == 1.0 for volume in volumes):
+        return utterance
+    starts = [word.start for word in utterance.words]
+
+    def volume(middle: float) -> float:
+        word = max(0, bisect_right(starts, middle) - 1)
+        return volumes[word * len(volumes) // len(starts)]
+
+    return replace(
+        utterance,
+        phonemes=tuple(
+            replace(p, volume=volume((p.start + p.end) / 2)) if p.ipa else p for p in utterance.phonemes
+        ),
+    )
