@@ -85,7 +85,13 @@ class Cast:
     def first_of(self, id: str) -> Schedule | None:
         """Of the newest block of an id, as it was when it was accepted, from where it starts now."""
         newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
-        return None if newest is None else replace(newest.first, start=newest.start)
+        if newest is None:
+            return None
+        first = replace(newest.first, start=newest.start)
+        if newest.stopped is None:
+            return first
+        last = max(0.0, newest.stopped - newest.start)  # nothing of it comes any more
+        return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
 
     def anticipate(self, id: str, syncs: Mapping[str, float]) -> None:
         """Points in time that a client expects, seconds on the session clock."""

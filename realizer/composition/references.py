@@ -1,12 +1,13 @@
-"""A block in, every sync reference it makes out."""
+"""A block in, every sync reference it makes out, or the block with others."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
-from bml_schema import Block, Speech, Synchronize, SyncRef
+from bml_schema import Behaviour, Block, Constraint, Required, Speech, Sync, Synchronize, SyncRef
 
-__all__ = ["abroad", "references"]
+__all__ = ["abroad", "redirected", "references"]
 
 
 def abroad(block: Block) -> tuple[SyncRef, ...]:
@@ -27,3 +28,30 @@ def references(block: Block) -> Iterator[SyncRef]:
             yield from part.refs
             if not isinstance(part, Synchronize):
                 yield part.ref
+
+
+def redirected(block: Block, to: Callable[[SyncRef], SyncRef]) -> Block:
+    """The block with what `to` makes of each of its references."""
+
+    def inside(node: Behaviour | Constraint) -> Behaviour | Constraint:
+        if isinstance(node, Constraint):
+            parts = (replace(part, refs=tuple(map(to, part.refs))) for part in node.parts)
+            return replace(
+                node,
+                parts=tuple(p if isinstance(p, Synchronize) else replace(p, ref=to(p.ref)) for p in parts),
+            )
+        if isinstance(node, Speech) and node.text is not None:
+            said = (
+                replace(p, ref=to(p.ref)) if isinstance(p, Sync) and p.ref is not None else p
+                for p in node.text.parts
+            )
+            node = replace(node, text=replace(node.text, parts=tuple(said)))
+        return replace(node, syncs={point: to(ref) for point, ref in node.syncs.items()})
+
+    children = (
+        replace(child, children=tuple(map(inside, child.children)))
+        if isinstance(child, Required)
+        else inside(child)
+        for child in block.children
+    )
+    return replace(block, children=tuple(children))

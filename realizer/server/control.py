@@ -21,8 +21,8 @@ from realizer.server.connection import (
 )
 from realizer.server.effects import Look
 from realizer.server.messages import (
-    PROTOCOL,
     PICTURES,
+    PROTOCOL,
     STREAMS,
     Anticipate,
     BlockState,
@@ -45,6 +45,7 @@ from realizer.server.messages import (
     Unsubscribe,
     VoiceState,
 )
+from realizer.server.speeches import SpeechError
 from realizer.server.streams import arkit_names
 from realizer.tables import faps
 
@@ -86,8 +87,7 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
             case Anticipate():
                 session.player.anticipate(message.id, message.syncs, t)
             case SpeechMessage():
-                if message.clip is not None:
-                    session.clips.tell(message)
+                _say(session, connection, message, t)
             case Stop():
                 wanted = None if message.blocks is None else set(message.blocks)
                 waiting = session.preparation.waiting
@@ -97,7 +97,7 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
                 session.reply(connection.id, _state(session, connection, t))
             case Ping():
                 session.reply(connection.id, Pong(id=message.id, time=t))
-    except Wrong as error:
+    except (Wrong, SpeechError) as error:
         where = f"{message.type}.{error.where}"
         session.reply(connection.id, ErrorMessage(code="invalid", message=str(error), where=where))
     except ClipError as error:
@@ -108,6 +108,22 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
     except VoiceError as error:
         where = f"{message.type}.voice"
         session.reply(connection.id, ErrorMessage(code="voice", message=str(error), where=where))
+
+
+def _say(session: Session, connection: Connection, message: SpeechMessage, t: float) -> None:
+    if message.clip is not None and (message.id is None or _tells(message)):
+        session.clips.tell(message)
+    if message.id is None:
+        return
+    if message.clip is not None and message.clip not in session.clips.recordings:
+        raise Wrong("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
+    index_of(session, message.character)
+    session.speeches.hear(message, connection.id, t)
+
+
+def _tells(message: SpeechMessage) -> bool:
+    """Whether it says what is in its clip; one that only names it changes nothing of that."""
+    return bool(message.text is not None or message.words or message.phonemes or message.visemes)
 
 
 def _hello(session: Session, connection: Connection, message: Hello, t: float) -> None:

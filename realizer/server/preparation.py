@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from bml_schema import Block
@@ -22,6 +22,7 @@ class Waiting:
         utterances: behaviour -> what the voice has made.
         after: blocks in preparation that must be planned first.
         final: what the voice makes now is not asked for again.
+        lacks: whether something the block names is still to come.
     """
 
     block: Block
@@ -31,6 +32,12 @@ class Waiting:
     utterances: dict[str, Utterance] = field(default_factory=dict)
     after: set[Waiting] = field(default_factory=set)
     final: bool = False
+    lacks: Callable[[Block], bool] = lambda block: False
+
+    @property
+    def ready(self) -> bool:
+        """It waits for nothing."""
+        return not self.says and not self.after and not self.lacks(self.block)
 
 
 class Preparation:
@@ -89,11 +96,11 @@ class Preparation:
     @property
     def has_ready(self) -> bool:
         """Whether `ready` would give a block."""
-        return any(not w.says and not w.after for w in self.waiting)
+        return any(w.ready for w in self.waiting)
 
     def ready(self) -> Waiting | None:
         """The first block that waits for nothing; None where all wait. `remove` it when it is planned."""
-        return next((w for w in self.waiting if not w.says and not w.after), None)
+        return next((w for w in self.waiting if w.ready), None)
 
     def replaced_by(self, waiting: Waiting) -> list[Waiting]:
         """The blocks in preparation that came before a replacing block of their character."""

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import logging
-import re
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from bml_schema import Block, BMLError, read
+from bml_schema import Block
 from realizer.animation.mapping import FapMapping
-from realizer.behaviours import KINDS, VOCABULARY
+from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError, VoiceError
 from realizer.mapping import mapping_of
-from realizer.pipeline import as_it_is, warning_of, warped
+from realizer.pipeline import as_it_is, warped
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
@@ -24,6 +22,7 @@ from realizer.server.connection import STUCK, Connection
 from realizer.server.control import MAX_CHARACTERS, follow
 from realizer.server.effects import Close, Effect, Move, Send, Speak
 from realizer.server.feedback_log import FeedbackLog
+from realizer.server.inbox import Inbox
 from realizer.server.messages import (
     MAX_CONTROL,
     MAX_FPS,
@@ -37,6 +36,7 @@ from realizer.server.messages import (
     parse_control,
 )
 from realizer.server.preparation import Preparation, Waiting
+from realizer.server.speeches import Speeches
 from realizer.server.streams import EPSILON
 from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
@@ -52,12 +52,8 @@ log = logging.getLogger(__name__)
 
 # Feedback that is kept for clients that come back: about an hour of talk.
 LOG = 10_000
-# Messages that may wait to be read; a client that sends faster is told.
-INBOX = 1_000
 # A voice that has not answered by then is taken for silent.
 SPEAK_DEADLINE = 20.0  # s
-
-_BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})[\"']")
 
 
 class Session:
@@ -117,9 +113,10 @@ class Session:
         self.voice_fault: str | None = None
         self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
         self.preparation = Preparation()
+        self.speeches = Speeches(self.player)
         self._speaks = 0
         self._connections: dict[int, Connection] = {}
-        self._inbox: deque[Iterator[Block | BMLError | Warning]] = deque()
+        self._inbox = Inbox(settings.max_document)
         self.log = FeedbackLog(LOG, epoch)
         self._effects: list[Effect] = []
 
@@ -140,6 +137,7 @@ class Session:
     def disconnect(self, connection: int, now: float) -> None:
         """A client is gone. A session nobody named ends with it."""
         self._connections.pop(connection, None)
+        self.speeches.leave(connection)
         if not self._connections:
             self.empty_since = now
             if not self.named:
@@ -178,11 +176,8 @@ class Session:
                 self.reply(connection, control)
             else:
                 follow(self, self._connections[connection], control, now - self.opened)
-        elif len(self._inbox) >= INBOX:
-            text = f"{INBOX} messages wait to be read: wanted fewer at a time"
-            self._refuse(Warning(_name_of(message), "PARSING_FAILURE", text), now)
-        else:
-            self._inbox.append(self._documents(message))
+        elif (refused := self._inbox.put(message)) is not None:
+            self._refuse(refused, now - self.opened)
         self.tick(now)
 
     def _take_clip(self, connection: int, message: bytes) -> None:
@@ -230,14 +225,15 @@ class Session:
             self._silently(speak, f"the voice has not answered for {SPEAK_DEADLINE:g} s")
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
-        if self._submit_ready(t) or self._read_one(t):
+        done = self._submit_ready(t) or self._read_one(t)
+        if self.speeches.settle(t) or done:
             self._publish(t)
 
     def next_deadline(self) -> float | None:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
         if self.closed:
             return None
-        if self._inbox or self.preparation.has_ready:
+        if self._inbox or self.speeches.has_next or self.preparation.has_ready:
             return float("-inf")
         deadlines = [
             self.player.next_deadline(),
@@ -259,33 +255,14 @@ class Session:
 
     # documents ----------------------------------------------------------------------------------
 
-    def _documents(self, text: str) -> Iterator[Block | BMLError | Warning]:
-        limit = self.settings.max_document
-        size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
-        if size > limit:
-            words = f"wanted at most {limit} bytes of BML in a message, got {size}"
-            return iter([Warning(_name_of(text), "PARSING_FAILURE", words)])
-        return iter(read(text, VOCABULARY))
-
     def _read_one(self, t: float) -> bool:
-        """Take the next document of the inbox; False where there is none."""
-        while self._inbox:
-            try:
-                item = next(self._inbox[0], None)
-            except Exception:
-                log.exception("session %s: a document could not be read", self.id)
-                self._inbox.popleft()
-                self._refuse(Warning("<no id>", "PARSING_FAILURE", "internal error while reading"), t)
-                return True
-            if item is None:
-                self._inbox.popleft()
-                continue
-            if isinstance(item, Block):
-                self._prepare(item, t)
-            else:
-                self._refuse(item if isinstance(item, Warning) else warning_of(item), t)
-            return True
-        return False
+        """Prepare what comes next in a speech, or in the inbox; False where there is nothing."""
+        item = self.speeches.next() or self._inbox.next()
+        if isinstance(item, Warning):
+            self._refuse(item, t)
+        elif item is not None:
+            self._prepare(item, t)
+        return item is not None
 
     def _prepare(self, block: Block, t: float) -> None:
         """Ask for the block's voice and acknowledge it; it is planned when nothing is missing."""
@@ -293,9 +270,11 @@ class Session:
             self._refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
             return
         try:
+            block = self.speeches.placed(block)
             wants = self.player.wants(block)
             character = self.player.character_index(block.character_id)
             waiting = self.preparation.add(block, character, {}, t)
+            waiting.lacks = self.speeches.lacks
             self.player.announce(block, t)
         except Exception:
             self._internal(block, t)
@@ -308,6 +287,7 @@ class Session:
         if waiting is None:
             return False
         try:
+            waiting.block = self.speeches.placed(waiting.block)
             schedule = self.player.submit(waiting.block, t, waiting.utterances)
             if schedule.lengths and waiting.final:
                 # Time has passed while the voice spoke, and it never comes exactly: what is left is little.
@@ -321,6 +301,11 @@ class Session:
             self._speak_again(waiting, schedule.lengths, t)
             return True
         self.preparation.remove([waiting])
+        if schedule.failed:
+            self.speeches.refused(waiting.block.id)
+        else:
+            words = (word.text for utterance in waiting.utterances.values() for word in utterance.words)
+            self.speeches.planned(waiting.block.id, " ".join(words))
         if waiting.block.composition == "REPLACE" and not schedule.failed:
             self.withdraw(self.preparation.replaced_by(waiting), t)
         return True
@@ -347,6 +332,7 @@ class Session:
     def withdraw(self, gone: list[Waiting], t: float) -> None:
         for waiting in gone:
             self.player.withdraw(waiting.block, t)
+            self.speeches.refused(waiting.block.id)
         self.preparation.remove(gone)
 
     def _beyond_limits(self, block: Block) -> str | None:
@@ -372,6 +358,7 @@ class Session:
 
     def _refuse(self, warning: Warning, t: float, character: str | None = None) -> None:
         self.player.refuse(warning, t, character)
+        self.speeches.refused(warning.id)
 
     def _silently(self, speak: int, fault: str) -> None:
         """Let the silent voice answer for one that failed; a client sees it in `state` alone."""
@@ -389,8 +376,13 @@ class Session:
 
     def _publish(self, t: float) -> None:
         """Number what is due, keep it, and send it to every connection that has not switched it off."""
-        for feedback in self.player.due(t + EPSILON):
-            self.log.add(feedback)
+        while due := self.player.due(t + EPSILON):
+            for feedback in due:
+                told, ends = self.speeches.told(feedback)
+                self.log.add(told)
+                if ends:
+                    self.withdraw([w for w in self.preparation.waiting if w.block.id in ends], t)
+                    self.player.stop(t, ends)
         for connection in self._connections.values():
             if connection.place <= self.log.newest:
                 self._catch_up(connection)
@@ -457,12 +449,6 @@ class Session:
 
     def reply(self, connection: int, reply: Any) -> None:
         self._effects.append(Send(connection, reply.text()))
-
-
-def _name_of(text: str) -> str:
-    """The block id of a document that is not parsed, where it can be read near its start."""
-    found = _BLOCK_ID.search(text, 0, 4096)
-    return found.group(1) if found else "<no id>"
 
 
 def _load_face(name: str, deformer: str | None) -> Face:

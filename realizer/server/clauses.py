@@ -1,0 +1,123 @@
+"""Text as it comes in, with tags in it, whole sentences out as soon as they are whole."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+from realizer import tables
+
+__all__ = ["TAG", "Clauses"]
+
+# A tag; groups: "/" of an end, name, attributes, "/" of one without an inside.
+TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
+BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # a tag of which more is to come
+LONGEST_TAG = 2000  # characters; what is longer is no tag
+MOST = 20_000  # characters; what waits no longer for its end tag
+
+
+class Clauses:
+    """What has come of a text and is not spoken yet."""
+
+    def __init__(self) -> None:
+        self._rest = ""
+        self._first = True
+
+    def feed(self, text: str, *, close: bool = False) -> list[str]:
+        """Take more of the text.
+
+        A sentence is whole when a blank follows it; tags that follow it at once are part of it. Where one is
+        long (the first of all: not short) it is given out by clauses. Elements are never divided.
+
+        Args:
+            close: nothing follows: what is left is given out too.
+
+        Returns:
+            Pieces in order; together they are the text.
+        """
+        self._rest += text
+        pieces: list[str] = []
+        while (end := _end(self._rest, first=self._first, closed=close)) is not None:
+            pieces.append(self._rest[:end])
+            self._rest, self._first = self._rest[end:], False
+        if close or len(self._rest) > MOST:
+            pieces.append(self._rest)
+            self._rest = ""
+        return [piece for piece in pieces if piece.strip()]
+
+
+def _end(text: str, *, first: bool, closed: bool) -> int | None:
+    """How long the first piece of a text is; None while it is not whole."""
+    facts = _facts()
+    limit = facts["first"] if first else facts["longest"]
+    at = depth = length = 0
+    blank: int | None = None  # behind the last one that is in no element
+    ended = False  # a sentence, up to here
+    while at < len(text):
+        if text[at] == "<":
+            tag = TAG.match(text, at)
+            if tag is not None:
+                depth = max(0, depth + (-1 if tag[1] else 0 if tag[4] else 1))
+                at = tag.end()
+                continue
+            if not closed and BEGUN.match(text[at : at + LONGEST_TAG]):
+                return None
+            # It is a sign like others.
+        end = text.find("<", at + 1)
+        end = len(text) if end < 0 else end
+        run = text[at:end]
+        if depth == 0:
+            if ended and run[0].isspace():
+                return at
+            for sign in _signs().finditer(run):
+                kind, stop = sign.lastgroup, sign.end()
+                follows = run[stop : stop + 1]
+                if kind == "sentence" and _abbreviated(text[:at] + run[:stop]):
+                    continue
+                if not follows and kind == "sentence" and end < len(text):
+                    break  # a tag follows at once: it is seen when that is past
+                if not (follows.isspace() or sign[0][-1] in facts["alone"] + facts["wide"]):
+                    continue
+                if kind == "sentence" or length + stop >= limit:
+                    return at + stop
+            spaces = [found.end() for found in re.finditer(r"\s", run)]
+            blank = at + spaces[-1] if spaces else blank
+            ended = bool(_ending().search(run)) and not _abbreviated(text[:end])
+            if (paragraph := re.search(r"\n\s*\n", run)) and text[: at + paragraph.start()].strip():
+                return at + paragraph.end()
+            if blank is not None and length + len(run) > facts["most"]:
+                return blank
+        length += len(run)
+        at = end
+    return None
+
+
+def _abbreviated(text: str) -> bool:
+    """Whether a full stop at its end is that of an abbreviation, an initial or a number in a list."""
+    found = re.search(r"([^\W_][\w.]*)\.$", text)
+    if found is None:
+        return False
+    word = found[1].lower()
+    alone = not TAG.sub("", text[: found.start()]).strip()
+    return (
+        word in _facts()["abbreviations"] or (len(word) == 1 and word.isalpha()) or (alone and word.isdigit())
+    )
+
+
+@cache
+def _signs() -> re.Pattern[str]:
+    facts = _facts()
+    signs, marks, closing = (re.escape(facts[name]) for name in ("signs", "marks", "closing"))
+    return re.compile(f"(?P<sentence>[{signs}]+[{closing}]*)|(?P<clause>[{marks}][{closing}]*)")
+
+
+@cache
+def _ending() -> re.Pattern[str]:
+    facts = _facts()
+    return re.compile(f"[{re.escape(facts['signs'])}][{re.escape(facts['closing'])}]*$")
+
+
+@cache
+def _facts() -> dict[str, Any]:
+    return tables.read_toml(tables.text_of("clauses.toml"), "clauses.toml")

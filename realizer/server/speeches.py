@@ -1,0 +1,297 @@
+"""Speeches that clients say piece by piece: text and clips in, their blocks and one around them out."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from bml_schema import Block, BlockProgress, Feedback, SyncRef, read
+from realizer.behaviours import VOCABULARY
+from realizer.composition.playing import Playing
+from realizer.composition.references import redirected, references
+from realizer.player import Player
+from realizer.server.clauses import Clauses
+from realizer.server.messages import SpeechMessage
+from realizer.server.pieces import Piece, clip_block, text_block
+
+__all__ = ["SpeechError", "Speeches"]
+
+# An open speech ends so much later than now, as long as nobody knows when.
+OPEN = 1e6  # s
+# Its block ends so much behind its last piece, so that what is told of that one comes first.
+BEHIND = 1e-3  # s
+SAME = 1e-6  # s
+# So many pieces are made ahead of the one that is heard. More is work that an interruption makes useless.
+AHEAD = 6
+MOST = 500_000  # characters of one speech that wait; nine hours
+MOST_SPEECHES = 1_000  # of a session
+CUT_OFF = ("INTERRUPTED", "REVOKED")
+ENDS = "speech-"  # an anticipator: when a speech ends
+
+
+class SpeechError(ValueError):
+    """A message of a speech that cannot be followed; `where` is its field."""
+
+    def __init__(self, where: str, text: str) -> None:
+        super().__init__(text)
+        self.where = where
+
+
+@dataclass(frozen=True, slots=True)
+class _Clip:
+    """A recording that is said after the text before it."""
+
+    id: str
+
+
+@dataclass(eq=False)
+class _Speech:
+    """One speech.
+
+    Attributes:
+        piece: the last one that was made.
+        unsaid: what is in no piece yet.
+        marks: sync -> the piece it stands in.
+        owed: pieces that were made and are not planned yet, in order.
+        ahead: pieces that are planned and have not ended, in order.
+        said: piece -> its words, as they are planned or were heard, in order.
+        asked: its own block was given out.
+        closed: nothing follows.
+        over: it was cut off.
+        spoken: when the last piece that has ended did, seconds on the session clock.
+        end: when its own block is anticipated to end.
+    """
+
+    id: str
+    connection: int
+    composition: str
+    piece: Piece
+    clauses: Clauses = field(default_factory=Clauses)
+    unsaid: deque[str | _Clip] = field(default_factory=deque)
+    marks: dict[str, str] = field(default_factory=dict)
+    owed: list[str] = field(default_factory=list)
+    ahead: list[str] = field(default_factory=list)
+    said: dict[str, str] = field(default_factory=dict)
+    asked: bool = False
+    closed: bool = False
+    over: bool = False
+    spoken: float = 0.0
+    end: float = 0.0
+
+    def close(self) -> None:
+        """Nothing follows: what is left is whole."""
+        self.unsaid.extend(self.clauses.feed("", close=True))
+        self.closed = True
+
+    def done(self, piece: str) -> None:
+        """A piece has ended, or never comes."""
+        for pieces in (self.owed, self.ahead):
+            if piece in pieces:
+                pieces.remove(piece)
+
+
+class Speeches:
+    """The speeches of a session.
+
+    Block `ID` is a <wait> from the first piece to the last: others can follow, interrupt and replace it as
+    any block. Piece k is block `ID.k` and starts when the one before it has ended.
+    """
+
+    def __init__(self, player: Player) -> None:
+        self._player = player
+        self._speeches: dict[str, _Speech] = {}
+
+    # from clients -------------------------------------------------------------------------------
+
+    def hear(self, message: SpeechMessage, connection: int, t: float) -> None:
+        """More of a speech.
+
+        What comes for one that was cut off is left out; its id is free again when it is closed.
+
+        Raises:
+            SpeechError: too much of it waits to be said, or it was closed and is still being said.
+        """
+        assert message.id is not None
+        speech = self._speeches.get(message.id)
+        if speech is None:
+            if len(self._speeches) >= MOST_SPEECHES:
+                raise SpeechError("id", f"wanted at most {MOST_SPEECHES} speeches at a time")
+            piece = Piece(message.id, 0, message.character, message.language)
+            speech = _Speech(message.id, connection, message.composition, piece, spoken=t)
+            self._speeches[message.id] = speech
+            self._anticipate(speech, t + OPEN, t)
+        elif speech.over:
+            if message.close:
+                del self._speeches[message.id]
+            return
+        elif speech.closed:
+            raise SpeechError(
+                "id", f"wanted a speech that is open, {message.id!r} was closed and is being said"
+            )
+        text = message.append or ""
+        waiting = sum(len(one) for one in speech.unsaid if isinstance(one, str))
+        if waiting + len(text) > MOST:
+            raise SpeechError("append", f"wanted at most {MOST} characters that wait to be said, got more")
+        speech.unsaid.extend(speech.clauses.feed(text, close=message.clip is not None))
+        if message.clip is not None:
+            speech.unsaid.append(_Clip(message.clip))
+        if message.close:
+            speech.close()
+
+    def leave(self, connection: int) -> None:
+        """Who spoke is gone: what is left is said, then its speeches end."""
+        for speech in [s for s in self._speeches.values() if s.connection == connection and not s.closed]:
+            speech.close()
+            if speech.over:
+                del self._speeches[speech.id]
+
+    # blocks out ---------------------------------------------------------------------------------
+
+    def next(self) -> Block | None:
+        """The next block that is to be prepared."""
+        speech = next(filter(self._has_next, self._speeches.values()), None)
+        if speech is None:
+            return None
+        if not speech.asked:
+            speech.asked = True
+            return _holder(speech)
+        one = speech.unsaid.popleft()
+        number = speech.piece.number + 1
+        piece = speech.piece = replace(speech.piece, number=number, marks=dict(speech.marks))
+        block = clip_block(one.id, piece) if isinstance(one, _Clip) else text_block(one, piece)
+        said = next((node for node in block.behaviours if node.id == speech.id), None)
+        speech.marks |= dict.fromkeys(getattr(said, "marked", ()), block.id)
+        speech.owed.append(block.id)
+        return block
+
+    @property
+    def has_next(self) -> bool:
+        """Whether `next` would give a block."""
+        return any(map(self._has_next, self._speeches.values()))
+
+    def placed(self, block: Block) -> Block:
+        """A piece behind those before it; any other block with what it says of `ID:ID:m` of the piece."""
+        speech = self._of(block.id)
+        if speech is None or block.id == speech.id:
+            return redirected(block, self._found) if any(map(self._names, references(block))) else block
+        holder = self._player.cast.find(speech.id)
+        before = [id for id in (*speech.ahead, *speech.owed) if id != block.id]
+        if holder is not None and holder.waiting:
+            before += [wait.block.block.id for wait in holder.waits]
+        return replace(block, append_after=tuple(before))
+
+    def lacks(self, block: Block) -> bool:
+        """Whether it names a sync of a speech that may still come."""
+        for ref in filter(self._names, references(block)):
+            speech = self._speeches[ref.block or ""]
+            piece = speech.marks.get(ref.sync or "")
+            if (piece is None and not (speech.closed and not speech.unsaid)) or piece in speech.owed:
+                return True
+        return False
+
+    # what became of them ------------------------------------------------------------------------
+
+    def planned(self, block: str, words: str) -> None:
+        """A block was taken in, and says this."""
+        speech = self._of(block)
+        if speech is not None and block in speech.owed:
+            speech.done(block)
+            speech.ahead.append(block)
+            speech.said[block] = words
+
+    def refused(self, block: str) -> None:
+        """A block will not play; without the one that holds it together a speech is over."""
+        speech = self._of(block)
+        if speech is not None:
+            speech.done(block)
+            speech.over |= block == speech.id
+
+    def told(self, feedback: Feedback) -> tuple[Feedback, frozenset[str]]:
+        """Feedback as it is to go out, and the blocks that end with what it tells of."""
+        if not isinstance(feedback, BlockProgress) or not feedback.id.endswith(":end"):
+            return feedback, frozenset()
+        block = feedback.id.removesuffix(":end")
+        speech = self._of(block)
+        if speech is None:
+            return feedback, frozenset()
+        if block != speech.id:
+            speech.done(block)
+            speech.spoken = max(speech.spoken, feedback.global_time)
+            if feedback.said is not None:
+                speech.said[block] = feedback.said
+            return feedback, frozenset()
+        left = frozenset({*speech.ahead, *speech.owed})
+        if feedback.status not in CUT_OFF:
+            del self._speeches[speech.id]
+            return feedback, left
+        speech.over = True
+        if speech.closed:
+            del self._speeches[speech.id]
+        return replace(feedback, said=" ".join(self._heard(speech, feedback.global_time))), left
+
+    def settle(self, t: float) -> bool:
+        """Let the block of each speech end with its last piece; True where one ends at another time."""
+        moved = False
+        for speech in self._speeches.values():
+            if speech.over:
+                continue
+            if not speech.closed or speech.owed or speech.unsaid:
+                end = t + OPEN if speech.end < t + OPEN / 2 else speech.end
+            else:
+                last = (self._player.cast.find(id) for id in speech.ahead)
+                end = max([speech.spoken, *(piece.end for piece in last if piece is not None)]) + BEHIND
+                end = max(t, end)
+            if abs(end - speech.end) > SAME:
+                self._anticipate(speech, end, t)
+                moved = True
+        return moved
+
+    # inside -------------------------------------------------------------------------------------
+
+    def _of(self, block: str) -> _Speech | None:
+        name, _, number = block.rpartition(".")
+        return self._speeches.get(name if number.isdigit() and name in self._speeches else block)
+
+    def _has_next(self, speech: _Speech) -> bool:
+        if speech.over:
+            return False
+        if not speech.asked:
+            return True
+        ready = bool(speech.unsaid) and len(speech.ahead) + len(speech.owed) < AHEAD
+        return ready and self._player.cast.find(speech.id) is not None
+
+    def _names(self, ref: SyncRef) -> bool:
+        """Whether it is a sync in the text of a speech: `ID:ID:m`."""
+        known = ref.block is not None and ref.block in self._speeches and ref.behaviour == ref.block
+        return known and ref.sync not in ("start", "end")
+
+    def _found(self, ref: SyncRef) -> SyncRef:
+        """A reference to a sync of a speech, as one to the piece it stands in."""
+        if not self._names(ref):
+            return ref
+        piece = self._speeches[ref.block or ""].marks.get(ref.sync or "")
+        return ref if piece is None else replace(ref, block=piece)
+
+    def _anticipate(self, speech: _Speech, end: float, t: float) -> None:
+        speech.end = end
+        self._player.anticipate(ENDS + speech.id, {"end": end}, t)
+
+    def _heard(self, speech: _Speech, t: float) -> Iterator[str]:
+        """What was heard of each piece; those that end just now are not told of yet."""
+        ending = {playing.block.id: playing for playing in self._player.cast.all()}
+        for piece, words in speech.said.items():
+            heard = _said(ending.get(piece), t) if piece in speech.ahead else None
+            if heard or (heard is None and words):
+                yield words if heard is None else heard
+
+
+def _said(playing: Playing | None, t: float) -> str | None:
+    return None if playing is None else playing.said(t)
+
+
+def _holder(speech: _Speech) -> Block:
+    wait = f'<wait id="{speech.id}" start="0" end="anticipators:{ENDS}{speech.id}:end"/>'
+    (block,) = read(replace(speech.piece, number=0).document(wait), VOCABULARY)
+    assert isinstance(block, Block)
+    return replace(block, id=speech.id, composition=speech.composition)
