@@ -9,6 +9,7 @@ import click
 import realizer
 from realizer.cli import options
 from realizer.cli.align import align
+from realizer.cli.batch import batch
 from realizer.cli.check import check
 from realizer.cli.demo import demo
 from realizer.cli.doctor import doctor
@@ -38,6 +39,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     realizer demo                          play the examples, leave a film, open a page
     realizer serve                         take BML over a WebSocket, stream faces back
     realizer realize hello.bml -o hello.mp4
+    realizer batch talks/ -o films/ --format mp4
     realizer schedule hello.bml            when every sync point falls
     realizer check hello.bml               every fault, with line and path
     realizer emotion guilty                what an emotion looks like, in FAPs or as a picture
@@ -62,6 +64,7 @@ for command in (
     voices,
     align,
     outputs,
+    batch,
     doctor,
     demo,
 ):

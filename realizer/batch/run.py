@@ -1,0 +1,63 @@
+"""Documents in, outputs and a manifest in a folder out, whoever does the work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Protocol
+
+from realizer.batch.documents import Document
+from realizer.batch.manifest import Manifest, Row
+from realizer.batch.task import Options, Task, fingerprint, key_of
+from realizer.batch.work import Outcome
+from realizer.outputs.files import write_bytes
+
+__all__ = ["Crew", "batch"]
+
+
+class Crew(Protocol):
+    """Whoever plays documents: `Processes` or a `Cluster`."""
+
+    def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
+        """The outcome of each task, in any order."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the workers."""
+        ...
+
+
+def batch(
+    documents: Iterable[Document], folder: Path, options: Options, crew: Crew
+) -> Iterator[tuple[Row, bool]]:
+    """Play what was not played yet; (row of the manifest, whether it was there already) for each document.
+
+    What comes of a document is written first and told of in the manifest then: a crash in between costs that
+    document's time and nothing else.
+
+    Raises:
+        BusyError: another batch writes to that folder.
+        FaceError: no such face.
+        OSError: a document cannot be read, or an output not be written.
+    """
+    mark = fingerprint(options)
+    with Manifest(folder).open() as manifest:
+        left: list[Document] = []
+        for document in documents:
+            row = manifest.has(document.name, key_of(document.path.read_bytes(), mark))
+            if row is None:
+                left.append(document)
+            else:
+                yield row, True
+        for outcome in crew.perform(_task(document, mark) for document in left):
+            for name, content in outcome.files.items():
+                path = folder / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write_bytes(path, content)
+            manifest.add(outcome.row)
+            yield outcome.row, False
+
+
+def _task(document: Document, mark: str) -> Task:
+    text = document.path.read_bytes()
+    return Task(document.name, key_of(text, mark), text, mark)

@@ -1,0 +1,119 @@
+"""A document and how it is to be played in, the key of what comes out: same key, same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import bml_schema
+import realizer
+from realizer.behaviours.kind import Position
+
+__all__ = ["Options", "Task", "fingerprint", "key_of"]
+
+# What decides about bytes beside our own files, where it is installed: voices, and what encodes.
+# Parts of our packages that no output is made by.
+APART = {"static", "web", "_faces", "server", "cli", "batch"}
+ENGINES = ("av", "espeakng-loader", "hibari-tts", "numpy", "pillow")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How all documents of a batch are played, as `realize` and `Drawing` take it; `formats` are suffixes."""
+
+    formats: tuple[str, ...]
+    voice: str
+    face: str = "default"
+    deformer: str | None = None
+    fps: float = 25.0
+    scene: tuple[tuple[str, Position], ...] | None = None
+    seed: int = 0
+    idle: bool = True
+    language: str = "en-US"
+    cooccurrence: str = "on"
+    prosody: bool = True
+    media: Path | None = None
+    expressions: Path | None = None
+    mapping: Path | None = None
+    size: tuple[int, int] = (512, 512)
+    camera: str = "front"
+    light: str | None = None
+    background: str | None = None
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """The files and folders that are named, by option: what is in them counts, not where they lie."""
+        named = {"media": self.media, "expressions": self.expressions, "mapping": self.mapping}
+        if self.cooccurrence not in ("on", "off"):
+            named["cooccurrence"] = Path(self.cooccurrence)
+        return {option: path for option, path in named.items() if path is not None}
+
+    def told(self) -> str:
+        """All but the files, as JSON."""
+        values = {name: getattr(self, name) for name in self.__slots__ if name not in self.files}
+        return json.dumps(values, sort_keys=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One document to play.
+
+    Attributes:
+        name: of the document.
+        key: of what comes out.
+        text: the document.
+        fingerprint: of the options, the program and its tables, where the key was made.
+    """
+
+    name: str
+    key: str
+    text: bytes
+    fingerprint: str
+
+
+def fingerprint(options: Options) -> str:
+    """Of everything but the document that decides about the bytes of an output, 64 hexadecimal digits.
+
+    The options, the files they name, the program with its tables, the face, and the versions of engines.
+
+    Raises:
+        FaceError: no such face.
+        OSError: a file cannot be read.
+    """
+    from realizer.face.load import folder_of
+
+    digest = hashlib.sha256(options.told().encode())
+    for package in (bml_schema, realizer):
+        root = Path(package.__path__[0])
+        for suffix in (".py", ".csv", ".toml"):
+            files = (p for p in root.rglob(f"*{suffix}") if not APART & {*p.relative_to(root).parts})
+            _add(digest, root, files)
+    for folder in (folder_of(options.face), *options.files.values()):
+        _add(digest, folder, _inside(folder))
+    for name in ENGINES:
+        try:
+            digest.update(f"{name} {version(name)}\n".encode())
+        except PackageNotFoundError:
+            digest.update(f"{name} none\n".encode())
+    return digest.hexdigest()
+
+
+def key_of(text: bytes, mark: str) -> str:
+    """The key of a document that is played where the fingerprint is `mark`, 64 hexadecimal digits."""
+    return hashlib.sha256(mark.encode() + b"\n" + text).hexdigest()
+
+
+def _inside(path: Path) -> Iterator[Path]:
+    return iter([path]) if path.is_file() else (p for p in path.rglob("*") if p.is_file())
+
+
+def _add(digest: hashlib._Hash, root: Path, files: Iterator[Path]) -> None:
+    """The names and contents of files, in order of their names below the root."""
+    for path in sorted(files):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())
+        digest.update(content)

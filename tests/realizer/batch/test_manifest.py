@@ -1,0 +1,74 @@
+"""The manifest: rows that survive a crash, and know whether an output is still what was written."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from realizer.batch.manifest import NAME, BusyError, Manifest
+
+
+def row(name: str, status: str = "done", content: bytes = b"") -> dict[str, Any]:
+    output = {"file": f"{name}.fap", "bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+    outputs = {".fap": output} if content else {}
+    return {"document": name, "key": f"key of {name}", "status": status, "outputs": outputs}
+
+
+def test_rows_are_in_the_file_at_once_and_in_order_of_documents_at_the_end(tmp_path: Path) -> None:
+    with Manifest(tmp_path).open() as manifest:
+        for name in "ba":
+            manifest.add(row(name))
+        assert [json.loads(line)["document"] for line in manifest.path.read_text().splitlines()] == ["b", "a"]
+    assert [json.loads(line)["document"] for line in manifest.path.read_text().splitlines()] == ["a", "b"]
+
+
+def test_a_line_that_a_crash_cut_short_costs_that_row_alone(tmp_path: Path) -> None:
+    lines = [json.dumps(row(name)) for name in "abc"]
+    (tmp_path / NAME).write_text("\n".join(lines)[:-20])
+    with Manifest(tmp_path).open() as manifest:
+        assert [manifest.has(name, f"key of {name}") is not None for name in "abc"] == [True, True, False]
+        manifest.add(row("d"))
+        manifest.path.read_text()
+    with Manifest(tmp_path).open() as manifest:
+        assert [manifest.has(name, f"key of {name}") is not None for name in "abcd"] == [
+            True,
+            True,
+            False,
+            True,
+        ]
+
+
+def test_only_what_is_still_as_it_was_written_is_there(tmp_path: Path) -> None:
+    with Manifest(tmp_path).open() as manifest:
+        (tmp_path / "a.fap").write_bytes(b"face")
+        manifest.add(row("a", content=b"face"))
+        assert manifest.has("a", "key of a")
+        assert not manifest.has("a", "another key")
+        (tmp_path / "a.fap").write_bytes(b"farce")
+        assert not manifest.has("a", "key of a")
+        (tmp_path / "a.fap").unlink()
+        assert not manifest.has("a", "key of a")
+
+
+def test_what_failed_is_tried_again_and_what_was_refused_is_not(tmp_path: Path) -> None:
+    with Manifest(tmp_path).open() as manifest:
+        manifest.add(row("a", "failed"))
+        manifest.add(row("b", "refused"))
+        assert not manifest.has("a", "key of a")
+        assert manifest.has("b", "key of b")
+
+
+def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:
+    pytest.importorskip("fcntl")
+    with (
+        Manifest(tmp_path).open(),
+        pytest.raises(BusyError, match="another batch writes here"),
+        Manifest(tmp_path).open(),
+    ):
+        pass
+    with Manifest(tmp_path).open():
+        pass

@@ -1,0 +1,89 @@
+"""A batch: resumed where it was, idempotent, and the same bytes whatever ran it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from realizer.batch.documents import find
+from realizer.batch.processes import Processes
+from realizer.batch.run import batch
+from realizer.batch.task import Options, Task
+from realizer.batch.work import Outcome, Worker
+
+
+class Here:
+    """A crew that does the work itself, the last document first."""
+
+    def __init__(self, options: Options) -> None:
+        self._worker = Worker(options)
+
+    def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
+        for task in reversed(list(tasks)):
+            yield self._worker.perform(task)
+
+    def close(self) -> None:
+        self._worker.close()
+
+
+def play(talks: Path, out: Path, options: Options, most: int | None = None) -> list[tuple[str, bool]]:
+    """(document, whether it was known) in the order they came; at most so many, then it is interrupted."""
+    rows = batch(find([str(talks)]), out, options, Here(options))
+    got = [(row["document"], known) for row, known in islice(rows, most)]
+    rows.close()
+    return got
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_the_same_bytes_whatever_ran_it_and_in_whatever_order(
+    talks: Path, options: Options, tmp_path: Path
+) -> None:
+    play(talks, tmp_path / "here", options)
+    crew = Processes(options, 2)
+    assert len(list(batch(find([str(talks)]), tmp_path / "there", options, crew))) == 6
+    assert contents(tmp_path / "here") == contents(tmp_path / "there")
+    assert {"more/said.fap", "more/said.vtt", "manifest.jsonl"} <= contents(tmp_path / "here").keys()
+
+
+def test_an_interrupted_batch_goes_on_where_it_was(talks: Path, options: Options, tmp_path: Path) -> None:
+    play(talks, tmp_path / "whole", options)
+    assert len(play(talks, tmp_path / "cut", options, most=2)) == 2
+    again = dict(play(talks, tmp_path / "cut", options))
+    assert sorted(again.values()) == [False] * 4 + [True] * 2
+    assert contents(tmp_path / "cut") == contents(tmp_path / "whole")
+
+
+def test_a_second_run_plays_nothing_and_changes_nothing(
+    talks: Path, options: Options, tmp_path: Path
+) -> None:
+    play(talks, tmp_path / "out", options)
+    before = contents(tmp_path / "out")
+    assert all(known for _, known in play(talks, tmp_path / "out", options))
+    assert contents(tmp_path / "out") == before
+
+
+def test_what_has_changed_is_played_again_and_nothing_else(
+    talks: Path, options: Options, tmp_path: Path
+) -> None:
+    play(talks, tmp_path / "out", options)
+    (talks / "2.bml").write_text('<bml id="b2"><head id="n" lexeme="SHAKE"/></bml>')
+    (tmp_path / "out" / "3.fap").write_text("scribbled over")
+    played = {name for name, known in play(talks, tmp_path / "out", options) if not known}
+    assert played == {"2", "3"}
+    assert not any(known for _, known in play(talks, tmp_path / "out", replace(options, seed=7)))
+
+
+def test_a_document_that_cannot_be_read_ends_the_batch_with_its_name(
+    talks: Path, options: Options, tmp_path: Path
+) -> None:
+    documents = find([str(talks)])
+    (talks / "0.bml").unlink()
+    with pytest.raises(FileNotFoundError, match=r"0\.bml"):
+        list(batch(documents, tmp_path / "out", options, Here(options)))

@@ -1,0 +1,75 @@
+"""`realizer batch`: places in, a folder with a manifest out, and the exit status."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from realizer.cli import cli
+
+NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
+
+
+def batch(*args: str, text: str = "") -> Result:
+    arguments = ["batch", *args, "--voice", "silent"]
+    return CliRunner().invoke(cli, arguments, input=text, standalone_mode=False, catch_exceptions=False)
+
+
+@pytest.fixture
+def talks(tmp_path: Path) -> Path:
+    (tmp_path / "talks").mkdir()
+    for name in "ab":
+        (tmp_path / "talks" / f"{name}.bml").write_text(NOD)
+    return tmp_path / "talks"
+
+
+def rows(folder: Path) -> dict[str, str]:
+    lines = (folder / "manifest.jsonl").read_text().splitlines()
+    return {row["document"]: row["status"] for row in map(json.loads, lines)}
+
+
+def test_a_folder_becomes_a_file_a_document_and_format(talks: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [str(talks), "-o", str(out), "--format", "fap", "--format", ".JSON", "--workers", "1"]
+    done = batch(*command)
+    assert done.return_value == 0
+    assert "2 done; manifest.jsonl says more" in done.stderr
+    assert {p.name for p in out.glob("*.*")} >= {"a.fap", "a.json", "b.fap", "b.json"}
+    assert rows(out) == {"a": "done", "b": "done"}
+    assert "2 done (2 of them before)" in batch(*command).stderr
+
+
+def test_what_was_refused_is_told_by_the_exit_status(talks: Path, tmp_path: Path) -> None:
+    (talks / "c.bml").write_text("<bml")
+    done = batch("-", "-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1", text=f"{talks}\n")
+    assert done.return_value == 1
+    assert rows(tmp_path / "out") == {"a": "done", "b": "done", "c": "refused"}
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["--format", "avi"], "wanted one of fap"),
+        (["--format", "fap", "--workers", "2", "--dask", "tcp://localhost:8786"], "wanted one of them"),
+        (["--format", "mp4", "--camera", "from-behind"], "from-behind"),
+    ],
+)
+def test_wrong_usage_is_told_before_anything_is_played(
+    args: list[str], words: str, talks: Path, tmp_path: Path
+) -> None:
+    import click
+
+    with pytest.raises(click.UsageError) as told:
+        batch(str(talks), "-o", str(tmp_path / "out"), *args)
+    assert words in told.value.format_message()
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_place_without_documents_is_told(tmp_path: Path) -> None:
+    import click
+
+    with pytest.raises(click.UsageError, match="nowhere: wanted a document"):
+        batch("nowhere", "-o", str(tmp_path / "out"), "--format", "fap")
