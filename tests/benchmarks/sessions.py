@@ -1,11 +1,12 @@
-"""Prints how many sessions one service plays at once: lateness of frames, feedback, processor time and memory.
+"""Prints how many sessions one service plays at once: lateness, processor time, memory.
 
 Run: python tests/benchmarks/sessions.py [--sessions 1000] [--seconds 20] [--floor] [serve's own options]
 
-Each session is a WebSocket of its own that gets 25 FAP frames a second and plays documents of head, face, gaze
-and idle motion, one every 10 s. The client is a process of its own on plain sockets, so that it costs little.
-`--floor` runs a server beside it that does nothing but send as many bytes as often (package websockets), which
-is what no service can be better than. Noise is how late this machine wakes a process that does nothing else.
+Each session is a WebSocket of its own that gets 25 FAP frames a second and plays documents of head, face,
+gaze and idle motion, one every 10 s. The client is a process of its own on plain sockets, so that it costs
+little. `--floor` runs a server beside it that does nothing but send as many bytes as often (with the package
+websockets), which no service can be better than. Noise is how late this machine wakes a process that does
+nothing else.
 """
 
 from __future__ import annotations
@@ -89,8 +90,8 @@ def messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
 def joined(url: str, session: str, plays: bool) -> Peer:
     """A connection that has opened and asked for frames."""
     parts = urlsplit(url)
-    assert parts.hostname is not None and parts.port is not None
-    peer = socket.create_connection((parts.hostname, parts.port), 20)
+    host, _, port = parts.netloc.rpartition(":")
+    peer = socket.create_connection((host, int(port)), 20)
     peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     key = base64.b64encode(os.urandom(16)).decode()
     peer.sendall(
@@ -257,8 +258,8 @@ def measure(name: str, command: list[str], arguments: argparse.Namespace, plays:
         f"{name}: {arguments.sessions} sessions, {told['frames']} frames of {told['expected']:.0f}, "
         f"{told['missing']} missing\n"
         f"  lateness ms     p50 {told['p50']:6.2f}  p99 {told['p99']:6.2f}  most {told['most']:6.1f}\n"
-        f"  processor       {used / took:5.0%} of a core, {1e6 * used / max(told['frames'], 1):5.1f} us a frame"
-        f" (the client {told['load']:.0%})\n"
+        f"  processor       {used / took:5.0%} of a core, {1e6 * used / max(told['frames'], 1):5.1f} us a"
+        f" frame (the client {told['load']:.0%})\n"
         f"  memory          {memory:5.0f} MB more than without sessions"
     )
     if plays:
@@ -279,7 +280,7 @@ def main() -> None:
     parser.add_argument("--load", help=argparse.SUPPRESS)
     parser.add_argument("--serve-floor", action="store_true", help=argparse.SUPPRESS)
     arguments, rest = parser.parse_known_args()
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     if arguments.serve_floor:
         floor()
@@ -289,7 +290,8 @@ def main() -> None:
         )
         print(json.dumps(told), flush=True)
     else:
-        print("noise of this machine: p50 %.2f, p99 %.2f ms" % noise())
+        median, worst = noise()
+        print(f"noise of this machine: p50 {median:.2f}, p99 {worst:.2f} ms")
         serve = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *rest]
         measure("realizer", serve, arguments, plays=True)
         if arguments.floor:
