@@ -200,6 +200,8 @@ def _response(answer: Answer) -> Response:
             "Content-Type": answer.media_type,
             "Content-Length": str(len(answer.body)),
             "X-Content-Type-Options": "nosniff",
+            # Other pages may import realizer.js and draw our faces, as they may open the WebSocket.
+            "Access-Control-Allow-Origin": "*",
             "Connection": "close",
             **dict(answer.headers),
         }

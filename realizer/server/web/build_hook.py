@@ -62,6 +62,8 @@ def bundle() -> None:
         if done.returncode:
             raise RuntimeError(_failed(step, (done.stderr or done.stdout).strip()[-2000:]))
     shutil.copyfile(WEB / "index.html", STATIC / "index.html")
+    # As it is written, with what it says of itself: other pages import it.
+    shutil.copyfile(WEB / "src" / "realizer.js", STATIC / "realizer.js")
     (STATIC / MARK).write_text(_hash() + "\n", "utf-8")
 
 

@@ -1,9 +1,7 @@
 // The page: wires the face, the sound, the editor and the feedback log to one WebSocket.
-import { Clock } from "./clock.js";
-import { Link } from "./link.js";
 import { Log } from "./log.js";
+import { Clock, Realizer, Sound } from "./realizer.js";
 import { Score } from "./score.js";
-import { Sound } from "./sound.js";
 import { Stage } from "./stage.js";
 
 const MESH_RATE = 30; // frames a second; the page draws between them
@@ -16,7 +14,7 @@ const sound = new Sound(clock);
 const log = new Log(at("log"));
 const score = new Score(at("score"));
 const name = new URLSearchParams(location.search).get("session") ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
-const link = new Link(name);
+const link = new Realizer({ session: name });
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
 let plays = 0;

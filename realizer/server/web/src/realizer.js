@@ -1,0 +1,391 @@
+/**
+ * A BML realizer in a web page: BML out; feedback, frames and sound in. One file, nothing else is needed.
+ *
+ *   import { Realizer, Clock, Sound } from "http://127.0.0.1:8765/realizer.js";
+ *
+ *   const realizer = new Realizer({ session: "show" });
+ *   realizer.onfeedback = (element) => console.log(element.outerHTML);
+ *   realizer.connect();
+ *   const { names } = await realizer.subscribe("arkit", { fps: 30 }, (frame) => move(head, frame.values()));
+ *   await realizer.play('<bml id="hello"><speech id="s"><text>Hello there.</text></speech></bml>');
+ *
+ * Sound, with the face on its clock:
+ *
+ *   const clock = new Clock();
+ *   const sound = new Sound(clock);
+ *   button.onclick = () => sound.start(); // browsers want a gesture
+ *   await realizer.subscribe("audio", { rate: sound.rate }, (p) => sound.packet(p.time, p.values(), p.forget));
+ *   realizer.subscribe("arkit", {}, (frame) => clock.heard(frame.time, performance.now() / 1000));
+ *   // what is to be seen now: sound.playhead() ?? clock.playhead(performance.now() / 1000), in session time
+ *
+ * What the messages are: asyncapi.json beside this file.
+ */
+
+/** Version of the protocol that this file speaks; a service that speaks another one refuses `hello`. */
+export const VERSION = 1;
+
+const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
+const HEADER = 16; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time
+const KINDS = {
+  1: ["fap", Int32Array],
+  2: ["au", Float32Array],
+  3: ["video", Uint8Array], // the bytes of a JPEG, PNG or WebP file
+  4: ["audio", Int16Array],
+  5: ["mesh", Int16Array],
+  6: ["arkit", Float32Array],
+};
+const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
+const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
+const nothing = () => {};
+const keyOf = ({ stream, character }) => `${stream}/${character ?? ""}`;
+
+/** Why the service did not follow; `code` and `where` as its message `error` has them. */
+export class RealizerError extends Error {
+  constructor(message, code = "connection", where = null) {
+    super(message);
+    this.name = "RealizerError";
+    this.code = code;
+    this.where = where;
+  }
+}
+
+/**
+ * One connection, which comes back by itself, with the feedback it missed and the streams it had.
+ *
+ * Told by handlers, as a WebSocket's:
+ *   onopen()                    connected, at first and again
+ *   onlost()                    the connection is gone; another one is tried
+ *   onfeedback(element, seq)    BML feedback, as an XML element
+ *   onreply(message)            every JSON message that is not a frame: welcome, subscribed, state, error, ...
+ *   onframe(frame)              every frame of every stream, see `frameOf`
+ */
+export class Realizer {
+  onopen = nothing;
+  onlost = nothing;
+  onfeedback = nothing;
+  onreply = nothing;
+  onframe = nothing;
+  /** seq of the newest feedback; null before the first. */
+  seen = null;
+  /** The WebSocket of now. */
+  socket = null;
+  #tries = 0;
+  #closed = false;
+  #asked = []; // { message, resolve, reject } of questions without an answer yet
+  #streams = new Map(); // "stream/character" -> { message, take, index of the character }
+  #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
+
+  /**
+   * @param {object} [options]
+   * @param {string} [options.url] of the service's WebSocket; that which serves this file
+   * @param {string} [options.session] which to join or make; one of its own that outlives a lost connection
+   */
+  constructor({ url, session } = {}) {
+    this.url = new URL(url ?? new URL("ws", import.meta.url));
+    if (this.url.protocol.startsWith("http")) this.url.protocol = this.url.protocol.replace("http", "ws");
+    this.session = session ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
+  }
+
+  /** Whether messages can be sent now. */
+  get open() {
+    return this.socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Connect, and stay so until `close`. What is asked before the connection is there is sent then. */
+  connect() {
+    this.#closed = false;
+    const url = new URL(this.url);
+    url.searchParams.set("session", this.session);
+    if (this.seen !== null) url.searchParams.set("seen", this.seen);
+    const socket = (this.socket = new WebSocket(url));
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.#tries = 0;
+      for (const { message } of this.#streams.values()) this.#post(message);
+      for (const { message } of this.#asked) if (message.type !== "subscribe") this.#post(message);
+      this.onopen();
+    };
+    socket.onmessage = (event) => this.#receive(event.data);
+    socket.onclose = () => {
+      if (this.#closed) return;
+      this.onlost();
+      setTimeout(() => this.#closed || this.connect(), 1000 * RETRY[Math.min(this.#tries++, RETRY.length - 1)]);
+    };
+  }
+
+  /** End the connection; whoever still waits for something is told. */
+  close() {
+    this.#closed = true;
+    this.socket?.close();
+    const over = new RealizerError("the connection was closed");
+    for (const { reject } of [...this.#asked, ...[...this.#awaited.values()].flat()]) reject(over);
+    this.#asked = [];
+    this.#awaited.clear();
+  }
+
+  /** Send BML, one or more documents. It is lost where the connection is not open. */
+  send(text) {
+    if (this.open) this.socket.send(text);
+  }
+
+  /**
+   * Send a control message, such as { type: "state" }.
+   * @returns {Promise<object|null>} the answer; null at once for messages that have none. Rejects with a
+   *   RealizerError where the service answers with one; it may be left alone: `onreply` gets it too.
+   */
+  ask(message) {
+    this.#post(message);
+    if (!(message.type in ANSWERS)) return Promise.resolve(null);
+    const answer = new Promise((resolve, reject) => this.#asked.push({ message, resolve, reject }));
+    answer.catch(nothing);
+    return answer;
+  }
+
+  /**
+   * Get a stream: fap, au, arkit, mesh, audio, video, schedule or feedback. It comes back with the connection.
+   * @param {string} stream
+   * @param {object} [options] encoding, fps, character, ... as the message `subscribe` has them
+   * @param {function} [take] called with every frame of it
+   * @returns {Promise<object>} `subscribed`: what its values mean
+   */
+  subscribe(stream, options = {}, take = nothing) {
+    const message = { type: "subscribe", stream, ...options };
+    const key = keyOf(message);
+    this.#streams.set(key, { message, take, index: 0 });
+    const answer = this.ask(message);
+    answer.catch(() => {
+      if (this.#streams.get(key)?.message === message) this.#streams.delete(key);
+    });
+    return answer;
+  }
+
+  /** End a stream. */
+  unsubscribe(stream, character) {
+    this.#streams.delete(keyOf({ stream, character }));
+    this.#post({ type: "unsubscribe", stream, ...(character === undefined ? {} : { character }) });
+  }
+
+  /**
+   * Send BML and wait for the end of its last block.
+   * @returns {Promise<Element>} the feedback that told it; rejects where the block is refused
+   */
+  play(text) {
+    const ids = [...text.matchAll(BLOCK)];
+    const end = this.ended(ids.length ? ids.at(-1)[1] : "<no id>");
+    this.send(text);
+    return end;
+  }
+
+  /** Wait for the end of a block that was sent. */
+  ended(id) {
+    const end = new Promise((resolve, reject) => {
+      this.#awaited.set(id, [...(this.#awaited.get(id) ?? []), { planned: false, resolve, reject }]);
+    });
+    end.catch(nothing);
+    return end;
+  }
+
+  #post(message) {
+    this.send(JSON.stringify(message));
+  }
+
+  #receive(data) {
+    if (data instanceof ArrayBuffer) return this.#frame(frameOf(data));
+    if (!data.startsWith("{")) return this.#feedback(data);
+    const message = JSON.parse(data);
+    if (message.type === "schedule" || Array.isArray(message.values)) return this.#frame(jsonFrameOf(message));
+    // Another life of the session: its numbers start again.
+    if (message.type === "gap") this.seen = null;
+    if (message.type === "subscribed" && this.#streams.has(keyOf(message))) this.#streams.get(keyOf(message)).index = message.index;
+    this.#answer(message);
+    this.onreply(message);
+  }
+
+  #frame(frame) {
+    for (const { message, take, index } of this.#streams.values()) {
+      // JSON names the character as the subscription did, binary frames say its index.
+      const own = frame.kind === undefined ? message.character : index;
+      if (message.stream === frame.stream && own === frame.character) take(frame);
+    }
+    this.onframe(frame);
+  }
+
+  #answer(message) {
+    const error = message.type === "error";
+    const fits = error
+      ? ({ message: { type } }) => message.where?.split(".")[0] === type
+      : ({ message: { type, stream, character } }) =>
+          ANSWERS[type] === message.type &&
+          (type !== "subscribe" || keyOf({ stream, character }) === keyOf(message));
+    const k = this.#asked.findIndex(fits);
+    if (k < 0) return;
+    const [{ resolve, reject }] = this.#asked.splice(k, 1);
+    error ? reject(new RealizerError(message.message, message.code, message.where)) : resolve(message);
+  }
+
+  #feedback(text) {
+    const element = new DOMParser().parseFromString(text, "text/xml").documentElement;
+    const seq = Number([...element.attributes].find((a) => a.localName === "seq")?.value);
+    if (seq) this.seen = seq;
+    const id = element.getAttribute("id");
+    if (element.localName === "predictionFeedback") {
+      for (const block of element.children) {
+        if (block.hasAttribute("globalEnd")) for (const one of this.#awaited.get(block.getAttribute("id")) ?? []) one.planned = true;
+      }
+    } else if (element.localName === "blockProgress" && id.endsWith(":end")) {
+      this.#settle(id.slice(0, -4), (one) => one.resolve(element));
+    } else if (element.localName === "warningFeedback" && this.#awaited.get(id)?.some((one) => !one.planned)) {
+      // A warning on the block itself refuses it, unless its prediction is already out.
+      this.#settle(id, (one) => one.reject(new RealizerError(element.textContent, "refused", id)));
+    }
+    this.onfeedback(element, seq);
+  }
+
+  #settle(id, how) {
+    for (const one of this.#awaited.get(id) ?? []) how(one);
+    this.#awaited.delete(id);
+  }
+}
+
+/**
+ * A binary message taken apart.
+ * @returns {object} stream, kind, character (its index, as `subscribed` told), frame (its number), time (seconds
+ *   on the session clock), forget (of sound: all from this time on is void), values(): a typed array; of a
+ *   picture its file's bytes
+ */
+export function frameOf(buffer) {
+  const view = new DataView(buffer);
+  const kind = view.getUint8(0);
+  if (!(kind in KINDS)) throw new RealizerError(`wanted a frame of kind ${Object.keys(KINDS)}, got ${kind}`);
+  const [stream, Values] = KINDS[kind];
+  return {
+    stream,
+    kind,
+    character: view.getUint16(2, true) & 0xff,
+    forget: Boolean(view.getUint16(2, true) & 0x100),
+    frame: view.getUint32(4, true),
+    time: view.getFloat64(8, true),
+    values: () => new Values(buffer, HEADER),
+  };
+}
+
+function jsonFrameOf(message) {
+  return { stream: message.type, ...message, forget: false, values: () => message.values ?? [] };
+}
+
+/** How much older what is shown is than what has come, in seconds: room for packets that are late. */
+export const DELAY = 0.1;
+const MEMORY = 5; // s
+
+/** The session's clock as seen from here: the frame that came soonest after its time tells the offset. */
+export class Clock {
+  constructor() {
+    this.reset();
+  }
+
+  /** Forget all, as after a new connection. */
+  reset() {
+    this.offsets = [];
+    this.offset = null;
+  }
+
+  /** A frame of session time `time` came at `here` (both in seconds, here on any clock of yours). */
+  heard(time, here) {
+    const offset = here - time;
+    while (this.offsets.length && this.offsets[0].here < here - MEMORY) this.offsets.shift();
+    while (this.offsets.length && this.offsets.at(-1).offset >= offset) this.offsets.pop();
+    this.offsets.push({ here, offset });
+    this.offset = this.offsets[0].offset;
+  }
+
+  /** The session time that should be seen and heard at `here`; null before the first frame. */
+  playhead(here) {
+    return this.offset === null ? null : here - this.offset - DELAY;
+  }
+}
+
+const DRIFT = 0.02; // s; the anchor moves only in silence, and only by more than this
+
+/** 20 ms packets to gapless sound. While it runs, the audio clock is the master of what is shown. */
+export class Sound {
+  /** Samples a second, to ask for in `subscribe`. */
+  rate = 22050;
+  /** Whether it was started and not muted. */
+  on = false;
+
+  constructor(clock) {
+    this.clock = clock;
+    this.context = null;
+    this.anchor = null; // audio time minus session time
+    this.playing = new Map(); // source -> session time
+  }
+
+  /** Browsers allow sound only after a gesture: call it from one. */
+  start() {
+    // A context at the packets' own rate: each packet resampled by itself would click at its ends.
+    this.context ??= new AudioContext({ sampleRate: this.rate, latencyHint: "interactive" });
+    this.context.resume();
+    this.on = true;
+  }
+
+  /** Be silent until `start`. */
+  mute() {
+    this.on = false;
+    this.forget(-Infinity);
+    this.context?.suspend();
+  }
+
+  /** Forget all, as after a new connection. */
+  reset() {
+    this.forget(-Infinity);
+    this.anchor = null;
+  }
+
+  /** Whether it can be heard now. */
+  get running() {
+    return this.on && this.context?.state === "running";
+  }
+
+  /** A packet of the stream `audio`. */
+  packet(time, samples, forget) {
+    if (forget) this.forget(time);
+    if (!this.running || !samples.length) return;
+    this.align();
+    if (this.anchor === null) return;
+    const start = this.anchor + time;
+    if (start < this.context.currentTime) return; // too late to be heard
+    const buffer = this.context.createBuffer(1, samples.length, this.rate);
+    const channel = buffer.getChannelData(0);
+    for (let i = 0; i < samples.length; i++) channel[i] = samples[i] / 32768;
+    const source = new AudioBufferSourceNode(this.context, { buffer });
+    source.connect(this.context.destination);
+    source.onended = () => this.playing.delete(source);
+    source.start(start);
+    this.playing.set(source, time);
+  }
+
+  /** Take back what would sound from a session time on. */
+  forget(time) {
+    for (const [source, start] of this.playing) {
+      if (start < time) continue;
+      source.stop();
+      this.playing.delete(source);
+    }
+  }
+
+  /** The session time that is heard now; null where sound is off: then the Clock counts. */
+  playhead() {
+    if (!this.running) return null;
+    this.align();
+    return this.anchor === null ? null : this.context.currentTime - this.anchor - (this.context.outputLatency || 0);
+  }
+
+  align() {
+    const target = this.clock.playhead(performance.now() / 1000);
+    if (target === null || this.playing.size) return;
+    const anchor = this.context.currentTime - target;
+    if (this.anchor !== null && Math.abs(anchor - this.anchor) < DRIFT) return;
+    // On the sample grid, so that packets join without a seam.
+    this.anchor = Math.round(anchor * this.rate) / this.rate;
+  }
+}
