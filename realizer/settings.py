@@ -76,6 +76,12 @@ def _address(value: Any) -> str:
     return f"{host}:{int(port)}"
 
 
+def _session(value: Any) -> str:
+    if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z0-9._~-]{1,64}", value):
+        raise ValueError("1..64 letters, digits or . _ ~ -")
+    return value
+
+
 def _colour(value: Any) -> str:
     if not isinstance(value, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}|transparent", value):
         raise ValueError("transparent or a colour such as #d8dde2")
@@ -130,6 +136,13 @@ class Settings:
     )
     xface_port: int | None = _setting(
         None, _optional(_number(int, 0, 65535)), "of Xface's TCP: tasks for a player; none: no door"
+    )
+    xface_player: str | None = _setting(
+        None, _optional(_address), "HOST:PORT of an Xface player that shows a session; none: no door"
+    )
+    xface_player_session: str = _setting("xface-player", _session, "which session it shows")
+    xface_player_interval: float = _setting(
+        0.25, _number(float, 0, 60), "seconds from one frame to the next; the player stops at shorter ones"
     )
     stomp: str | None = _setting(None, _optional(_address), "HOST:PORT of a message broker; none: no door")
     stomp_login: str | None = _setting(None, _optional(_text), "for the broker")

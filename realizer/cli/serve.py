@@ -28,6 +28,11 @@ __all__: list[str] = []
     metavar="PORT",
     help="Serve clients of an Xface player, whose port is 50011: FAP files, playback, scripts of BML.",
 )
+@click.option(
+    "--xface-player",
+    metavar="HOST:PORT",
+    help="Show the session xface-player on this Xface player, four frames a second.",
+)
 @click.option("--stomp", metavar="HOST:PORT", help="Serve clients of this STOMP broker: ASAP JSON, VHMSG.")
 @click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
 @options.deformer

@@ -13,6 +13,7 @@ from realizer.server.doors.door import Door
 from realizer.server.doors.stomp import StompDoor
 from realizer.server.doors.websocket import WebSocketDoor
 from realizer.server.doors.xface import XfaceDoor
+from realizer.server.doors.xface_player import XfacePlayerDoor
 from realizer.server.shell import Shell
 from realizer.settings import Settings
 
@@ -151,6 +152,8 @@ def _doors(web: WebSocketDoor, shell: Shell, settings: Settings) -> list[Door]:
         doors.append(AsapDoor(shell, settings))
     if settings.xface_port is not None:
         doors.append(XfaceDoor(shell, settings))
+    if settings.xface_player is not None:
+        doors.append(XfacePlayerDoor(shell, settings))
     if settings.stomp is not None:
         doors.append(StompDoor(shell, settings))
     return doors

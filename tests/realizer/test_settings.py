@@ -45,6 +45,10 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
     [
         ("asap_ports", "7500"),
         ("asap_ports", "7500 0"),
+        ("xface_port", "65536"),
+        ("xface_player", "here"),
+        ("xface_player_session", "a b"),
+        ("xface_player_interval", "-1"),
         ("stomp", "here"),
         ("stomp", "here:0"),
         ("fps", "nan"),
