@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http
-from collections import deque
+from collections import Counter
 from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import Server as SocketServer
-from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import ServerConnection, broadcast
 from websockets.asyncio.server import serve as listen
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
@@ -34,6 +34,7 @@ class WebSocketDoor:
         self._socket: SocketServer | None = None
         self._closing: set[asyncio.Task[None]] = set()
         self._checking = asyncio.Lock()
+        self._from: Counter[str] = Counter()  # address -> WebSockets that are open
 
     @property
     def url(self) -> str:
@@ -83,11 +84,11 @@ class WebSocketDoor:
         """Everything but a WebSocket at /ws is answered here."""
         path = urlsplit(request.path).path
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
-        if path == "/check" and upgrade:
-            return None
-        if path == "/ws" and upgrade:
+        if path in ("/ws", "/check") and upgrade:
             try:
-                self._shell.check(_query(request)[0])
+                self._room(connection)
+                if path == "/ws":
+                    self._shell.check(_query(request)[0])
             except HubError as error:
                 return _response(Answer(error.status, "text/plain; charset=utf-8", f"{error}\n".encode()))
             return None
@@ -98,19 +99,44 @@ class WebSocketDoor:
         loop = asyncio.get_running_loop()
         return _response(await loop.run_in_executor(None, self._site.answer, request.path))
 
+    def _room(self, socket: ServerConnection) -> None:
+        """Whether one more may come from its address: nobody can take the room of all others.
+
+        Raises:
+            HubError: there are too many.
+        """
+        most = self._settings.max_connections
+        if self._from[_address(socket)] >= most:
+            words = f"{most} connections from {_address(socket)} are open: wanted fewer"
+            raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
+
     async def _handle(self, socket: ServerConnection) -> None:
         """One WebSocket, from its opening to its end."""
         assert socket.request is not None
-        if urlsplit(socket.request.path).path == "/check":
-            await self._check(socket)
-            return
-        client = _Client(socket)
+        address = _address(socket)
         try:
-            number = self._shell.join(client, *_query(socket.request))
+            self._room(socket)  # again: many may have been let in at the same moment
         except HubError as error:
             await socket.close(1013, str(error)[:120])
             return
-        writer = asyncio.create_task(client.write())
+        self._from[address] += 1
+        try:
+            if urlsplit(socket.request.path).path == "/check":
+                await self._check(socket)
+            else:
+                await self._join(socket, socket.request)
+        finally:
+            self._from[address] -= 1
+            if not self._from[address]:
+                del self._from[address]
+
+    async def _join(self, socket: ServerConnection, request: Request) -> None:
+        client = _Client(socket)
+        try:
+            number = self._shell.join(client, *_query(request))
+        except HubError as error:
+            await socket.close(1013, str(error)[:120])
+            return
         try:
             async for message in socket:
                 if not self._shell.receive(number, message):
@@ -120,9 +146,6 @@ class WebSocketDoor:
             pass
         finally:
             self._shell.leave(number)
-            writer.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await writer
 
     async def _check(self, socket: ServerConnection) -> None:
         """An editor's own WebSocket: a text in, its faults out, one after the other."""
@@ -148,42 +171,31 @@ class WebSocketDoor:
 
 
 class _Client:
-    """The way out to one WebSocket: messages queue here while the socket is slow."""
+    """The way out to one WebSocket: what is sent is written at once, or waits in the socket's own buffer."""
 
     def __init__(self, socket: ServerConnection) -> None:
         self._socket = socket
-        self._queue: deque[str | bytes] = deque()
-        self._queued = 0
-        self._wake = asyncio.Event()
-        self._end: tuple[int, str] | None = None
+        self._end: asyncio.Task[None] | None = None
 
     @property
     def waiting(self) -> int:
         transport = self._socket.transport
-        return self._queued + (0 if transport is None else transport.get_write_buffer_size())
+        return 0 if transport is None else transport.get_write_buffer_size()
 
     def send(self, data: str | bytes) -> None:
-        self._queue.append(data)
-        self._queued += len(data)
-        self._wake.set()
+        # To one, but without a task that wakes for every frame; a socket that closes is left out.
+        if self._end is None:
+            broadcast((self._socket,), data)
 
     def end(self, code: int, reason: str) -> None:
-        self._end = (code, reason)
-        self._wake.set()
+        if self._end is None:
+            self._end = asyncio.get_running_loop().create_task(self._socket.close(code, reason))
 
-    async def write(self) -> None:
-        """Write what queues, in order, until the socket closes."""
-        with contextlib.suppress(ConnectionClosed):
-            while True:
-                await self._wake.wait()
-                self._wake.clear()
-                while self._queue and self._end is None:
-                    data = self._queue.popleft()
-                    self._queued -= len(data)
-                    await self._socket.send(data)
-                if self._end is not None:
-                    await self._socket.close(*self._end)
-                    return
+
+def _address(socket: ServerConnection) -> str:
+    """Without the port; "" where the socket has none."""
+    remote = socket.remote_address
+    return str(remote[0]) if isinstance(remote, tuple) else ""
 
 
 def _query(request: Request) -> tuple[str | None, int | None]:
