@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from realizer.colours import linear
+from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals
 
 __all__ = ["to_glb"]
-
-FLOAT, USHORT, UINT = 5126, 5123, 5125  # glTF component types
-ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 
 def to_glb(face: Face) -> bytes:
@@ -31,33 +27,15 @@ def to_glb(face: Face) -> bytes:
     ups[np.abs(ups).sum(axis=1) == 0] = (0, 0, 1)
     colours = np.full((len(face.colours), 4), 65535, np.uint16)
     colours[:, :3] = np.rint(linear(face.colours) * 65535)
-    arrays: dict[str, tuple[Any, int, str, bool]] = {
-        "POSITION": (face.vertices.astype("<f4"), FLOAT, "VEC3", False),
-        "NORMAL": (ups.astype("<f4"), FLOAT, "VEC3", False),
-        "COLOR_0": (colours.astype("<u2"), USHORT, "VEC4", True),
-        "_OCCLUSION": (face.occlusion.astype("<f4"), FLOAT, "SCALAR", False),
-        "_GLOSS": (face.gloss.astype("<f4"), FLOAT, "SCALAR", False),
-        "indices": (face.triangles.astype("<u4").ravel(), UINT, "SCALAR", False),
+    file = GlbFile()
+    attributes = {
+        "POSITION": file.add(face.vertices.astype("<f4"), target=ARRAY_BUFFER, bounds=True),
+        "NORMAL": file.add(ups.astype("<f4"), target=ARRAY_BUFFER),
+        "COLOR_0": file.add(colours, target=ARRAY_BUFFER, normalised=True),
+        "_OCCLUSION": file.add(face.occlusion.astype("<f4"), target=ARRAY_BUFFER),
+        "_GLOSS": file.add(face.gloss.astype("<f4"), target=ARRAY_BUFFER),
     }
-    views, accessors, data = [], [], b""
-    for name, (array, component, kind, normalised) in arrays.items():
-        raw = array.tobytes()
-        target = ELEMENT_ARRAY_BUFFER if name == "indices" else ARRAY_BUFFER
-        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(raw), "target": target})
-        accessor: dict[str, Any] = {
-            "bufferView": len(views) - 1,
-            "componentType": component,
-            "count": len(array),
-            "type": kind,
-        }
-        if normalised:
-            accessor["normalized"] = True
-        if name == "POSITION":
-            accessor["min"] = [float(x) for x in array.min(axis=0)]
-            accessor["max"] = [float(x) for x in array.max(axis=0)]
-        accessors.append(accessor)
-        data += raw + b"\0" * (-len(raw) % 4)
-    attributes = {name: k for k, name in enumerate(arrays) if name != "indices"}
+    indices = file.add(face.triangles.astype("<u4").ravel(), target=ELEMENT_ARRAY_BUFFER)
     scale, offset = face_scale(face)
     document = {
         "asset": {
@@ -78,9 +56,7 @@ def to_glb(face: Face) -> bytes:
         "meshes": [
             {
                 "name": face.name,
-                "primitives": [
-                    {"attributes": attributes, "indices": len(arrays) - 1, "material": 0, "mode": 4}
-                ],
+                "primitives": [{"attributes": attributes, "indices": indices, "material": 0, "mode": 4}],
                 "extras": {
                     "scale": scale,
                     "offset": [float(x) for x in offset],
@@ -91,16 +67,8 @@ def to_glb(face: Face) -> bytes:
                 },
             }
         ],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(data)}],
     }
-    text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = (
-        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
-    )
-    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+    return file.bytes_of(document)
 
 
 def _parts(face: Face) -> dict[str, Any]:

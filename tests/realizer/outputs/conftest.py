@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -15,6 +22,7 @@ from realizer.speech.utterance import Utterance, Word
 FPS = 25.0
 DURATION = 1.5
 RATE = 16000
+READERS = Path(__file__).parent / "readers"
 
 
 @pytest.fixture
@@ -44,3 +52,31 @@ def realization() -> Realization:
         warnings=(Warning("greeting:wave", "IMPOSSIBLE_TO_SCHEDULE", "too short"),),
         speaking=(Speaking(0.25, 1.25, hello, 0),),
     )
+
+
+@pytest.fixture(scope="session")
+def turn() -> str:
+    """A document of which every part of a head has something: lips, brows, lids, eyes, neck."""
+    return (
+        '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
+        '<speech id="s" start="0"><text>Oh, what a beautiful morning</text></speech>'
+        '<faceLexeme id="f" lexeme="HAPPINESS" start="0" end="2"/>'
+        '<head id="h" lexeme="SHAKE" start="0.2"/><gaze id="g" target="10,5,30" start="0"/></bml>'
+    )
+
+
+@pytest.fixture(scope="session")
+def read_by() -> Callable[..., Any]:
+    """A function: what a program of others makes of a file, by a script in `readers/`; its JSON."""
+    node = shutil.which("node")
+
+    def read(script: str, *arguments: str | Path) -> Any:
+        if node is None or not (READERS / "node_modules").is_dir():
+            pytest.skip(f"needs Node and: npm ci --prefix {READERS}")
+        done = subprocess.run(
+            [node, READERS / script, *map(str, arguments)], capture_output=True, text=True, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return read

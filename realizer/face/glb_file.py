@@ -1,0 +1,99 @@
+"""Arrays and a glTF 2.0 document in, the bytes of a GLB file out."""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+__all__ = ["ARRAY_BUFFER", "ELEMENT_ARRAY_BUFFER", "GlbFile"]
+
+COMPONENTS = {"u1": 5121, "u2": 5123, "u4": 5125, "f4": 5126}
+KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+
+
+class GlbFile:
+    """The binary part of a GLB file, as accessors are added to it."""
+
+    def __init__(self) -> None:
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._data = bytearray()
+
+    def add(
+        self, array: Any, *, target: int | None = None, normalised: bool = False, bounds: bool = False
+    ) -> int:
+        """The number of a new accessor with the rows of an array, uint8, uint16, uint32 or float32.
+
+        Args:
+            target: ARRAY_BUFFER of vertices, ELEMENT_ARRAY_BUFFER of triangles, None of anything else.
+            normalised: integers stand for 0..1.
+            bounds: with the least and the greatest, as glTF asks of positions and of times.
+        """
+        raw = _little(array)
+        accessor = {"bufferView": self._view(raw, target), **_shape(raw)}
+        if normalised:
+            accessor["normalized"] = True
+        return self._accessor(accessor, raw, bounds)
+
+    def add_sparse(self, array: Any, *, bounds: bool = False) -> int:
+        """The same for an array of which most rows are zero: only the others are stored."""
+        raw = _little(array)
+        rows = np.flatnonzero(raw.reshape(len(raw), -1).any(axis=1))
+        accessor = _shape(raw)
+        if len(rows):
+            index = _little(rows.astype(np.uint16 if len(raw) <= 65536 else np.uint32))
+            accessor["sparse"] = {
+                "count": len(rows),
+                "indices": {
+                    "bufferView": self._view(index, None),
+                    "componentType": _shape(index)["componentType"],
+                },
+                "values": {"bufferView": self._view(raw[rows], None)},
+            }
+        return self._accessor(accessor, raw, bounds)
+
+    def bytes_of(self, document: dict[str, Any]) -> bytes:
+        """The file: the document with these accessors, and their data."""
+        whole = {
+            **document,
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": len(self._data)}],
+        }
+        text = json.dumps(whole, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<II", len(text), JSON_CHUNK) + text
+        chunks += struct.pack("<II", len(self._data), BINARY_CHUNK) + self._data
+        return struct.pack("<III", MAGIC, 2, 12 + len(chunks)) + chunks
+
+    def _view(self, raw: Any, target: int | None) -> int:
+        view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": raw.nbytes}
+        if target is not None:
+            view["target"] = target
+        self._data += raw.tobytes() + b"\0" * (-raw.nbytes % 4)
+        self._views.append(view)
+        return len(self._views) - 1
+
+    def _accessor(self, accessor: dict[str, Any], raw: Any, bounds: bool) -> int:
+        if bounds:
+            rows = raw.reshape(len(raw), -1)
+            accessor["min"], accessor["max"] = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
+        self._accessors.append(accessor)
+        return len(self._accessors) - 1
+
+
+def _little(array: Any) -> Any:
+    return np.ascontiguousarray(array, np.asarray(array).dtype.newbyteorder("<"))
+
+
+def _shape(raw: Any) -> dict[str, Any]:
+    return {
+        "componentType": COMPONENTS[f"{raw.dtype.kind}{raw.dtype.itemsize}"],
+        "count": len(raw),
+        "type": KINDS[raw.size // len(raw)],
+    }

@@ -1,0 +1,128 @@
+"""A realization as an animated head (.glb): glTF 2.0 with morph targets, joints, and a key a frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realizer.arrays import Float32
+from realizer.face.glb_file import GlbFile
+from realizer.outputs.files import write_bytes
+from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
+from realizer.outputs.morphs import morphs
+from realizer.outputs.output import Drawing, Output
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "encode_glb", "write_glb"]
+
+# Nodes by their numbers in the file; those of the eyes follow.
+FACE, NECK, HEAD = 0, 1, 2
+EYES = ("left_eye", "right_eye")
+MATERIALS = (("face", 0.6), ("eyes", 0.15))  # name, roughness
+
+
+def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
+    """The file: frame k of the animation is at k / fps, and linear between.
+
+    One mesh holds all that changes its shape. It is bound to two joints, neck and head, as far as each vertex
+    turns with the head. Eyeballs are rigid, on nodes in the head.
+
+    Args:
+        poses: (n, len(face.takes)), `Realization.poses`.
+    """
+    made = morphs(face, poses)
+    file = GlbFile()
+    pivot = face.basis["head_pivot"]
+    nodes: list[dict[str, Any]] = [
+        {"name": face.name, "mesh": 0, "skin": 0},
+        {"name": "neck", "children": [HEAD]},
+        {"name": "head", "translation": pivot.tolist()},
+    ]
+    keys = [(HEAD, "rotation", _quaternions(made.head))]
+    if made.names:
+        keys.append((FACE, "weights", made.weights.ravel()))
+    balls = []
+    rest = np.ones(len(face.vertices), bool)
+    for eye, ((first, last), centre) in enumerate(face.basis["eyes"]):
+        if last <= first:
+            continue
+        ball = np.zeros_like(rest)
+        ball[first:last] = True
+        rest &= ~ball
+        balls.append((ball, EYES[eye], centre))
+        node = len(nodes)
+        nodes[HEAD].setdefault("children", []).append(node)
+        nodes.append({"name": EYES[eye], "mesh": len(balls), "translation": (centre - pivot).tolist()})
+        keys.append((node, "rotation", _quaternions(np.pad(made.eyes[:, eye], ((0, 0), (0, 1))))))
+        if made.thrust[:, eye].any():
+            keys.append((node, "translation", centre - pivot + np.outer(made.thrust[:, eye], (0, 0, 1))))
+    meshes = [morphing_mesh(file, face, rest, 0, made)]
+    meshes += [rigid_mesh(file, face, ball, name, 1, centre) for ball, name, centre in balls]
+    clock = file.add((np.arange(len(poses)) / fps).astype(np.float32), bounds=True)
+    return file.bytes_of(
+        {
+            "asset": {
+                "version": "2.0",
+                "generator": "bml-realizer",
+                "copyright": f"{face.licence}; {face.source}",
+            },
+            "scene": 0,
+            "scenes": [{"nodes": [FACE, NECK]}],
+            "nodes": nodes,
+            "materials": [_material(*material) for material in MATERIALS],
+            "meshes": meshes,
+            "skins": [{"joints": [NECK, HEAD], "inverseBindMatrices": _unbound(file, pivot)}],
+            "animations": [
+                {
+                    "name": "performance",
+                    "channels": [
+                        {"sampler": k, "target": {"node": node, "path": path}}
+                        for k, (node, path, _) in enumerate(keys)
+                    ],
+                    "samplers": [
+                        {"input": clock, "output": file.add(values.astype(np.float32))}
+                        for _, _, values in keys
+                    ],
+                }
+            ],
+        }
+    )
+
+
+def write_glb(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """The first character's head."""
+    write_bytes(path, encode_glb(realization.face, realization.poses, realization.fps))
+
+
+def _quaternions(turns: Float32) -> Float32:
+    """(n, 4) x, y, z, w of (n, 3) pitch, yaw, roll, applied as `face.deform` does: roll first, yaw last."""
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
+    out: Float32 = np.where(turned[:, 3:] < 0, -turned, turned).astype(np.float32)
+    return out
+
+
+def _unbound(file: GlbFile, pivot: Float32) -> int:
+    """What takes the vertices at rest into the two joints; glTF writes matrices by columns."""
+    matrices = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
+    matrices[1, 3, :3] = -pivot
+    return file.add(matrices.reshape(2, 16))
+
+
+def _material(name: str, roughness: float) -> dict[str, Any]:
+    return {
+        "name": name,
+        "doubleSided": True,
+        "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": roughness},
+    }
+
+
+OUTPUTS = (
+    Output(".glb", "model/gltf-binary", "the head, animated: morph targets, head and eyes", write_glb),
+)

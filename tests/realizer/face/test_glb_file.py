@@ -1,0 +1,44 @@
+"""GLB files: what goes in is what a reader finds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.face.arkit.gltf import Gltf
+from realizer.face.glb_file import GlbFile
+
+ARRAYS = {
+    "bytes": np.arange(8, dtype=np.uint8).reshape(2, 4),
+    "shorts": np.array([1, 2, 65535], np.uint16),
+    "words": np.array([0, 70000], np.uint32),
+    "floats": np.array([[1, -2, 3.5]], np.float32),
+    "matrices": np.arange(32, dtype=np.float32).reshape(2, 16),
+}
+
+
+def read(tmp_path, file: GlbFile) -> Gltf:
+    path = tmp_path / "x.glb"
+    path.write_bytes(file.bytes_of({"asset": {"version": "2.0"}}))
+    return Gltf(path)
+
+
+def test_every_kind_of_array_comes_back(tmp_path):
+    file = GlbFile()
+    numbers = {name: file.add(array) for name, array in ARRAYS.items()}
+    found = read(tmp_path, file)
+    for name, array in ARRAYS.items():
+        np.testing.assert_array_equal(found.accessor(numbers[name]).squeeze(), array.squeeze())
+    assert all(view["byteOffset"] % 4 == 0 for view in found.json["bufferViews"])
+
+
+@pytest.mark.parametrize("rows", [[], [3], [0, 99], [65535, 69999]])
+def test_of_a_sparse_array_only_the_rows_that_are_not_zero_are_stored(tmp_path, rows):
+    array = np.zeros((70000, 3), np.float32)
+    array[rows] = (1, 0, -2)
+    file = GlbFile()
+    file.add_sparse(array, bounds=True)
+    found = read(tmp_path, file)
+    np.testing.assert_array_equal(found.accessor(0), array)
+    assert found.json["buffers"][0]["byteLength"] == len(rows) * (4 + 12)
+    assert found.json["accessors"][0]["min"] == ([0, 0, -2] if rows else [0, 0, 0])

@@ -1,0 +1,123 @@
+"""The animated head: what others see in the file is the face that we draw."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+import trimesh
+
+from realizer.animation.targets import fap
+from realizer.face import deform, load_face
+from realizer.face.arkit.gltf import Gltf
+from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.glb import encode_glb
+from realizer.outputs.morphs import TRUE
+from realizer.pipeline import realize
+
+FPS = 12.5
+EYES = ("left_eye", "right_eye")
+
+
+@pytest.fixture(scope="module", params=["mpeg4", "au"])
+def played(request, turn):
+    return realize(turn, deformer=request.param, voice="silent", fps=FPS)
+
+
+@pytest.fixture(scope="module")
+def path(played, tmp_path_factory):
+    found = tmp_path_factory.mktemp("glb") / "turn.glb"
+    OUTPUTS[".glb"].write(played, found, Drawing())
+    return found
+
+
+def split(face, vertices):
+    """By the meshes of the file."""
+    balls = {name: slice(*ball) for name, (ball, _) in zip(EYES, face.basis["eyes"], strict=True)}
+    rest = np.ones(len(face.vertices), bool)
+    for ball in balls.values():
+        rest[ball] = False
+    return {face.name: vertices[rest]} | {name: vertices[ball] for name, ball in balls.items()}
+
+
+def far(got, wanted):
+    return max(np.linalg.norm(np.asarray(got[name]) - wanted[name], axis=1).max() for name in wanted)
+
+
+def test_khronos_finds_no_fault_and_three_js_sees_the_face_that_is_drawn(played, path, read_by):
+    frames = [0, 7, 12, 20, played.frames - 1]
+    seen = read_by("gltf.mjs", path, *(str(k / FPS) for k in frames))
+    assert seen["issues"]["messages"] == []
+    assert seen["duration"] == pytest.approx((played.frames - 1) / FPS)
+    assert "open_jaw" in seen["targets"]
+    wanted = deform(played.face, played.poses[frames])
+    assert np.linalg.norm(wanted - played.face.vertices, axis=2).max() > 0.01
+    for got, vertices in zip(seen["frames"], wanted, strict=True):
+        assert far(got, split(played.face, vertices)) < 1.5 * TRUE
+
+
+def test_trimesh_opens_the_head_as_it_rests(played, path):
+    scene = trimesh.load(io.BytesIO(path.read_bytes()), file_type="glb")
+    meshes = scene.geometry
+    wanted = split(played.face, played.face.vertices)
+    assert {name: len(mesh.vertices) for name, mesh in meshes.items()} == {
+        name: len(vertices) for name, vertices in wanted.items()
+    }
+    assert sum(len(mesh.faces) for mesh in meshes.values()) == len(played.face.triangles)
+    assert np.allclose(scene.bounds, played.face.bounds, atol=1e-6)
+
+
+def test_its_arrays_make_every_frame_of_the_face(played, path):
+    file = Gltf(path)
+    nodes, (animation,) = file.json["nodes"], file.json["animations"]
+    tracks = {
+        (nodes[channel["target"]["node"]]["name"], channel["target"]["path"]): file.accessor(
+            animation["samplers"][channel["sampler"]]["output"]
+        )
+        for channel in animation["channels"]
+    }
+    assert {name for name, _ in tracks} == {played.face.name, "head", *EYES}
+    (primitive,) = file.json["meshes"][0]["primitives"]
+    moves = np.stack([file.accessor(target["POSITION"]) for target in primitive["targets"]])
+    weights = tracks[played.face.name, "weights"].reshape(played.frames, -1)
+    shares = file.accessor(primitive["attributes"]["WEIGHTS_0"])
+    assert np.allclose(shares.sum(axis=1), 1)
+    pivot = np.array(nodes[2]["translation"])
+    for k, vertices in enumerate(deform(played.face, played.poses)):
+        shaped = file.accessor(primitive["attributes"]["POSITION"]) + np.tensordot(weights[k], moves, 1)
+        turned = turned_by(tracks["head", "rotation"][k], shaped - pivot) + pivot
+        got = shares[:, :1] * shaped + shares[:, 1:2] * turned
+        wanted = split(played.face, vertices)[played.face.name]
+        assert np.linalg.norm(got - wanted, axis=1).max() < 1.5 * TRUE
+
+
+def turned_by(quaternion, vertices):
+    """Vertices turned by x, y, z, w."""
+    axis, w = quaternion[:3], quaternion[3]
+    return vertices + 2 * np.cross(axis, np.cross(axis, vertices) + w * vertices)
+
+
+def test_eyes_that_are_pushed_move_on_their_nodes(tmp_path, read_by):
+    face = load_face("default")
+    poses = np.zeros((4, len(face.takes)), np.float32)
+    for number, value in ((27, 150), (28, -80), (23, 2e4), (24, -1e4), (49, 3e4)):
+        poses[1:, face.takes.index(fap(number).name)] = np.array([0.3, 0.7, 1]) * value
+    (tmp_path / "x.glb").write_bytes(encode_glb(face, poses, 25.0))
+    seen = read_by("gltf.mjs", tmp_path / "x.glb", *(str(k / 25) for k in range(4)))
+    assert seen["issues"]["messages"] == []
+    for got, vertices in zip(seen["frames"], deform(face, poses), strict=True):
+        assert far(got, split(face, vertices)) < 1.5 * TRUE
+
+
+def test_a_head_that_rests_is_a_file_without_targets(tmp_path, read_by):
+    face = load_face("default")
+    (tmp_path / "x.glb").write_bytes(encode_glb(face, np.zeros((1, len(face.takes)), np.float32), 25.0))
+    seen = read_by("gltf.mjs", tmp_path / "x.glb", "0")
+    assert seen["issues"]["messages"] == []
+    assert seen["targets"] == []
+    assert far(seen["frames"][0], split(face, face.vertices)) < 1e-6
+
+
+def test_two_runs_write_the_same_bytes(played, path):
+    assert encode_glb(played.face, played.poses, FPS) == path.read_bytes()
