@@ -10,6 +10,7 @@ import numpy as np
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.closures import BILABIAL, LABIODENTAL, held, lips_taken
 from realizer.animation.dominance import CLASSES, Track, dominances, key_times, track_of
+from realizer.animation.mouth import mouth_faps
 from realizer.animation.targets import fap, presence
 from realizer.animation.visemes import SHAPE, coarticulation, shape_table
 from realizer.arrays import Float64
@@ -45,7 +46,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
     mouth = _mouth(track, times) * taken[:, None]
     _constrain(mouth, track, times, taken, facts)
     mouth[[0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
-    return _channels(times + start, mouth, taken, facts["contour"])
+    return _channels(times + start, mouth, taken)
 
 
 def _mouth(track: Track, times: Float64) -> Float64:
@@ -112,31 +113,7 @@ def _smooth(values: Float64, reach: float) -> Float64:
     return smooth
 
 
-def _channels(
-    times: Float64, mouth: Float64, taken: Float64, contour: dict[str, float]
-) -> tuple[Channel, ...]:
-    part = {name: mouth[:, k] for k, name in enumerate(SHAPE)}
-    # MPEG-4 counts upper lip FAPs downwards, lower lip FAPs upwards: an open mouth is negative in both.
-    upper, lower = -part["upper"], -part["lower"]
-    values: dict[tuple[int, ...], Float64] = {
-        (3,): np.maximum(part["jaw"], 0.0),  # FAP 3 has one direction
-        (4,): upper,
-        (5,): lower,
-        (8, 9): upper * contour["side"],
-        (10, 11): lower * contour["side"],
-        (51,): upper * contour["outer"],
-        (52,): lower * contour["outer"],
-        (55, 56): upper * contour["outer_side"],
-        (57, 58): lower * contour["outer_side"],
-        (6, 7, 53, 54): part["width"],
-        (12, 13, 59, 60): part["corner"],
-        (16,): part["push_lower"],
-        (17,): part["push_upper"],
-        (44,): part["tip"],
-        (45,): part["thrust"],
-        (46,): part["body"],
-    }
-    channels = [Channel(presence("lips"), times, taken, "linear", Layer.SPEECH)]
-    for numbers, value in values.items():
-        channels += [Channel(fap(number), times, value, "linear", Layer.SPEECH) for number in numbers]
-    return tuple(channels)
+def _channels(times: Float64, mouth: Float64, taken: Float64) -> tuple[Channel, ...]:
+    lips = Channel(presence("lips"), times, taken, "linear", Layer.SPEECH)
+    moved = mouth_faps(mouth).items()
+    return (lips, *(Channel(fap(number), times, value, "linear", Layer.SPEECH) for number, value in moved))
