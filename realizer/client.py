@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 from bml_schema.feedback import BlockProgress, Feedback, WarningFeedback, parse_feedback
-from realizer.errors import RealizerError
+from realizer.client_speech import ClientError, Heard, Speech, SyncSpeech
 from realizer.server.wire import FrameKind, WireFrame, unpack
 
 __all__ = ["Client", "ClientError", "SyncClient", "connect", "connect_sync"]
@@ -30,10 +30,6 @@ _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']"
 Frame = WireFrame | dict[str, Any]
 
 
-class ClientError(RealizerError):
-    """The service refused a control message, or the connection ended while something was awaited."""
-
-
 class _Mail:
     """Messages sorted by what they are; knows no sockets."""
 
@@ -42,6 +38,7 @@ class _Mail:
         self.frames: dict[str, deque[Frame]] = {}
         self.replies: deque[dict[str, Any]] = deque()
         self.last_block: str | None = None
+        self.speeches: list[Heard] = []
 
     def put(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
@@ -54,7 +51,11 @@ class _Mail:
             else:
                 self.replies.append(reply)
         else:
-            self.feedback.append(parse_feedback(message))
+            feedback = parse_feedback(message)
+            self.feedback.append(feedback)
+            for speech in self.speeches:
+                speech.tell(feedback)
+            self.speeches = [speech for speech in self.speeches if not speech.over]
 
     def sent(self, bml: str) -> None:
         found = _BLOCK_ID.findall(bml)
@@ -128,6 +129,27 @@ class Client:
             ClientError: there is no such stream, or it cannot be had.
         """
         return await self.ask("subscribe", stream=stream, **fields)
+
+    @contextlib.asynccontextmanager
+    async def speech(self, id: str, **opening: Any) -> AsyncIterator[Speech]:
+        """A speech that is said while its text comes: `async with client.speech("s") as speech`.
+
+        Leaving the block says that nothing follows, and waits for nothing; an exception stops the speech.
+
+        Args:
+            id: of the block that others can name; the syncs of its text are `ID:ID:sync` there.
+            opening: composition, character, language of the message `speech`.
+        """
+        speech = Speech(id, self.control, self._wait, opening)
+        self._mail.speeches.append(speech.heard)
+        try:
+            yield speech
+        except BaseException:
+            with contextlib.suppress(Exception):  # the first one counts
+                await speech.stop()
+                await speech.close()
+            raise
+        await speech.close()
 
     async def feedback(self) -> AsyncIterator[Feedback]:
         """Feedback as it comes, until the connection ends; each is given to one iterator."""
@@ -205,6 +227,20 @@ class SyncClient:
     def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
         """Ask for a stream; returns what its values mean. Errors as `Client.ask`."""
         return self.ask("subscribe", stream=stream, **fields)
+
+    @contextlib.contextmanager
+    def speech(self, id: str, **opening: Any) -> Iterator[SyncSpeech]:
+        """A speech that is said while its text comes, as `Client.speech` without `async`."""
+        speech = SyncSpeech(id, self.control, self._wait, opening)
+        self._mail.speeches.append(speech.heard)
+        try:
+            yield speech
+        except BaseException:
+            with contextlib.suppress(Exception):  # the first one counts
+                speech.stop()
+                speech.close()
+            raise
+        speech.close()
 
     def feedback(self) -> Iterator[Feedback]:
         """Feedback as it comes, until the connection ends."""

@@ -145,7 +145,9 @@ MAY: dict[str, set[str]] = {
         "realizer.render",
         "realizer.speech",
     },
-    "realizer.client": VALUES | {"bml_schema", "realizer.server.wire", "realizer.server.messages"},
+    "realizer.client": VALUES
+    | {"bml_schema", "realizer.client_speech", "realizer.server.messages", "realizer.server.wire"},
+    "realizer.client_speech": VALUES | {"bml_schema"},
     "realizer.server": {"*"},
     "realizer.cli": {"*"},
     "realizer.__main__": {"realizer.cli"},

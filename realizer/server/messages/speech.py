@@ -36,7 +36,8 @@ class SpeechMessage(Message):
 
     Text may have <sync id="m"/>, SSML and behaviours in it; a sentence is spoken when it is whole. The speech
     is block `id`, from its first sound to its last; its pieces are the blocks `id.1`, `id.2`, ..., each with
-    the behaviour `id`, whose syncs are those of the text. Without `close` the block goes on for ever.
+    the behaviour `id`, whose syncs are those of the text: documents name them `id:id:m`, before and after
+    they have come. Without `close` the block goes on for ever.
 
     A clip comes as binary messages, little-endian: u8 kind 4, u8 version 1, u16 flags (0x200: the last
     piece), u32 number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a WAV,

@@ -1,0 +1,175 @@
+"""A speech that a client says as its text comes: feedback in, syncs that have passed and its end out."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
+from realizer.errors import RealizerError
+
+__all__ = ["ClientError", "Speech", "SyncSpeech"]
+
+LONGEST = 20_000  # characters that one message may append
+
+
+class ClientError(RealizerError):
+    """The service refused a control message, or the connection ended while something was awaited."""
+
+
+class Heard:
+    """What was told of a speech; knows no sockets.
+
+    Attributes:
+        points: sync of the text -> when it was said, seconds on the session clock.
+        end: that it has ended; `said` where it was cut off.
+        refused: why it is not said at all.
+    """
+
+    def __init__(self, id: str) -> None:
+        self._id = id
+        self.points: dict[str, float] = {}
+        self.end: BlockProgress | None = None
+        self.refused: str | None = None
+
+    def tell(self, feedback: Feedback) -> None:
+        """One message of feedback; most are of others."""
+        match feedback:
+            case SyncPointProgress(id=id):
+                block, behaviour, sync = id.split(":", 2)
+                if behaviour == self._id and block.rpartition(".")[0] == self._id:
+                    self.points.setdefault(sync, feedback.global_time)
+            case BlockProgress(id=id) if id == f"{self._id}:end":
+                self.end = feedback
+            case WarningFeedback(id=id) if id == self._id:
+                self.refused = feedback.text
+
+    def knows(self, sync: str) -> bool:
+        """Whether that sync has been said, or never will be."""
+        return sync in self.points or self.over
+
+    @property
+    def over(self) -> bool:
+        return self.end is not None or self.refused is not None
+
+    def point(self, sync: str) -> float:
+        """When a sync was said.
+
+        Raises:
+            ClientError: it never will be.
+        """
+        if sync not in self.points:
+            raise ClientError(self.refused or f"the speech {self._id} has ended without a sync {sync!r}")
+        return self.points[sync]
+
+    def ended(self) -> BlockProgress:
+        """Its end.
+
+        Raises:
+            ClientError: it was refused.
+        """
+        if self.end is None:
+            raise ClientError(self.refused or f"the speech {self._id} has not ended")
+        return self.end
+
+
+class Speech:
+    """A speech over an open connection; made by `Client.speech`.
+
+    Args:
+        control: sends a control message.
+        wait: until something is so.
+        opening: fields of its first message.
+    """
+
+    def __init__(
+        self,
+        id: str,
+        control: Callable[..., Awaitable[None]],
+        wait: Callable[[Callable[[], bool]], Awaitable[None]],
+        opening: dict[str, Any],
+    ) -> None:
+        self.id = id
+        self.heard = Heard(id)
+        self._control = control
+        self._wait = wait
+        self._opening = opening
+
+    async def append(self, text: str) -> None:
+        """Say more: text with <sync id="m"/>, SSML and behaviours in it, each sentence when it is whole."""
+        for at in range(0, max(1, len(text)), LONGEST):
+            await self._send(append=text[at : at + LONGEST])
+
+    async def close(self) -> None:
+        """Nothing follows: what is left is said."""
+        await self._send(close=True)
+
+    async def stop(self) -> None:
+        """Fall silent at once."""
+        await self._control("stop", blocks=[self.id])
+
+    async def until(self, sync: str) -> float:
+        """Wait until a sync of the text is said; when that was, seconds on the session clock.
+
+        Raises:
+            ClientError: the speech has ended without it, was refused, or the connection has ended.
+        """
+        await self._wait(lambda: self.heard.knows(sync))
+        return self.heard.point(sync)
+
+    async def ended(self) -> BlockProgress:
+        """Wait until all is said, or it was cut off: then `said` are the words that were heard.
+
+        Raises:
+            ClientError: it was refused, or the connection has ended.
+        """
+        await self._wait(lambda: self.heard.over)
+        return self.heard.ended()
+
+    async def _send(self, **fields: Any) -> None:
+        opening, self._opening = self._opening, {}
+        await self._control("speech", id=self.id, **fields, **opening)
+
+
+class SyncSpeech:
+    """A speech over an open connection without an event loop; made by `SyncClient.speech`. As `Speech`."""
+
+    def __init__(
+        self,
+        id: str,
+        control: Callable[..., None],
+        wait: Callable[[Callable[[], bool]], None],
+        opening: dict[str, Any],
+    ) -> None:
+        self.id = id
+        self.heard = Heard(id)
+        self._control = control
+        self._wait = wait
+        self._opening = opening
+
+    def append(self, text: str) -> None:
+        """Say more. As `Speech.append`."""
+        for at in range(0, max(1, len(text)), LONGEST):
+            self._send(append=text[at : at + LONGEST])
+
+    def close(self) -> None:
+        """Nothing follows: what is left is said."""
+        self._send(close=True)
+
+    def stop(self) -> None:
+        """Fall silent at once."""
+        self._control("stop", blocks=[self.id])
+
+    def until(self, sync: str) -> float:
+        """Wait until a sync of the text is said. Returns and raises as `Speech.until`."""
+        self._wait(lambda: self.heard.knows(sync))
+        return self.heard.point(sync)
+
+    def ended(self) -> BlockProgress:
+        """Wait until all is said, or it was cut off. Raises as `Speech.ended`."""
+        self._wait(lambda: self.heard.over)
+        return self.heard.ended()
+
+    def _send(self, **fields: Any) -> None:
+        opening, self._opening = self._opening, {}
+        self._control("speech", id=self.id, **fields, **opening)

@@ -1,0 +1,148 @@
+"""A speech that is said while its text comes, from the client's side, against the real service."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from realizer.client import connect, connect_sync
+from realizer.client_speech import ClientError, Heard
+
+from .test_client import serving
+
+
+def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            async with client.speech("s1") as speech:
+                for token in ("Yes, ", '<sync id="a"/>', "here. ", 'And <sync id="b"/>there'):
+                    await speech.append(token)
+                await client.send('<bml id="n"><head id="n" lexeme="NOD" start="s1:s1:b"/></bml>')
+                first = await speech.until("a")
+            second = await speech.until("b")
+            assert 0 < first < second
+            end = await speech.ended()
+            assert second < end.global_time
+            assert (end.status, end.said) == ("DONE", None)
+            told = {f.id: f async for f in client.until_end("s1") if isinstance(f, SyncPointProgress)}
+            assert told["n:n:start"].global_time == pytest.approx(second)
+
+    serving(test)
+
+
+def test_a_speech_is_stopped_and_says_what_was_heard() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            async with client.speech("s1", composition="MERGE") as speech:
+                await speech.append('One two. <sync id="m"/>Three four five six seven eight nine ten. Eleven')
+                await speech.until("m")
+                await speech.stop()
+            end = await speech.ended()
+            assert end.status == "INTERRUPTED"
+            assert (end.said or "").startswith("One two")
+            with pytest.raises(ClientError, match="without a sync 'x'"):
+                await speech.until("x")
+
+    serving(test)
+
+
+def test_an_exception_stops_the_speech_and_its_id_is_free_again() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            speeches = []
+
+            async def broken() -> None:
+                async with client.speech("s1") as speech:
+                    speeches.append(speech)
+                    await speech.append("One two three four five six seven eight. ")
+                    raise ZeroDivisionError
+
+            with pytest.raises(ZeroDivisionError):
+                await broken()
+            assert (await speeches[0].ended()).status in ("INTERRUPTED", "REVOKED")
+            async with client.speech("s1") as again:
+                await again.append("One.")
+            assert (await again.ended()).status == "DONE"
+
+    serving(test)
+
+
+def test_a_speech_with_the_id_of_a_block_that_plays_is_refused() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.send('<bml id="s1"><wait id="w" duration="60"/></bml>')
+            async with client.speech("s1") as speech:
+                await speech.append("One. ")
+            with pytest.raises(ClientError, match="still in use"):
+                await speech.ended()
+
+    serving(test)
+
+
+def test_the_connection_may_end_while_a_sync_is_awaited() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+
+            async def left() -> None:
+                async with client.speech("s1") as speech:
+                    await speech.append("One. ")
+                    waiting = asyncio.create_task(speech.until("never"))
+                    await client.close()
+                    await waiting
+
+            with pytest.raises(ClientError, match="connection has ended"):
+                await left()
+
+    serving(test)
+
+
+def test_the_plain_client_does_the_same() -> None:
+    def plain(url: str) -> None:
+        with connect_sync(url) as client:
+            with client.speech("s1") as speech:
+                speech.append('One <sync id="a"/>two. ')
+                assert speech.until("a") > 0
+                speech.append("Three. ")
+            assert speech.ended().status == "DONE"
+            with client.speech("s2") as cut:
+                cut.append("One two three four five six seven eight. ")
+                cut.stop()
+            assert cut.ended().status in ("INTERRUPTED", "REVOKED")
+
+            def broken() -> None:
+                with client.speech("s3") as third:
+                    third.append("One two three four five six seven eight. ")
+                    raise ZeroDivisionError
+
+            with pytest.raises(ZeroDivisionError):
+                broken()
+            assert [getattr(f, "id", "") for f in client.until_end("s3")][-1] == "s3:end"
+
+    async def test(url: str) -> None:
+        await asyncio.to_thread(plain, url)
+
+    serving(test)
+
+
+def test_a_text_of_any_length_is_appended() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            async with client.speech("s1") as speech:
+                await speech.append("<!-- -->" + " " * 30_000 + 'One <sync id="m"/>two.')
+                await speech.append("")
+            assert await speech.until("m") > 0
+            assert (await client.ask("ping"))["type"] == "pong", "no error waits"
+
+    serving(test)
+
+
+def test_only_what_is_said_of_the_speech_itself_is_heard() -> None:
+    heard = Heard("s")
+    for id in ("t.1:t:m", "s.1:n:m", "s:s:m", "s.1:s:stroke:2"):
+        heard.tell(SyncPointProgress(id=id, time=0.0, global_time=1.0))
+    heard.tell(BlockProgress(id="s.1:end", global_time=1.0))
+    heard.tell(WarningFeedback(id="s.1", type="X", text="no"))
+    assert heard.points == {"stroke:2": 1.0}
+    assert not heard.over
