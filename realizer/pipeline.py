@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bml_schema import Block, BMLError, WarningFeedback, read
+from bml_schema import Block, BMLError, Feedback, WarningFeedback, read
 from realizer.animation.curves import gain_at
 from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
@@ -67,7 +67,7 @@ class Realization:
         mapping: what its AUs ask of FAPs.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
-        feedback: BML feedback as XML text, in order.
+        told: BML feedback, in order.
         warnings: all of them, in order.
         refused: documents and blocks that gave nothing to play.
         speaking: what sounds when.
@@ -78,7 +78,7 @@ class Realization:
     face_name: str
     characters: Mapping[str | None, Performance]
     schedules: tuple[Schedule, ...]
-    feedback: tuple[str, ...]
+    told: tuple[Feedback, ...]
     warnings: tuple[Warning, ...]
     refused: tuple[str, ...] = ()
     speaking: tuple[Speaking, ...] = field(default=())
@@ -99,6 +99,11 @@ class Realization:
     def faps(self) -> FAPFrames:
         """FAP frames of the first character."""
         return next(iter(self.characters.values())).faps
+
+    @cached_property
+    def feedback(self) -> tuple[str, ...]:
+        """BML feedback as XML text, in order."""
+        return tuple(f.to_xml() for f in self.told)
 
     @property
     def speech(self) -> tuple[tuple[float, Utterance], ...]:
@@ -266,7 +271,7 @@ def realize(
         face_name=face_name(face),
         characters=characters,
         schedules=tuple(schedules),
-        feedback=tuple(f.to_xml() for f in told),
+        told=tuple(told),
         warnings=warnings,
         refused=tuple(w.text for w in refused),
         speaking=speaking,

@@ -93,7 +93,7 @@ def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
     from realizer.animation.lips import lip_channels
 
     channels = lip_channels(world.utterances[node.id].phonemes, float(times[0]))
-    return tuple(replace(channel, source=node.id) for channel in channels)
+    return tuple(channel.named(node.id) for channel in channels)
 
 
 def check(node: Speech, world: World) -> tuple[Fault, ...]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bml_schema import BlockProgress
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.targets import AU_NAMES, axis
 from realizer.pipeline import Performance, Realization
@@ -48,7 +49,7 @@ def realization() -> Realization:
         face_name="default",
         characters={None: Performance(AUFrames(times, targets), FAPFrames(times, values, mask))},
         schedules=(nod,),
-        feedback=("<blockProgress/>",),
+        told=(BlockProgress("greeting:start", 0.2),),
         warnings=(Warning("greeting:wave", "IMPOSSIBLE_TO_SCHEDULE", "too short"),),
         speaking=(Speaking(0.25, 1.25, hello, 0),),
     )
