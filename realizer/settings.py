@@ -185,7 +185,7 @@ class Settings:
     max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of one document")
     max_behaviours: int = _setting(10_000, _number(int, 1, 10**6), "behaviours in one block")
     max_blocks: int = _setting(1_000, _number(int, 1, 10**6), "blocks playing or waiting in one session")
-    max_connections: int = _setting(512, _number(int, 1, 10**6), "WebSockets open from one address")
+    max_connections: int = _setting(2_000, _number(int, 1, 10**6), "WebSockets open from one address")
     max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service")
     max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
 

@@ -7,7 +7,8 @@ import secrets
 from collections.abc import Callable
 
 from realizer.errors import RealizerError
-from realizer.server.effects import Effect, Move
+from realizer.server.effects import Effect, Move, Send
+from realizer.server.messages import ErrorMessage
 from realizer.server.session import Session
 
 __all__ = ["Hub", "HubError"]
@@ -46,7 +47,7 @@ class Hub:
         if name is not None and not SESSION_ID.fullmatch(name):
             words = f"session: wanted 1..64 letters, digits or . _ ~ -, got {name[:80]!r}"
             raise HubError(400, words)
-        if (name is None or name not in self.sessions) and len(self.sessions) >= self._most:
+        if (name is None or name not in self.sessions) and self._full and not self._left():
             raise HubError(503, f"{self._most} sessions are open: wanted fewer")
 
     def open(self, connection: int, name: str | None, now: float, seen: int | None = None) -> Session:
@@ -59,6 +60,8 @@ class Hub:
         id = secrets.token_urlsafe(9) if name is None else name
         session = self.sessions.get(id)
         if session is None:
+            if self._full:
+                self._end(self._left()[0])
             session = self.sessions[id] = self._make(id, now, name is not None)
         session.connect(connection, now, seen)
         self._of[connection] = session
@@ -81,6 +84,11 @@ class Hub:
         effects: list[Effect] = []
         for effect in session.outgoing():
             if isinstance(effect, Move):
+                if not self._takes(effect, session):
+                    words = f"{self._most} sessions are open: wanted fewer"
+                    error = ErrorMessage(code="invalid", message=words, where="hello.session")
+                    effects.append(Send(effect.connection, error.text()))
+                    continue
                 self.leave(effect.connection, now)
                 there = self.open(effect.connection, effect.session, now)
                 there.welcome(effect.connection, now)
@@ -91,8 +99,25 @@ class Hub:
                 effects.append(effect)
         return effects
 
+    def _takes(self, move: Move, left: Session) -> bool:
+        """Whether there is room in the session it goes to, or that it leaves."""
+        ends = not left.named and len(left.connections) == 1
+        return move.session in self.sessions or ends or not self._full or bool(self._left())
+
     def sweep(self, now: float) -> None:
         """Close the sessions nobody has been in for too long."""
         for session in [s for s in self.sessions.values() if s.expired(now)]:
-            session.close()
-            del self.sessions[session.id]
+            self._end(session)
+
+    @property
+    def _full(self) -> bool:
+        return len(self.sessions) >= self._most
+
+    def _left(self) -> list[Session]:
+        """Sessions that wait for somebody to come back, the longest left first: they make room for others."""
+        left = [(s.empty_since, s.id, s) for s in self.sessions.values() if s.empty_since is not None]
+        return [session for *_, session in sorted(left)]
+
+    def _end(self, session: Session) -> None:
+        session.close()
+        del self.sessions[session.id]

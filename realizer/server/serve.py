@@ -53,6 +53,7 @@ async def _tell(door: Door) -> None:
 
 def run(settings: Settings | None = None) -> None:
     """`serve` in an event loop of its own: uvloop's where it is installed."""
+    _allow_files()
     try:
         import uvloop
     except ImportError:
@@ -60,6 +61,17 @@ def run(settings: Settings | None = None) -> None:
     else:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             runner.run(serve(settings))
+
+
+def _allow_files() -> None:
+    """A WebSocket is an open file: let there be as many as the system allows, which begins with fewer."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with contextlib.suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 class Server:

@@ -133,6 +133,8 @@ class Shell:
         if session is None or session.closed:
             return False
         try:
+            # Who asks and never reads the answers is found here: nothing else may ever be due.
+            session.backlog(number, self._clients[number].waiting)
             session.receive(number, message, self._loop.time())
         except Exception:
             self._fail(session)

@@ -53,7 +53,7 @@ def address() -> Iterator[str]:
 
 
 @pytest.fixture
-def page(browser, address, tmp_path):  # type: ignore[no-untyped-def]  # noqa: F811
+def page(browser, address, tmp_path):  # type: ignore[no-untyped-def]
     (tmp_path / "index.html").write_text(PAGE.format(address=address), "utf-8")
     with hosted(tmp_path) as url:
         opened = browser.new_page()

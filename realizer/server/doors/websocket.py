@@ -23,6 +23,10 @@ from realizer.settings import Settings
 __all__ = ["WebSocketDoor"]
 
 
+# A client that has not answered the close by then is gone.
+GOODBYE = 2.0  # s
+
+
 class WebSocketDoor:
     """Serves `settings.host`; `port` is the one that is open after `start`."""
 
@@ -60,7 +64,7 @@ class WebSocketDoor:
             max_size=self._settings.max_message,
             ping_interval=20,
             ping_timeout=60,
-            close_timeout=2,
+            close_timeout=GOODBYE,
             server_header=None,
         )
         self.port = next(iter(self._socket.sockets)).getsockname()[1]
@@ -189,7 +193,15 @@ class _Client:
 
     def end(self, code: int, reason: str) -> None:
         if self._end is None:
-            self._end = asyncio.get_running_loop().create_task(self._socket.close(code, reason))
+            self._end = asyncio.get_running_loop().create_task(self._close(code, reason))
+
+    async def _close(self, code: int, reason: str) -> None:
+        """One that does not read will not hear that it is let go: `close` would wait for it for ever."""
+        try:
+            async with asyncio.timeout(GOODBYE):
+                await self._socket.close(code, reason)
+        except TimeoutError:
+            self._socket.transport.abort()
 
 
 def _address(socket: ServerConnection) -> str:

@@ -55,6 +55,29 @@ def test_too_many_sessions_are_refused_but_joining_is_not(hub) -> None:
     hub.open(10, "s0", 0.0)
 
 
+def test_a_session_that_was_left_makes_room_the_longest_left_first(hub) -> None:
+    for k in range(3):
+        hub.open(k, f"s{k}", 0.0)
+    hub.leave(1, 1.0)
+    hub.leave(0, 2.0)
+    hub.check("more")
+    hub.open(9, "more", 3.0)
+    assert set(hub.sessions) == {"s0", "s2", "more"}
+    hub.open(10, "s0", 3.0)
+    with pytest.raises(HubError, match="3 sessions are open"):
+        hub.check("again")
+
+
+def test_hello_into_one_session_too_many_is_an_error_and_leaves_all_as_it_was(hub) -> None:
+    for k in range(3):
+        hub.open(k, f"s{k}", 0.0)
+    here = hub.open(3, "s0", 0.0)
+    here.receive(3, '{"type":"hello","session":"more"}', 0.5)
+    (effect,) = hub.effects(here, 0.5)
+    assert '"where":"hello.session"' in effect.data
+    assert hub.session_of(3) is here
+
+
 def test_hello_moves_a_connection_to_the_session_it_names(hub) -> None:
     there = hub.open(1, "show", 0.0)
     here = hub.open(2, None, 0.0)
