@@ -208,6 +208,8 @@ class Player:
 
     def due(self, now: float) -> list[Feedback]:
         """Feedback whose time has come, in the order of report, each once."""
+        if not self._blocks.stirs(now):
+            return []
         out = self._blocks.due(now)
         forgotten = self._blocks.forget(now - self.history - RELAX - AFTERMATH)
         if forgotten:

@@ -30,6 +30,7 @@ class Cast:
         self.next_number = 0
         self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
         self._alive: dict[str, Playing] = {}  # by id; those that are not done
+        self._ended: list[Playing] = []  # those of `_playing` that are done
         self._past: dict[str, Schedule] = {}
         self._anticipated = Schedule(ANTICIPATORS, {}, {})
 
@@ -41,11 +42,18 @@ class Cast:
     def end(self, playing: Playing) -> None:
         """A block has ended: its id is free."""
         del self._alive[playing.block.id]
+        self._ended.append(playing)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether there are blocks that have ended and are not forgotten."""
+        return bool(self._ended)
 
     def forget(self, before: float) -> list[Playing]:
         """Drop the blocks of which nothing is to be seen from a time on; returns them."""
-        gone = [p for p in self._playing.values() if p.done and p.gone < before]
+        gone = [p for p in self._ended if p.gone < before]
         for playing in gone:
+            self._ended.remove(playing)
             self._past[playing.block.id] = playing.schedule
             del self._playing[playing.number]
         while len(self._past) > PAST:

@@ -125,6 +125,11 @@ class Ensemble:
     def next_deadline(self) -> float | None:
         return float("-inf") if self.reports else self.course.calendar.next
 
+    def stirs(self, now: float) -> bool:
+        """Whether something is due by then, or has ended and is not forgotten."""
+        due = self.next_deadline()
+        return self.cast.has_ended or (due is not None and due <= now)
+
     def forget(self, before: float) -> bool:
         """Drop blocks of which nothing is to be seen after a time; True where there were some."""
         gone = self.cast.forget(before)

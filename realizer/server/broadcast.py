@@ -223,6 +223,7 @@ class Broadcast:
                         messages[key] = encode(window, s, number)
                     effects.append(Send(connection.id, messages[key]))
                 s.next = newest + 1
+            window.settle()
 
     def _send_packets(
         self, connection: Connection, subscription: SoundSubscription, now: float, effects: list[Effect]
@@ -282,4 +283,5 @@ class Broadcast:
             self._draws += 1
             view.busy, view.drawing, view.begun, view.next = self._draws, newest, now, newest + 1
             pose = window.poses[newest - window.first]
+            window.settle()
             effects.append(Draw(self._draws, view.face, pose, view.look))

@@ -221,8 +221,9 @@ class Session:
         t = now - self.opened
         self._publish(t)
         self._effects += self.broadcast.due(self._connections.values(), t)
-        for speak in self.preparation.overdue(t + EPSILON - SPEAK_DEADLINE):
-            self._silently(speak, f"the voice has not answered for {SPEAK_DEADLINE:g} s")
+        if self.preparation.waiting:
+            for speak in self.preparation.overdue(t + EPSILON - SPEAK_DEADLINE):
+                self._silently(speak, f"the voice has not answered for {SPEAK_DEADLINE:g} s")
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
         done = self._submit_ready(t) or self._read_one(t)

@@ -13,7 +13,7 @@ from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
-from realizer.arrays import Float32, Int16, Int32
+from realizer.arrays import Float32, Float64, Int16, Int32
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.pipeline import CUT, heard
 from realizer.player import Player, Speaking
@@ -24,9 +24,11 @@ if TYPE_CHECKING:
 
 __all__: list[str] = []
 
-# Frames computed in one call. The cost of a call is flat up to some 100 frames; a longer window is thrown
-# away more often when a plan changes.
-WINDOW = 2.0  # s
+# Frames computed in one call. 200 frames cost twice what 25 do; a longer window is thrown away more often,
+# when a plan changes.
+WINDOW = 8.0  # s
+# Meshes computed in one call: each costs as much as the frames of a whole window, so a few at a time.
+MESHES = 8
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
 AHEAD = 0.1  # s
@@ -50,22 +52,47 @@ def last_at(now: float, fps: float) -> int:
 
 
 class Window:
-    """Frames `first` .. `first + n - 1` of one character; all but AUs is made when first asked for."""
+    """Frames `first` .. `first + n - 1` of one character; each of its arrays is made when first asked for.
+
+    Args:
+        aus: (times) -> the AUs at those times.
+    """
 
     def __init__(
-        self, first: int, fps: float, aus: AUFrames, face: Callable[[], Face], mapping: FapMapping
+        self,
+        first: int,
+        count: int,
+        fps: float,
+        aus: Callable[[Float64], AUFrames],
+        face: Callable[[], Face],
+        mapping: FapMapping,
     ) -> None:
         self.first = first
+        self.count = count
         self.fps = fps
-        self.aus = aus
+        self._make = aus
+        self._aus: AUFrames | None = None
         self._face = face
         self._mapping = mapping
+        self._meshes: Int16 | None = None
+        self._meshes_from = 0
+
+    @property
+    def aus(self) -> AUFrames:
+        """All that follows is made of these."""
+        if self._aus is None:
+            self._aus = self._make(np.arange(self.first, self.end) / self.fps)
+        return self._aus
+
+    def settle(self) -> None:
+        """What is streamed has been made: let go of what it was made of, which is several times as large."""
+        self._aus = None
 
     @property
     def end(self) -> int:
-        return self.first + len(self.aus.times)
+        return self.first + self.count
 
-    @cached_property
+    @property
     def faps(self) -> FAPFrames:
         """In FAPU."""
         return to_fap(self.aus, self._mapping)
@@ -97,13 +124,16 @@ class Window:
         """(n, k) float32: what the face is drawn by."""
         return poses(self.aus, self._face().takes, self._mapping)
 
-    @cached_property
-    def mesh(self) -> Int16:
-        """(n, n_vertices, 3) int16."""
+    def mesh(self, row: int) -> Int16:
+        """(n_vertices, 3) int16 of one frame, counted from the first."""
         from realizer.face import deform, quantise
 
-        face = self._face()
-        return np.ascontiguousarray(quantise(face, deform(face, self.poses)).astype("<i2"))
+        if self._meshes is None or not 0 <= row - self._meshes_from < MESHES:
+            face, self._meshes_from = self._face(), row - row % MESHES
+            poses = self.poses[self._meshes_from : self._meshes_from + MESHES]
+            self._meshes = np.ascontiguousarray(quantise(face, deform(face, poses)).astype("<i2"))
+        mesh: Int16 = self._meshes[row - self._meshes_from]
+        return mesh
 
 
 class Timeline:
@@ -140,9 +170,11 @@ class Timeline:
             or last >= window.end
         ):
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
-            times = np.arange(first, first + count) / self.fps
-            aus = self.player.frames(times, self.character)
-            window = self._window = Window(first, self.fps, aus, self._face, self._mapping())
+
+            def aus(times: Float64) -> AUFrames:
+                return self.player.frames(times, self.character)
+
+            window = self._window = Window(first, count, self.fps, aus, self._face, self._mapping())
             self._revision = self.player.revision
         return window
 
@@ -168,17 +200,17 @@ def arkit_names() -> list[str]:
 
 def encode(window: Window, wanted: Wanted, frame: int) -> str | bytes:
     """Frame `frame` of the window as one WebSocket message."""
-    rows: Float32 | Int32 | Int16
+    n, time = frame - window.first, frame / window.fps
+    row: Float32 | Int32 | Int16
     match wanted.stream:
         case "fap":
-            kind, rows = FrameKind.FAP, window.integers
+            kind, row = FrameKind.FAP, window.integers[n]
         case "au":
-            kind, rows = FrameKind.AU, window.asked if wanted.asked else window.intensities
+            kind, row = FrameKind.AU, (window.asked if wanted.asked else window.intensities)[n]
         case "arkit":
-            kind, rows = FrameKind.ARKIT, window.arkit
+            kind, row = FrameKind.ARKIT, window.arkit[n]
         case _:
-            kind, rows = FrameKind.MESH, window.mesh
-    row, time = rows[frame - window.first], frame / window.fps
+            kind, row = FrameKind.MESH, window.mesh(n)
     if wanted.encoding == "json":
         values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
         return json_frame(wanted.stream, frame, time, values, wanted.name)

@@ -119,9 +119,11 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
     face = faces["au"]
     player = Player(idle=True, seed=3)
     window = Timeline(player, 0, 25, lambda: face).window(0, 20)
-    assert window.poses.shape == (50, len(face.takes))
-    assert np.array_equal(window.mesh, quantise(face, deform(face, window.poses)))
-    assert not np.array_equal(window.mesh[0], window.mesh[-1])
+    assert window.poses.shape == (window.count, len(face.takes))
+    meshes = quantise(face, deform(face, window.poses[:30]))
+    for row in (0, 29, 7, 8):  # in any order
+        assert np.array_equal(window.mesh(row), meshes[row])
+    assert not np.array_equal(meshes[0], meshes[-1])
 
 
 def test_a_session_draws_as_the_service_was_told(faces: dict[str, Face]) -> None:
