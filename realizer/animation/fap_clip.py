@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from realizer.animation.frames import FAPFrames
 from realizer.arrays import Bool, Int32
+from realizer.units import frame_count
 
 __all__ = ["FAPClip"]
 
@@ -50,6 +52,31 @@ class FAPClip:
         """What is left of it from a frame on."""
         parts = (self.values[frame:], self.mask, self.visemes[frame:], self.expressions[frame:])
         return FAPClip(self.name, self.fps, *parts, self.notes)
+
+    def resampled(self, fps: float) -> FAPClip:
+        """The same course at another rate: FAPs straight between frames, FAP 1 and 2 of the nearest frame.
+
+        Raises:
+            ValueError: not a positive, finite rate.
+        """
+        if not (math.isfinite(fps) and fps > 0):
+            raise ValueError(f"fps: wanted a number above 0, got {fps}")
+        if fps == self.fps or not len(self.values):
+            return replace(self, fps=fps)
+        last = len(self.values) - 1
+        count = frame_count(last / self.fps, fps)
+        at = np.minimum(np.arange(count) * (self.fps / fps), last)
+        before = np.minimum(at.astype(int), max(last - 1, 0))
+        part = (at - before)[:, None]
+        values = self.values[before] * (1 - part) + self.values[np.minimum(before + 1, last)] * part
+        nearest = np.rint(at).astype(int)
+        return replace(
+            self,
+            fps=fps,
+            values=np.rint(values).astype(np.int32),
+            visemes=self.visemes[nearest],
+            expressions=self.expressions[nearest],
+        )
 
     def frames(self) -> FAPFrames:
         """The values on a clock that starts at 0; FAP 1 and 2 are left out: frames have no place for them."""

@@ -12,6 +12,7 @@ from realizer.animation.fap_reader import read_fap
 from realizer.animation.targets import fap
 from realizer.arrays import Float64
 from realizer.behaviours import media
+from realizer.behaviours.fap_compound import shown
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
 from realizer.behaviours.tracks import track
@@ -74,13 +75,11 @@ def expand_file(node: FapFile, times: Float64, world: World) -> tuple[Channel, .
 
 
 def check_file(node: FapFile, world: World) -> tuple[Fault, ...]:
-    """A file that cannot be read is fatal; FAPs 1 and 2, and values that go too far, are not."""
+    """A file that cannot be read is fatal; what of FAP 1 and 2 has no face, and values too far, are not."""
     if faults := media.faults(node.file_name, world, read):
         return faults
     clip = media.load(node.file_name, world, read)
-    words = []
-    if clip.visemes.any() or clip.expressions.any():
-        words.append("FAP 1 and 2 (viseme and expression) are not played")
+    words = [note for note in clip.notes if note.startswith(("FAP 1:", "FAP 2:"))]
     far = [number for number in moved(clip) if out_of_range(number, *_extremes(clip, number))]
     if far:
         words.append(f"FAP {', '.join(map(str, far))} beyond the range of the standard are limited to it")
@@ -93,7 +92,7 @@ def claims_of_file(node: FapFile, world: World) -> frozenset[str]:
 
 
 def read(content: bytes) -> FAPClip:
-    """The clip of a file.
+    """The clip of a file, with the FAPs that show its visemes and expressions.
 
     Raises:
         MediaError: fewer than two frames, or too much text.
@@ -103,7 +102,7 @@ def read(content: bytes) -> FAPClip:
         raise media.MediaError(
             f"wanted at most {MOST_BYTES // 2**20} MiB of FAP text, got {len(content)} bytes"
         )
-    clip = read_fap(content)
+    clip = shown(read_fap(content))
     if len(clip.values) < 2:
         raise media.MediaError(f"wanted at least two frames, got {len(clip.values)}")
     return clip

@@ -10,6 +10,7 @@ from bml_schema import Block, BMLError, read
 from realizer.animation.fap_clip import FAPClip
 from realizer.animation.fap_reader import read_fap
 from realizer.behaviours import VOCABULARY
+from realizer.behaviours.fap_compound import shown
 from realizer.behaviours.fap_values import MOST_BYTES
 from realizer.behaviours.kind import World
 from realizer.behaviours.media import media_file
@@ -67,7 +68,7 @@ def prepare(task: Task, media: Path | None) -> FAPClip | Script | None:
 
 
 def _clip(text: str | bytes) -> FAPClip:
-    clip = read_fap(text)
+    clip = shown(read_fap(text))
     if not len(clip.values):
         raise RealizerError("wanted frames, got none")
     return clip

@@ -94,14 +94,27 @@ def test_a_file_that_does_not_begin_at_rest_gets_there_smoothly(play, media: Pat
     assert np.abs(np.diff(course)).max() < 25
 
 
-def test_compound_faps_of_a_file_are_said_to_be_left_out(play, media: Path) -> None:
-    mask = " ".join("1" if fap in (1, 31) else "0" for fap in range(1, 69))
-    lines = [f"{mask}\n{k} 3 0 63 0 {10 * (k % 2)}" for k in range(3)]
-    (media / "viseme.fap").write_text("\n".join(["2.1 v 25 3", *lines]), "utf-8")
-    played = play('<own:fapFile id="f" fileName="viseme.fap"/>', media=media)
+def with_compound(media: Path, viseme: str, expression: str) -> None:
+    """A file v.fap of a second with these and FAP 31."""
+    mask = " ".join("1" if fap in (1, 2, 31) else "0" for fap in range(1, 69))
+    lines = [f"{mask}\n{k} {viseme} {expression} {10 * (k % 2)}" for k in range(26)]
+    (media / "v.fap").write_text("\n".join(["2.1 v 25 26", *lines]), "utf-8")
+
+
+def test_visemes_and_expressions_of_a_file_are_shown(play, media: Path) -> None:
+    with_compound(media, "10 0 63 0", "6 63 0 0 0 0")
+    played = play('<own:fapFile id="f" fileName="v.fap"/>', media=media)
+    assert played.warnings == []
+    assert played.fap(5, 0.5) < -300, "the mouth says a"
+    assert played.fap(32, 0.5) > 100, "a brow is surprised"
+    assert played.fap(31, 0.52) == pytest.approx(10), "the other one is as the file says"
+
+
+def test_what_a_viseme_cannot_show_is_said(play, media: Path) -> None:
+    with_compound(media, "500 0 63 0", "7 63 0 0 0 0")
+    played = play('<own:fapFile id="f" fileName="v.fap"/>', media=media)
     assert played.warnings == [("b:f", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
-    assert "FAP 1 and 2" in played.told
-    assert played.fap(31, 0.04) == pytest.approx(10)
+    assert "FAP 1: wanted visemes 0..14, got 500: shown as none; FAP 2: wanted" in played.told
 
 
 @pytest.mark.parametrize(
