@@ -154,10 +154,11 @@ def load(url: str, sessions: int, seconds: float, warm: float, plays: bool) -> d
                     peer.documents, peer.due = peer.documents + 1, peer.due + EVERY
                     peer.sent[name] = time.time()
                     peer.socket.sendall(masked(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
-    late = [c - t - (0.0 if p.zero is None else p.zero) for p in peers.values() for t, c in p.frames]
+    zeros = {peer: 0.0 if not plays else peer.zero for peer in peers.values()}
+    late = [came - at - zero for peer, zero in zeros.items() if zero is not None for at, came in peer.frames]
     gaps = sum(p.numbers[-1] - p.numbers[0] + 1 - len(p.numbers) for p in peers.values() if p.numbers)
     return {
-        "frames": len(late),
+        "frames": sum(len(peer.frames) for peer in zeros),
         "expected": sessions * seconds * FPS,
         "missing": gaps,
         **{name: 1e3 * float(np.percentile(late, part)) for name, part in PARTS.items()},
