@@ -63,6 +63,7 @@ MAY: dict[str, set[str]] = {
     "realizer.outputs": VALUES
     | {
         "realizer.animation",
+        "realizer.composition.playing",
         "realizer.face",
         "realizer.outputs",
         "realizer.pipeline",

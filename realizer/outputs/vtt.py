@@ -1,4 +1,4 @@
-"""A realization as WebVTT (.vtt): what is said, word by word, and every sync point, as cues."""
+"""A realization as WebVTT (.vtt): words, phonemes and sync points, as cues."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from realizer.outputs import said
 from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
@@ -17,20 +18,24 @@ if TYPE_CHECKING:
 __all__ = ["OUTPUTS", "encode_vtt", "write_vtt"]
 
 LEAST = 0.001  # s; WebVTT wants every cue to end after it starts, and counts milliseconds
+KINDS = ("word", "phoneme", "sync")  # of cues that start together, in this order
 
 
 @dataclass(frozen=True, slots=True)
 class _Cue:
     start: float
     end: float
-    kind: str  # "word" or "sync": the class a style sheet can pick it by
+    kind: str  # the class a style sheet, or a program, can pick it by
     text: str
     id: str = ""
 
 
 def encode_vtt(realization: Realization) -> str:
-    """Cues by start time: words as `<c.word>`, sync points as `<c.sync>`, named and a frame long."""
-    cues = sorted([*_words(realization), *_syncs(realization)], key=lambda cue: (cue.start, cue.kind, cue.id))
+    """Cues by start time: words as `<c.word>`, IPA as `<c.phoneme>`, sync points as `<c.sync>`.
+
+    A sync point's cue is a frame long, and its name is its identifier too.
+    """
+    cues = sorted(_cues(realization), key=lambda cue: (cue.start, KINDS.index(cue.kind), cue.id))
     blocks = ["WEBVTT"]
     for cue in cues:
         head = f"{_clock(cue.start)} --> {_clock(max(cue.end, cue.start + LEAST))}"
@@ -42,23 +47,17 @@ def encode_vtt(realization: Realization) -> str:
 
 
 def write_vtt(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """All characters' words."""
     write_text(path, encode_vtt(realization))
 
 
-def _words(realization: Realization) -> Iterator[_Cue]:
-    for start, utterance in realization.speech:
-        for word in utterance.words:
-            yield _Cue(start + word.start, start + word.end, "word", " ".join(word.text.split()))
-
-
-def _syncs(realization: Realization) -> Iterator[_Cue]:
-    frame = 1 / realization.fps
-    for schedule in realization.schedules:
-        for behaviour, times in schedule.times.items():
-            for point, time in zip(schedule.points[behaviour], times, strict=True):
-                at = schedule.start + float(time)
-                name = f"{schedule.block}:{behaviour}:{point}"
-                yield _Cue(at, at + frame, "sync", name, name)
+def _cues(realization: Realization) -> Iterator[_Cue]:
+    for speaking in realization.speaking:
+        for kind, spans in (("word", said.words(speaking)), ("phoneme", said.phonemes(speaking))):
+            for span in spans:
+                yield _Cue(span.start, span.end, kind, span.text)
+    for time, name in said.points(realization):
+        yield _Cue(time, time + 1 / realization.fps, "sync", name, name)
 
 
 def _clock(seconds: float) -> str:
@@ -67,4 +66,4 @@ def _clock(seconds: float) -> str:
     return f"{minutes // 60:02}:{minutes % 60:02}:{milliseconds // 1000:02}.{milliseconds % 1000:03}"
 
 
-OUTPUTS = (Output(".vtt", "text/vtt", "words and sync points as WebVTT cues", write_vtt),)
+OUTPUTS = (Output(".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", write_vtt),)

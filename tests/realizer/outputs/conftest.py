@@ -18,7 +18,7 @@ from realizer.animation.targets import AU_NAMES, axis
 from realizer.pipeline import Performance, Realization
 from realizer.player import Speaking
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech.utterance import Utterance, Word
+from realizer.speech.utterance import Phoneme, Utterance, Word
 
 FPS = 25.0
 DURATION = 1.5
@@ -41,7 +41,12 @@ def realization() -> Realization:
     nod = Schedule("greeting", {"nod": points}, {"nod": np.array([0.0, 0.61, 1.2])}, start=0.2)
     tone = (9000 * np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE)).astype(np.int16)
     hello = Utterance(
-        1.0, (Word(0.0, 0.4, "Hello"), Word(0.4, 0.9, "R&D <team>")), (), {}, sample_rate=RATE, pcm=tone
+        1.0,
+        (Word(0.0, 0.4, "Hello"), Word(0.4, 0.9, "R&D <team>")),
+        (Phoneme(0.0, 0.1, "h"), Phoneme(0.1, 0.4, "oʊ", 1), Phoneme(0.4, 0.5, ""), Phoneme(0.5, 0.9, "iː")),
+        {},
+        sample_rate=RATE,
+        pcm=tone,
     )
     return Realization(
         fps=FPS,
@@ -49,7 +54,7 @@ def realization() -> Realization:
         face_name="default",
         characters={None: Performance(AUFrames(times, targets), FAPFrames(times, values, mask))},
         schedules=(nod,),
-        told=(BlockProgress("greeting:start", 0.2),),
+        told=(BlockProgress(id="greeting:start", global_time=0.2),),
         warnings=(Warning("greeting:wave", "IMPOSSIBLE_TO_SCHEDULE", "too short"),),
         speaking=(Speaking(0.25, 1.25, hello, 0),),
     )

@@ -1,0 +1,111 @@
+"""A realization as a TextGrid (.textgrid), as Praat and ELAN read it: words, phonemes, sync points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from realizer.outputs import said
+from realizer.outputs.files import write_text
+from realizer.outputs.output import Drawing, Output
+from realizer.outputs.said import Span
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "encode_textgrid", "write_textgrid"]
+
+DIGITS = 6  # after the point: microseconds
+
+
+def encode_textgrid(realization: Realization) -> str:
+    """The text, in Praat's long form: interval tiers `words` and `phonemes`, a point tier `syncs`.
+
+    Further characters have tiers named after them. Points that fall together are one, their names apart by a
+    blank, because a tier has one point at a time.
+    """
+    end = max([realization.duration, 1 / realization.fps, *_ends(realization)])
+    tiers = []
+    for index, name in enumerate(realization.characters):
+        mine = [speaking for speaking in realization.speaking if speaking.character == index]
+        mine.sort(key=lambda speaking: speaking.start)
+        prefix = f"{name or index} " if index else ""
+        tiers.append(_intervals(f"{prefix}words", end, (w for s in mine for w in said.words(s))))
+        tiers.append(_intervals(f"{prefix}phonemes", end, (p for s in mine for p in said.phonemes(s))))
+    tiers.append(_points("syncs", end, said.points(realization)))
+    lines = [
+        'File type = "ooTextFile"', 'Object class = "TextGrid"', "",
+        "xmin = 0", f"xmax = {_number(end)}", "tiers? <exists>", f"size = {len(tiers)}", "item []:",
+    ]  # fmt: skip
+    for k, tier in enumerate(tiers, 1):
+        lines += [f"    item [{k}]:", *(f"        {line}" for line in tier)]
+    return "\n".join(lines) + "\n"
+
+
+def write_textgrid(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """All characters' words."""
+    write_text(path, encode_textgrid(realization))
+
+
+def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
+    """A tier without a hole: what nobody says is an interval with no text."""
+    whole = list(_filled(end, spans))
+    lines = [*_head("IntervalTier", name, end), f"intervals: size = {len(whole)}"]
+    for k, span in enumerate(whole, 1):
+        lines += [
+            f"intervals [{k}]:",
+            f"    xmin = {_number(span.start)}", f"    xmax = {_number(span.end)}",
+            f"    text = {_quoted(span.text)}",
+        ]  # fmt: skip
+    return lines
+
+
+def _filled(end: float, spans: Iterable[Span]) -> Iterator[Span]:
+    now = 0.0
+    for span in spans:
+        start, last = round(max(span.start, now), DIGITS), round(span.end, DIGITS)
+        if last <= start:
+            continue
+        if start > now:
+            yield Span(now, start, "")
+        yield Span(start, last, span.text)
+        now = last
+    if round(end, DIGITS) > now:
+        yield Span(now, end, "")
+
+
+def _points(name: str, end: float, points: Iterable[tuple[float, str]]) -> list[str]:
+    together = [
+        (time, " ".join(name for _, name in names))
+        for time, names in groupby(points, lambda point: _number(max(point[0], 0.0)))
+    ]
+    lines = [*_head("TextTier", name, end), f"points: size = {len(together)}"]
+    for k, (time, names) in enumerate(together, 1):
+        lines += [f"points [{k}]:", f"    number = {time}", f"    mark = {_quoted(names)}"]
+    return lines
+
+
+def _head(kind: str, name: str, end: float) -> list[str]:
+    return [f'class = "{kind}"', f"name = {_quoted(name)}", "xmin = 0", f"xmax = {_number(end)}"]
+
+
+def _ends(realization: Realization) -> Iterator[float]:
+    for speaking in realization.speaking:
+        for spans in (said.words(speaking), said.phonemes(speaking)):
+            yield from (span.end for span in spans)
+    yield from (time for time, _ in said.points(realization))
+
+
+def _number(seconds: float) -> str:
+    return f"{round(seconds, DIGITS):.{DIGITS}f}".rstrip("0").rstrip(".")
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"'
+
+
+OUTPUTS = (
+    Output(".textgrid", "text/x-textgrid", "words, phonemes and sync points for Praat", write_textgrid),
+)

@@ -1,0 +1,61 @@
+"""WebVTT, as a reader of others takes it."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import replace
+
+import pytest
+
+from realizer.outputs import OUTPUTS, Drawing
+from realizer.pipeline import realize
+
+webvtt = pytest.importorskip("webvtt", reason="pip install webvtt-py")
+
+
+def cues(realization, tmp_path):
+    """(start, end, kind, text) of what webvtt-py finds."""
+    OUTPUTS[".vtt"].write(realization, tmp_path / "x.vtt", Drawing())
+    found = []
+    for cue in webvtt.read(str(tmp_path / "x.vtt")):
+        kind = cue.raw_text.removeprefix("<c.").partition(">")[0]
+        found.append((seconds(cue.start_time), seconds(cue.end_time), kind, html.unescape(cue.text)))
+        assert cue.identifier == (cue.text if kind == "sync" else None)
+    return found
+
+
+def seconds(time):
+    return time.hours * 3600 + time.minutes * 60 + time.seconds + time.milliseconds / 1000
+
+
+def test_words_phonemes_and_sync_points_are_cues_in_their_order(realization, tmp_path):
+    assert cues(realization, tmp_path) == [
+        (0.2, 0.24, "sync", "greeting:nod:start"),
+        (0.25, 0.65, "word", "Hello"),
+        (0.25, 0.35, "phoneme", "h"),
+        (0.35, 0.65, "phoneme", "oʊ"),
+        (0.65, 1.15, "word", "R&D <team>"),
+        (0.75, 1.15, "phoneme", "iː"),
+        (0.81, 0.85, "sync", "greeting:nod:stroke"),
+        (1.4, 1.44, "sync", "greeting:nod:end"),
+    ]
+
+
+def test_what_was_cut_off_is_not_said(realization, tmp_path):
+    (speaking,) = realization.speaking
+    short = replace(realization, speaking=(replace(speaking, until=0.6),))
+    told = [cue for cue in cues(short, tmp_path) if cue[2] != "sync"]
+    assert [cue[3] for cue in told] == ["Hello", "h", "oʊ"]
+    assert max(cue[1] for cue in told) == 0.6
+
+
+def test_every_word_and_point_of_a_document_is_read(turn, tmp_path):
+    played = realize(turn, voice="silent", idle=False)
+    found = cues(played, tmp_path)
+    assert [text for _, _, kind, text in found if kind == "word"] == [
+        word.text for _, utterance in played.speech for word in utterance.words
+    ]
+    assert {text for _, _, kind, text in found if kind == "sync"} == {
+        f"a:{behaviour}:{point}" for behaviour, names in played.schedules[0].points.items() for point in names
+    }
+    assert all(end > start for start, end, _, _ in found)
