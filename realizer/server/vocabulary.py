@@ -29,7 +29,7 @@ def vocabulary() -> bytes:
 
     elements: name, namespace, usual prefix, attributes (what is wanted, words), children, sync points.
     values: {"element attribute": words} where a word is looked up in a table.
-    aus, faps: what the sliders are made of. wheel: places, degrees and 0..7. profiles: {set: names}.
+    aus, faps, groups: what the sliders are made of. wheel: places, degrees and 0..7. profiles: {set: names}.
     """
     return json.dumps(
         {
@@ -37,6 +37,7 @@ def vocabulary() -> bytes:
             "values": _values(),
             "aus": _aus(),
             "faps": _faps(),
+            "groups": _groups(),
             "wheel": _wheel(),
             "profiles": _profiles(),
             "voices": _voices(),
@@ -155,6 +156,13 @@ def _faps() -> list[dict[str, Any]]:
         }
         for row in faps()[2:]
     ]
+
+
+def _groups() -> dict[str, list[dict[str, Any]]]:
+    from realizer.tables.regions import au_regions, fap_regions
+
+    found = {"aus": au_regions(), "faps": fap_regions()}
+    return {kind: [{"name": r.name, "members": r.members} for r in rows] for kind, rows in found.items()}
 
 
 def _wheel() -> list[dict[str, Any]]:

@@ -46,6 +46,9 @@ def test_words_of_tables_are_given_by_element_and_attribute() -> None:
 def test_sliders_and_the_wheel_have_their_rows() -> None:
     assert [fap["fap"] for fap in ALL["faps"]] == list(range(3, 69))
     assert {au["au"] for au in ALL["aus"]} >= {1, 2, 4, 12, 45}
+    for kind, number in (("aus", "au"), ("faps", "fap")):
+        members = [member for group in ALL["groups"][kind] for member in group["members"]]
+        assert sorted(members) == sorted(row[number] for row in ALL[kind])
     kinds = [place["kind"] for place in ALL["wheel"]]
     assert kinds.count("basic") == kinds.count("advanced") == 8
     assert "fear 8" in ALL["profiles"]["published"]
