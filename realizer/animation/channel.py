@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -124,6 +125,7 @@ class Channel:
         """As `replace`, in a tenth of its time: what changes is as sound as what was there."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__, **changes)
+        other.__dict__.pop("span", None)
         return other
 
     @property
@@ -139,7 +141,7 @@ class Channel:
         last = self.gains[-1] if self.gains else None
         return last.end if last is not None and last.to == 0.0 else float("inf")
 
-    @property
+    @cached_property
     def span(self) -> tuple[float, float]:
         """(first, last) seconds at which it may be other than 0; last is infinite where it holds."""
         last = float("inf") if self.holds else float(self.times[-1])

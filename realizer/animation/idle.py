@@ -10,7 +10,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -56,7 +56,7 @@ class Blink(Channel):
 class Fewer(Channel):
     """What is taken from the blinks; it counts for those that began before it had gone, until they end."""
 
-    @property
+    @cached_property
     def span(self) -> tuple[float, float]:
         first, last = super().span
         return first, last + BLINK_TIMES[-1]
