@@ -10,7 +10,19 @@ from realizer.outputs.output import Drawing, Output
 
 __all__ = ["OUTPUTS", "Drawing", "Output", "output_for"]
 
-MODULES = ("fap_text", "json_text", "csv_table", "vtt", "textgrid", "wav", "png", "film", "glb", "arkit_csv")
+MODULES = (
+    "fap_text",
+    "json_text",
+    "csv_table",
+    "vtt",
+    "textgrid",
+    "wav",
+    "png",
+    "film",
+    "glb",
+    "arkit_csv",
+    "talkinghead",
+)
 
 OUTPUTS: Mapping[str, Output] = {
     output.suffix: output for name in MODULES for output in import_module(f"realizer.outputs.{name}").OUTPUTS
