@@ -17,6 +17,7 @@ from realizer.cli.emotion import emotion
 from realizer.cli.enrich import enrich
 from realizer.cli.expressions import expressions
 from realizer.cli.faces import faces
+from realizer.cli.fap import fap
 from realizer.cli.lists import outputs, voices
 from realizer.cli.play import realize, schedule
 from realizer.cli.serve import serve
@@ -57,6 +58,7 @@ for command in (
     check,
     emotion,
     track,
+    fap,
     enrich,
     expressions,
     timeline,

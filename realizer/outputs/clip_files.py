@@ -1,0 +1,205 @@
+"""A FAPClip to the text of a .fap, .csv or .json file, and back from what any of them says."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.animation.fap_clip import FAPClip
+from realizer.animation.fap_reader import read_fap
+from realizer.errors import RealizerError
+from realizer.outputs import fap_text
+from realizer.tables import faps
+
+__all__ = ["ENCODINGS", "limited", "read_clip"]
+
+# Columns of a table for the numbers of FAP 1 and 2.
+VISEME = tuple(f"viseme_{part}" for part in ("select1", "select2", "blend", "def"))
+EXPRESSION = tuple(
+    f"expression_{part}" for part in ("select1", "intensity1", "select2", "intensity2", "init_face", "def")
+)
+INT32 = 2**31 - 1
+
+
+def read_clip(content: bytes) -> FAPClip:
+    """The clip of a file, whichever of the three it is; `notes` says what was odd.
+
+    Tables and JSON may also be those of `realizer realize`: what is no FAP is passed over.
+
+    Raises:
+        RealizerError: it is none of them, or a cell is no number; says where.
+    """
+    text = content.decode("utf-8-sig", "replace")
+    if text.lstrip().startswith("{"):
+        return _from_json(text)
+    if "," in text.partition("\n")[0]:
+        return _from_csv(text)
+    return read_fap(content)
+
+
+def limited(clip: FAPClip) -> FAPClip:
+    """The clip within the range of the standard; each FAP that went beyond it is one more of `notes`."""
+    rows = faps()
+    values = np.clip(clip.values, [row.least for row in rows], [row.most for row in rows]).astype(np.int32)
+    values[:, :2] = clip.values[:, :2]
+    notes = [
+        f"FAP {row.fap} ({row.name}): wanted {row.least:g}..{row.most:g}, got {before[before != after][0]}; "
+        "limited to it"
+        for row, before, after in zip(rows, clip.values.T, values.T, strict=True)
+        if (before != after).any()
+    ]
+    return replace(clip, values=values, notes=(*clip.notes, *notes))
+
+
+def _to_csv(clip: FAPClip) -> str:
+    """A row a frame: `time` in seconds, the numbers of FAP 1 and 2, each FAP that is given, in its FAPU."""
+    given = [row for row in faps()[2:] if clip.mask[row.fap - 1]]
+    parts = [clip.values[:, [row.fap - 1 for row in given]]]
+    names = [row.name for row in given]
+    if clip.mask[1]:
+        parts.insert(0, clip.expressions)
+        names = [*EXPRESSION, *names]
+    if clip.mask[0]:
+        parts.insert(0, clip.visemes)
+        names = [*VISEME, *names]
+    buffer = io.StringIO()
+    table = csv.writer(buffer, lineterminator="\n")
+    table.writerow(["time", *names])
+    for frame, row in enumerate(np.hstack(parts).tolist()):
+        table.writerow([f"{frame / clip.fps:.9g}", *row])
+    return buffer.getvalue()
+
+
+def _from_csv(text: str) -> FAPClip:
+    try:
+        lines = [(number, row) for number, row in enumerate(csv.reader(io.StringIO(text)), 1) if any(row)]
+    except csv.Error as error:
+        raise RealizerError(f"wanted a table, got {error}") from None
+    (_, head), *body = lines or [(1, [""])]
+    head = [name.strip() for name in head]
+    numbers = {row.name: row.fap for row in faps()[2:]}
+    if "time" not in head or not (wanted := {*numbers, *VISEME, *EXPRESSION}.intersection(head)):
+        raise RealizerError(f"line 1: wanted a column time and some with names of FAPs, got {head[:6]}")
+    if len(set(head)) < len(head):
+        twice = next(name for name in head if head.count(name) > 1)
+        raise RealizerError(f"line 1: wanted each column once, got {twice!r} twice")
+    cells = np.empty((len(body), len(head)))
+    for place, (number, row) in enumerate(body):
+        if len(row) != len(head):
+            raise RealizerError(f"line {number}: wanted {len(head)} cells, got {len(row)}")
+        for column, (name, cell) in enumerate(zip(head, row, strict=True)):
+            known = name in wanted or name == "time"
+            cells[place, column] = _number(cell, f"line {number}, {name}") if known else 0.0
+    column_of = {name: k for k, name in enumerate(head)}
+    fps, notes = _rate(cells[:, column_of["time"]])
+    others = len(head) - 1 - len(wanted)
+    if others:
+        notes.append(f"{others} columns are no FAP and passed over")
+    values, mask = np.zeros((len(body), 68)), np.zeros(68, bool)
+    for name, fap in numbers.items():
+        if name in wanted:
+            values[:, fap - 1], mask[fap - 1] = cells[:, column_of[name]], True
+    compound = []
+    for fap, names in ((0, VISEME), (1, EXPRESSION)):
+        mask[fap] = any(name in wanted for name in names)
+        found = [cells[:, column_of[name]] if name in wanted else np.zeros(len(body)) for name in names]
+        compound.append(np.stack(found, axis=1))
+    return FAPClip("", fps, _whole(values), mask, _whole(compound[0]), _whole(compound[1]), tuple(notes))
+
+
+def _rate(times: npt.NDArray[np.float64]) -> tuple[float, list[str]]:
+    """Frames a second of a column of times, and what is odd about it.
+
+    Raises:
+        RealizerError: they do not rise evenly.
+    """
+    if len(times) < 2:
+        return 25.0, ["less than two frames have no rate; taken as 25 a second"]
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    if not step > 0:
+        raise RealizerError(f"time: wanted rising times, got {times[0]:g} to {times[-1]:g}")
+    away = np.abs(times - times[0] - step * np.arange(len(times)))
+    if away.max() > step / 2:
+        got = f"{times[away.argmax()]:g} in frame {away.argmax()}"
+        raise RealizerError(f"time: wanted frames {step:.4g} s apart, got {got}")
+    return float(f"{1 / step:.6g}"), []
+
+
+def _to_json(clip: FAPClip) -> str:
+    """As `realizer realize` writes FAPs, with the numbers of FAP 1 and 2 where they are given."""
+    fap: dict[str, Any] = {
+        "names": [row.name for row in faps()],
+        "values": clip.values.tolist(),
+        "mask": clip.mask.astype(int).tolist(),
+    }
+    if clip.mask[0]:
+        fap["viseme"] = clip.visemes.tolist()
+    if clip.mask[1]:
+        fap["expression"] = clip.expressions.tolist()
+    whole = {"name": clip.name, "fps": clip.fps, "frames": len(clip.values), "fap": fap}
+    return json.dumps(whole, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def _from_json(text: str) -> FAPClip:
+    try:
+        whole = json.loads(text)
+    except ValueError as error:
+        raise RealizerError(f"wanted JSON, got {error}") from None
+    fap = whole.get("fap")
+    if not isinstance(fap, dict) or "values" not in fap:
+        raise RealizerError('wanted {"fps": ..., "fap": {"values": ...}}, got no values')
+    fps = _number(whole.get("fps", 25.0), "fps")
+    if not fps > 0:
+        raise RealizerError(f"fps: wanted a number above 0, got {fps:g}")
+    values = _whole(np.stack(list(_rows(fap["values"], 68, "fap.values"))))
+    count = len(values)
+    mask = next(_rows([fap.get("mask", [1] * 68)], 68, "fap.mask")) != 0
+    compound = []
+    for column, name, width in ((0, "viseme", 4), (1, "expression", 6)):
+        mask[column] = name in fap
+        rows = list(_rows(fap.get(name, [[0] * width] * count), width, f"fap.{name}"))
+        if len(rows) != count:
+            raise RealizerError(f"fap.{name}: wanted {count} frames, got {len(rows)}")
+        compound.append(_whole(np.stack(rows)))
+    values[:, ~mask] = 0
+    return FAPClip(str(whole.get("name", "")), fps, values, mask, compound[0], compound[1])
+
+
+def _rows(rows: Any, width: int, where: str) -> Iterator[npt.NDArray[np.float64]]:
+    """Each row as numbers; at least one."""
+    if not isinstance(rows, list) or not rows:
+        raise RealizerError(f"{where}: wanted a list of frames, got {str(rows)[:40]}")
+    for number, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) != width:
+            got = len(row) if isinstance(row, list) else str(row)[:40]
+            raise RealizerError(f"{where}[{number}]: wanted {width} numbers, got {got}")
+        yield np.array([_number(cell, f"{where}[{number}]") for cell in row])
+
+
+def _number(cell: Any, where: str) -> float:
+    try:
+        number = float(cell)
+    except (TypeError, ValueError):
+        raise RealizerError(f"{where}: wanted a number, got {str(cell)[:40]!r}") from None
+    if not abs(number) <= INT32:
+        raise RealizerError(f"{where}: wanted a number within 32 bits, got {str(cell)[:40]}")
+    return number
+
+
+def _whole(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
+    return np.rint(values).astype(np.int32)
+
+
+# suffix -> the text of a clip.
+ENCODINGS: dict[str, Callable[[FAPClip], str]] = {
+    ".fap": lambda clip: fap_text.encode(limited(clip)),
+    ".csv": _to_csv,
+    ".json": _to_json,
+}
