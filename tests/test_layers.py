@@ -147,8 +147,14 @@ MAY: dict[str, set[str]] = {
         "realizer.speech",
     },
     "realizer.client": VALUES
-    | {"bml_schema", "realizer.client_speech", "realizer.server.messages", "realizer.server.wire"},
-    "realizer.client_speech": VALUES | {"bml_schema"},
+    | {
+        "bml_schema",
+        "realizer.client",
+        "realizer.outputs.files",
+        "realizer.outputs.film",
+        "realizer.server.messages",
+        "realizer.server.wire",
+    },
     "realizer.server": {"*"},
     "realizer.cli": {"*"},
     "realizer.__main__": {"realizer.cli"},

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
-from realizer.errors import RealizerError
+from realizer.client.mail import ClientError
 
-__all__ = ["ClientError", "Speech", "SyncSpeech"]
+__all__ = ["Speech", "SyncSpeech"]
 
 LONGEST = 20_000  # characters that one message may append
-
-
-class ClientError(RealizerError):
-    """The service refused a control message, or the connection ended while something was awaited."""
 
 
 class Heard:
@@ -132,44 +128,37 @@ class Speech:
 
 
 class SyncSpeech:
-    """A speech over an open connection without an event loop; made by `SyncClient.speech`. As `Speech`."""
+    """A speech over an open connection without an event loop; made by `SyncClient.speech`. As `Speech`.
 
-    def __init__(
-        self,
-        id: str,
-        control: Callable[..., None],
-        wait: Callable[[Callable[[], bool]], None],
-        opening: dict[str, Any],
-    ) -> None:
-        self.id = id
-        self.heard = Heard(id)
-        self._control = control
-        self._wait = wait
-        self._opening = opening
+    Args:
+        do: runs what a Speech does.
+    """
+
+    def __init__(self, speech: Speech, do: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
+        self._speech = speech
+        self._do = do
+
+    @property
+    def id(self) -> str:
+        return self._speech.id
 
     def append(self, text: str) -> None:
         """Say more. As `Speech.append`."""
-        for at in range(0, max(1, len(text)), LONGEST):
-            self._send(append=text[at : at + LONGEST])
+        self._do(self._speech.append(text))
 
     def close(self) -> None:
         """Nothing follows: what is left is said."""
-        self._send(close=True)
+        self._do(self._speech.close())
 
     def stop(self) -> None:
         """Fall silent at once."""
-        self._control("stop", blocks=[self.id])
+        self._do(self._speech.stop())
 
     def until(self, sync: str) -> float:
         """Wait until a sync of the text is said. Returns and raises as `Speech.until`."""
-        self._wait(lambda: self.heard.knows(sync))
-        return self.heard.point(sync)
+        return float(self._do(self._speech.until(sync)))
 
     def ended(self) -> BlockProgress:
         """Wait until all is said, or it was cut off. Raises as `Speech.ended`."""
-        self._wait(lambda: self.heard.over)
-        return self.heard.ended()
-
-    def _send(self, **fields: Any) -> None:
-        opening, self._opening = self._opening, {}
-        self._control("speech", id=self.id, **fields, **opening)
+        end: BlockProgress = self._do(self._speech.ended())
+        return end

@@ -1,15 +1,14 @@
-"""The client against the real service: send, follow a block to its end, iterate frames, be told of errors."""
+"""The client in an event loop, against the real service: send, play, iterate frames, be told of errors."""
 
 from __future__ import annotations
 
 import asyncio
-import threading
-from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from bml_schema.feedback import WarningFeedback
-from realizer.client import ClientError, connect, connect_sync
+from realizer.client import ClientError, connect
 from realizer.server.serve import Server
 from realizer.server.wire import WireFrame
 from realizer.settings import Settings
@@ -96,6 +95,60 @@ def test_an_error_of_the_service_is_raised() -> None:
     serving(test)
 
 
+def test_play_waits_for_the_end_and_says_when_it_was() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.play(WAIT.format("b"))
+            assert (end.id, end.status) == ("b:end", "DONE")
+            # Whoever iterates gets the feedback all the same.
+            assert [f async for f in client.until_end("b")][-1] == end
+            ends = await asyncio.gather(client.play(WAIT.format("c")), client.play(WAIT.format("d")))
+            assert [end.id for end in ends] == ["c:end", "d:end"]
+            with pytest.raises(ClientError, match="lexeme") as caught:
+                await client.play('<bml id="e"><required><head id="n" lexeme="NONE"/></required></bml>')
+            assert caught.value.code == "refused"
+
+    serving(test)
+
+
+def test_the_welcome_says_what_there_is_and_the_state_what_plays() -> None:
+    async def test(url: str) -> None:
+        async with connect(f"{url}?session=show") as client:
+            assert (client.session, client.welcome["version"]) == ("show", 1)
+            assert "NOD" in client.welcome["capabilities"]["lexemes"]["head"]
+            await client.control("set", aus={"12L": 0.5})
+            layers: dict[str, Any] = {}
+            while "direct" not in layers:  # it is reached smoothly
+                layers = (await client.state())["characters"][0]["layers"]
+            assert layers["direct"]["aus"].keys() == {"12L"}
+
+    serving(test)
+
+
+def test_errors_that_nobody_asked_for_are_kept_and_spoil_no_answer() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.control("set", aus={"12": 7})
+            assert (await client.ask("ping", id=1))["id"] == 1
+            assert [error["where"] for error in client.errors] == ["set.aus.12"]
+            with pytest.raises(ValueError, match="which are answered; got stop"):
+                await client.ask("stop")
+
+    serving(test)
+
+
+def test_a_service_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.client.connecting.PROTOCOL", 2)
+
+    async def test(url: str) -> None:
+        with pytest.raises(ClientError, match="wanted version 1 of the protocol, got 2") as caught:
+            async with connect(url):
+                pass
+        assert caught.value.code == "version"
+
+    serving(test)
+
+
 def test_feedback_ends_with_the_connection() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
@@ -116,36 +169,3 @@ def test_nobody_there_is_an_os_error() -> None:
                 pass
 
     asyncio.run(run())
-
-
-@pytest.fixture
-def url() -> Iterator[str]:
-    """A service in a thread of its own, for clients without an event loop."""
-    started, urls, stop = threading.Event(), [], []
-
-    async def run() -> None:
-        async with Server(Settings(port=0, voice="silent")) as server:
-            urls.append(server.url)
-            ended = asyncio.Event()
-            loop = asyncio.get_running_loop()
-            stop.append(lambda: loop.call_soon_threadsafe(ended.set))
-            started.set()
-            await ended.wait()
-
-    thread = threading.Thread(target=lambda: asyncio.run(run()))
-    thread.start()
-    assert started.wait(LIMIT)
-    yield urls[0]
-    stop[0]()
-    thread.join(LIMIT)
-    assert not thread.is_alive()
-
-
-def test_the_plain_client_does_the_same(url) -> None:
-    with connect_sync(url) as client:
-        client.send(WAIT.format("b"))
-        assert list(client.until_end())[-1].id == "b:end"
-        client.subscribe("fap", fps=50)
-        assert len(next(client.frames("fap")).values) == 68
-        with pytest.raises(ClientError, match="wanted a stream of"):
-            client.subscribe("smell")

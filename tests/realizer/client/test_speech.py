@@ -7,10 +7,10 @@ import asyncio
 import pytest
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from realizer.client import connect, connect_sync
-from realizer.client_speech import ClientError, Heard
+from realizer.client import ClientError, connect
+from realizer.client.speech import Heard
 
-from .test_client import serving
+from .test_live import serving
 
 
 def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:
@@ -100,7 +100,7 @@ def test_the_connection_may_end_while_a_sync_is_awaited() -> None:
 
 def test_the_plain_client_does_the_same() -> None:
     def plain(url: str) -> None:
-        with connect_sync(url) as client:
+        with connect(url) as client:
             with client.speech("s1") as speech:
                 speech.append('One <sync id="a"/>two. ')
                 assert speech.until("a") > 0

@@ -1,0 +1,62 @@
+"""An address of the service in, an open connection out: `async with` or plain `with`."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any
+
+from realizer.client.live import Client
+from realizer.client.plain import SyncClient
+from realizer.server.messages import PROTOCOL
+
+__all__ = ["Connecting", "connect"]
+
+
+def connect(url: str) -> Connecting:
+    """`async with connect("ws://127.0.0.1:8765/ws?session=show") as client`, or `with` and no event loop.
+
+    Without a session's name it is one of the client's own.
+
+    Raises:
+        OSError: nobody listens there.
+        ClientError: the service speaks another version of the protocol.
+    """
+    return Connecting(url)
+
+
+class Connecting:
+    """What `connect` gives: a Client inside `async with`, a SyncClient inside `with`."""
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+        self._dial: Any = None
+        self._client: Client | None = None
+        self._plain: SyncClient | None = None
+
+    async def __aenter__(self) -> Client:
+        from websockets.asyncio.client import connect as dial
+
+        self._dial = dial(self._url, compression=None, max_size=None, max_queue=None)
+        self._client = Client(await self._dial.__aenter__(), self._url)
+        try:
+            self._client.welcome = await self._client.ask("hello", version=PROTOCOL)
+        except BaseException:
+            await self._client.close()
+            raise
+        return self._client
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._client is not None
+        await self._client.close()
+
+    def __enter__(self) -> SyncClient:
+        self._plain = SyncClient(Connecting(self._url))
+        return self._plain
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._plain is not None
+        self._plain.close()

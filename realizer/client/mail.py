@@ -1,0 +1,177 @@
+"""Messages of the service in, sorted by what they are; knows no sockets."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import deque
+from typing import Any, Protocol
+
+from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
+from realizer.errors import RealizerError
+from realizer.server.wire import FrameKind, WireFrame, unpack
+
+__all__ = ["ClientError", "Frame"]
+
+# Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
+KEPT = 1_000
+KEPT_FEEDBACK = 10_000
+STREAM_OF = {
+    FrameKind.FAP: "fap",
+    FrameKind.AU: "au",
+    FrameKind.PICTURE: "video",
+    FrameKind.SOUND: "audio",
+    FrameKind.MESH: "mesh",
+    FrameKind.ARKIT: "arkit",
+}
+# Type of a control message -> type of its answer; the others have none.
+ANSWERS = {"hello": "welcome", "subscribe": "subscribed", "state": "state", "ping": "pong"}
+_BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
+
+Frame = WireFrame | dict[str, Any]
+
+
+class ClientError(RealizerError):
+    """The service refused something, or the connection ended while something was awaited.
+
+    Attributes:
+        code: as in the message `error`; "refused" of a block, "connection" where it ended.
+    """
+
+    def __init__(self, text: str, code: str = "connection") -> None:
+        super().__init__(text)
+        self.code = code
+
+    @classmethod
+    def of(cls, error: dict[str, Any]) -> ClientError:
+        """What a message `error` says."""
+        return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
+
+
+class Follower(Protocol):
+    """Who hears feedback until it is over."""
+
+    @property
+    def over(self) -> bool:
+        """Nothing more of what it follows will come."""
+        ...
+
+    def tell(self, feedback: Feedback) -> None:
+        """One message of feedback; most are of others."""
+        ...
+
+
+class Mail:
+    """What has come and nobody has taken yet.
+
+    Attributes:
+        errors: of what was not asked for: control messages without an answer, pictures that ended.
+        last_block: id of the last block that was sent; None where it has none.
+    """
+
+    def __init__(self) -> None:
+        self.feedback: deque[Feedback] = deque(maxlen=KEPT_FEEDBACK)
+        self.frames: dict[str, deque[Frame]] = {}
+        self.errors: deque[dict[str, Any]] = deque(maxlen=KEPT)
+        self.last_block: str | None = None
+        self._asked: str | None = None
+        self._answer: dict[str, Any] | None = None
+        self._followers: list[Follower] = []
+
+    def put(self, message: str | bytes) -> None:
+        if isinstance(message, bytes):
+            frame = unpack(message)
+            self.of(STREAM_OF[frame.kind]).append(frame)
+        elif message.startswith("{"):
+            reply = json.loads(message)
+            if reply["type"] == "schedule" or "values" in reply:
+                self.of(reply["type"]).append(reply)
+            else:
+                self._reply(reply)
+        else:
+            feedback = parse_feedback(message)
+            self.feedback.append(feedback)
+            for one in self._followers:
+                one.tell(feedback)
+            self._followers = [one for one in self._followers if not one.over]
+
+    def sent(self, bml: str) -> None:
+        found = _BLOCK_ID.findall(bml)
+        self.last_block = found[-1] if found else None
+
+    def of(self, stream: str) -> deque[Frame]:
+        """The newest messages of a stream; of `schedule` all, as each says what has changed since another."""
+        return self.frames.setdefault(stream, deque(maxlen=None if stream == "schedule" else KEPT))
+
+    def ask(self, type: str) -> None:
+        """From now on the next answer to a message of that type is for `answer`."""
+        self._asked, self._answer = type, None
+
+    @property
+    def answered(self) -> bool:
+        return self._answer is not None
+
+    def answer(self) -> dict[str, Any]:
+        assert self._answer is not None
+        if self._answer["type"] == "error":
+            raise ClientError.of(self._answer)
+        return self._answer
+
+    def follow(self, follower: Follower) -> None:
+        """Let somebody hear all feedback from now on; whoever iterates gets it all the same."""
+        self._followers.append(follower)
+
+    def _reply(self, reply: dict[str, Any]) -> None:
+        asked = self._asked
+        if reply["type"] == "error":
+            # Where it says nothing of where, it is about text that was no message at all.
+            mine = reply.get("where", f"{asked}").partition(".")[0] in (asked, "type")
+        else:
+            mine = asked is not None and reply["type"] == ANSWERS.get(asked)
+        if mine and asked is not None:
+            self._asked, self._answer = None, reply
+        elif reply["type"] in ("error", "gap"):
+            self.errors.append(reply)
+
+
+class Until:
+    """Whether a block has ended, from its feedback: its end, or the warning that it was refused.
+
+    Attributes:
+        start: when it started, seconds on the session clock; None before.
+        last: the feedback that ended it; None before.
+    """
+
+    def __init__(self, block: str | None) -> None:
+        self.block = block
+        self.start: float | None = None
+        self.last: BlockProgress | WarningFeedback | None = None
+        self._planned = False
+
+    @property
+    def over(self) -> bool:
+        return self.last is not None
+
+    def tell(self, feedback: Feedback) -> None:
+        """One message of feedback; most are of others."""
+        match feedback:
+            case BlockProgress(id=id) if id == f"{self.block}:start":
+                self.start = feedback.global_time
+            case BlockProgress(id=id) if id == f"{self.block}:end":
+                self.last = self.last or feedback
+            case WarningFeedback(id=id) if id == (self.block or "<no id>") and not self._planned:
+                # A warning on the block itself refuses it, unless its prediction is already out.
+                self.last = self.last or feedback
+            case PredictionFeedback():
+                self._planned |= any(b.id == self.block and b.global_end is not None for b in feedback.blocks)
+
+    def end(self) -> BlockProgress:
+        """What told the end.
+
+        Raises:
+            ClientError: the block was refused.
+        """
+        if isinstance(self.last, BlockProgress):
+            return self.last
+        assert self.last is not None
+        raise ClientError(f"{self.last.id}: {self.last.text}", "refused")

@@ -1,0 +1,80 @@
+"""The client without an event loop, against the real service in a thread."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from realizer.client import ClientError, connect
+from realizer.server.serve import Server
+from realizer.server.wire import WireFrame
+from realizer.settings import Settings
+
+WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
+LIMIT = 30  # s
+
+
+@pytest.fixture
+def url() -> Iterator[str]:
+    """A service in a thread of its own, for clients without an event loop."""
+    started, urls, stop = threading.Event(), [], []
+
+    async def run() -> None:
+        async with Server(Settings(port=0, voice="silent")) as server:
+            urls.append(server.url)
+            ended = asyncio.Event()
+            loop = asyncio.get_running_loop()
+            stop.append(lambda: loop.call_soon_threadsafe(ended.set))
+            started.set()
+            await ended.wait()
+
+    thread = threading.Thread(target=lambda: asyncio.run(run()))
+    thread.start()
+    assert started.wait(LIMIT)
+    yield urls[0]
+    stop[0]()
+    thread.join(LIMIT)
+    assert not thread.is_alive()
+
+
+def test_the_plain_client_does_the_same(url) -> None:
+    with connect(url) as client:
+        client.send(WAIT.format("b"))
+        assert list(client.until_end())[-1].id == "b:end"
+        client.subscribe("fap", fps=50)
+        assert len(next(client.frames("fap")).values) == 68
+        with pytest.raises(ClientError, match="wanted a stream of"):
+            client.subscribe("smell")
+
+
+def test_two_clients_share_a_session(url) -> None:
+    with connect(f"{url}?session=show") as manager, connect(f"{url}?session=show") as viewer:
+        told = viewer.subscribe("arkit", fps=50)
+        end = manager.play(WAIT.format("b"))
+        assert end.id == "b:end"
+        assert [f.seq for f in viewer.until_end("b")][-1] == end.seq
+        frames = viewer.frames("arkit")
+        first, second = next(frames), next(frames)
+        assert isinstance(first, WireFrame)
+        assert isinstance(second, WireFrame)
+        assert second.frame == first.frame + 1
+        assert len(first.values) == len(told["names"]) == 59
+        assert manager.state()["connections"] == 2
+        assert manager.session == viewer.session == "show"
+        assert manager.errors == []
+
+
+def test_what_is_refused_is_raised_and_the_thread_ends(url) -> None:
+    with connect(url) as client:
+        with pytest.raises(ClientError, match="lexeme"):
+            client.play('<bml id="b"><required><head id="n" lexeme="NONE"/></required></bml>')
+        assert client.url == url
+    assert "realizer client" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_nobody_there_is_an_os_error() -> None:
+    with pytest.raises(OSError, match="Connect"), connect("ws://127.0.0.1:9/ws"):
+        pass
