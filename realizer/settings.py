@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from realizer.errors import RealizerError
 
-__all__ = ["Settings", "SettingsError"]
+__all__ = ["Settings", "SettingsError", "raises"]
 
 T = TypeVar("T")
 PREFIX = "REALIZER_"
@@ -36,6 +36,11 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
         return number
 
     return read
+
+
+def raises(name: str) -> str:
+    """What a refusal says of a limit: where a larger one is set."""
+    return f"({PREFIX}{name.upper()} sets it)"
 
 
 def _flag(value: Any) -> bool:
@@ -112,12 +117,33 @@ def _switch_or_file(value: Any) -> str:
         return str(value)
 
 
+def _origins(value: Any) -> tuple[str, ...]:
+    """Addresses of pages, with scheme and without path: in one text, or a list of them."""
+    origins = value.replace(",", " ").split() if isinstance(value, str) else value
+    if not isinstance(origins, list | tuple) or not all(
+        origin == "*" or re.fullmatch(r"[a-z][a-z0-9+.-]*://[^/\s]+/?|null", str(origin))
+        for origin in origins
+    ):
+        raise ValueError("addresses such as https://example.org, or *")
+    return tuple(str(origin) for origin in origins)
+
+
+def _word_of(*words: str) -> Callable[[Any], str]:
+    def read(value: Any) -> str:
+        if value not in words:
+            raise ValueError(" or ".join(words))
+        return str(value)
+
+    return read
+
+
 def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
     return lambda value: None if value is None or value == "" else read(value)
 
 
-def _setting(default: Any, read: Callable[[Any], Any], says: str) -> Any:
-    return field(default=default, metadata={"read": read, "says": says})
+def _setting(default: Any, read: Callable[[Any], Any], says: str, *, secret: bool = False) -> Any:
+    """A field; a secret one is in no message and no `repr`."""
+    return field(default=default, repr=not secret, metadata={"read": read, "says": says, "secret": secret})
 
 
 # Not pydantic, which the messages of the service use: loading it takes longer than planning a document.
@@ -131,6 +157,18 @@ class Settings:
 
     host: str = _setting("127.0.0.1", _text, "address to listen on")
     port: int = _setting(8765, _number(int, 0, 65535), "0 takes a free port")
+    workers: int = _setting(1, _number(int, 1, 64), "processes that serve the port, each its sessions")
+    token: str | None = _setting(
+        None, _optional(_text), "what clients of the WebSocket must bring; none: all may come", secret=True
+    )
+    origins: tuple[str, ...] = _setting(
+        (), _origins, "addresses of pages elsewhere that may open a WebSocket; * is any"
+    )
+    tls_cert: Path | None = _setting(
+        None, _optional(_file), "certificates in PEM, the service's first; none: no TLS"
+    )
+    tls_key: Path | None = _setting(None, _optional(_file), "its key in PEM; none: it is in the same file")
+    log: str = _setting("text", _word_of("text", "json"), "how logs are written to standard error")
     asap_ports: tuple[int, int] | None = _setting(
         None, _optional(_ports), "of Asap's TCP: BML in, feedback to this port of the client; none: no door"
     )
@@ -146,7 +184,7 @@ class Settings:
     )
     stomp: str | None = _setting(None, _optional(_address), "HOST:PORT of a message broker; none: no door")
     stomp_login: str | None = _setting(None, _optional(_text), "for the broker")
-    stomp_password: str | None = _setting(None, _optional(_text), "for the broker")
+    stomp_password: str | None = _setting(None, _optional(_text), "for the broker", secret=True)
     stomp_host: str | None = _setting(None, _optional(_text), 'virtual host; RabbitMQ wants "/"')
     stomp_json_in: str | None = _setting(
         "/topic/bmlRequests", _optional(_text), "BML in JSON; none: not read"
@@ -188,6 +226,16 @@ class Settings:
     max_connections: int = _setting(2_000, _number(int, 1, 10**6), "WebSockets open from one address")
     max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service")
     max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
+    max_pixels: float = _setting(
+        125e6, _number(float, 256, 1e12), "pixels a second of one stream of pictures: 1920x1080 at 60"
+    )
+    max_speech: int = _setting(20_000, _number(int, 1, 10**7), "characters of one speech in a document")
+    max_rate: float = _setting(
+        500.0, _number(float, 0.1, 1e6), "messages a second that are read from one connection"
+    )
+    max_memory: int | None = _setting(
+        None, _optional(_number(int, 64, 10**7)), "MB above which nobody is let in any more; none: no limit"
+    )
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -195,7 +243,20 @@ class Settings:
             try:
                 object.__setattr__(self, f.name, f.metadata["read"](value))
             except ValueError as wanted:
-                raise SettingsError(f"setting {f.name}: wanted {wanted}, got {value!r}") from None
+                got = "something else" if f.metadata["secret"] else repr(value)
+                raise SettingsError(f"setting {f.name}: wanted {wanted}, got {got}") from None
+        if self.tls_key is not None and self.tls_cert is None:
+            raise SettingsError("setting tls_key: wanted tls_cert too, got none")
+        if self.tls_cert is not None and self.workers > 1:
+            raise SettingsError(
+                f"setting tls_cert: wanted workers = 1, got {self.workers}: what hands connections to several "
+                "workers reads their first line; let a proxy in front speak TLS"
+            )
+        open_doors = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
+        if self.token is not None and open_doors and self.host not in ("127.0.0.1", "localhost", "::1"):
+            raise SettingsError(
+                f"setting {open_doors[0]}: wanted none, or host 127.0.0.1: its clients cannot bring the token"
+            )
 
     @classmethod
     def read(

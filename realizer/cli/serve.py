@@ -16,6 +16,9 @@ __all__: list[str] = []
 @click.option("--host", metavar="ADDRESS", help="Address to listen on.  [default: 127.0.0.1]")
 @click.option("--port", type=int, help="Port of WebSocket and page; 0 takes a free one.  [default: 8765]")
 @click.option(
+    "--workers", type=int, help="Processes that serve the port, each its own sessions.  [default: 1]"
+)
+@click.option(
     "--asap-ports",
     nargs=2,
     type=int,
@@ -61,6 +64,7 @@ def serve(config: Path | None, **flags: Any) -> None:
     plays 5 s, ends.
     """
     from realizer.server.serve import run
+    from realizer.server.serve import serve as start
     from realizer.settings import Settings, SettingsError
     from realizer.speech import find_voice
 
@@ -72,4 +76,4 @@ def serve(config: Path | None, **flags: Any) -> None:
     options.check_light(settings.light)
     find_voice(settings.voice).close()  # a voice that is not installed is said before a door opens
     options.tell_silence(settings.voice)
-    run(settings)
+    run(start(settings))

@@ -30,9 +30,16 @@ class Hub:
     Args:
         make: (id, now, named) -> Session.
         most: how many sessions there may be.
+        ours: (name) -> whether the session of that name is in this process.
     """
 
-    def __init__(self, make: Callable[[str, float, bool], Session], most: int) -> None:
+    def __init__(
+        self,
+        make: Callable[[str, float, bool], Session],
+        most: int,
+        ours: Callable[[str], bool] = lambda name: True,
+    ) -> None:
+        self._ours = ours
         self._make = make
         self._most = most
         self.sessions: dict[str, Session] = {}
@@ -84,8 +91,12 @@ class Hub:
         effects: list[Effect] = []
         for effect in session.outgoing():
             if isinstance(effect, Move):
-                if not self._takes(effect, session):
+                words = None
+                if not self._ours(effect.session):
+                    words = f"wanted another worker's session in the address: /ws?session={effect.session}"
+                elif not self._takes(effect, session):
                     words = f"{self._most} sessions are open: wanted fewer"
+                if words is not None:
                     error = ErrorMessage(code="invalid", message=words, where="hello.session")
                     effects.append(Send(effect.connection, error.text()))
                     continue

@@ -5,19 +5,22 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
+import socket
+from collections.abc import Awaitable, Coroutine
 from types import TracebackType
 
 from realizer.scheduling import warm_up
 from realizer.server.doors.asap import AsapDoor
 from realizer.server.doors.door import Door
 from realizer.server.doors.stomp import StompDoor
-from realizer.server.doors.websocket import WebSocketDoor
+from realizer.server.doors.websocket import WebSocketDoor, lines
 from realizer.server.doors.xface import XfaceDoor
 from realizer.server.doors.xface_player import XfacePlayerDoor
 from realizer.server.shell import Shell
+from realizer.server.workers import READY, Workers, handed
 from realizer.settings import Settings
 
-__all__ = ["Server", "run", "serve"]
+__all__ = ["Server", "run", "serve", "work"]
 
 # How often the drain looks whether everything has ended.
 DRAIN_STEP = 0.05  # s
@@ -26,19 +29,57 @@ DRAIN_STEP = 0.05  # s
 async def serve(settings: Settings | None = None) -> None:
     """Serve until SIGINT or SIGTERM; then take no more work, give what plays `settings.drain` s, and end.
 
-    Prints the lines of each door when it is ready.
+    Prints the lines of each door when it is ready. With `settings.workers` > 1 that many processes serve.
+
+    Raises:
+        OSError: an address cannot be had.
+        RealizerError: something that was asked for is not there.
     """
+    settings = settings or Settings()
+    if settings.workers > 1:
+        workers = await Workers(settings).start()
+        print(*lines(settings, workers.port), sep="\n", flush=True)
+        try:
+            await _asked(signal.SIGINT, signal.SIGTERM)
+        finally:
+            await workers.close()
+        return
     server = await Server(settings).start()
+    await _serve(server, _asked(signal.SIGINT, signal.SIGTERM))
+
+
+async def work(settings: Settings, number: int, control: socket.socket) -> None:
+    """Serve as worker `number`, what comes through `control`, until SIGTERM or until the parent is gone."""
     loop = asyncio.get_running_loop()
-    asked = asyncio.Event()
-    signals = (signal.SIGINT, signal.SIGTERM)
-    for number in signals:
-        loop.add_signal_handler(number, asked.set)
+    server = await Server(settings, worker=number).start()
+    gone = asyncio.Event()
+
+    def take() -> None:
+        try:
+            for client in handed(control):
+                server.take(client)
+        except BlockingIOError:
+            pass
+        except (EOFError, OSError):
+            loop.remove_reader(control)
+            gone.set()
+
+    async def asked() -> None:
+        done = [asyncio.ensure_future(one) for one in (gone.wait(), _asked(signal.SIGTERM))]
+        await asyncio.wait(done, return_when=asyncio.FIRST_COMPLETED)
+        loop.remove_reader(control)
+        for one in done:
+            one.cancel()
+
+    loop.add_reader(control, take)
+    await loop.sock_sendall(control, READY)
+    await _serve(server, asked())
+
+
+async def _serve(server: Server, asked: Awaitable[None]) -> None:
     telling = [asyncio.create_task(_tell(door)) for door in server.doors]
     try:
-        await asked.wait()
-        for number in signals:  # a second one ends at once
-            loop.remove_signal_handler(number)
+        await asked
         await server.drain()
     finally:
         for task in telling:
@@ -46,21 +87,33 @@ async def serve(settings: Settings | None = None) -> None:
         await server.close()
 
 
+async def _asked(*signals: signal.Signals) -> None:
+    """Return when one of these has come; a second one ends at once."""
+    loop = asyncio.get_running_loop()
+    come = asyncio.Event()
+    for number in signals:
+        loop.add_signal_handler(number, come.set)
+    await come.wait()
+    for number in signals:
+        loop.remove_signal_handler(number)
+
+
 async def _tell(door: Door) -> None:
     await door.ready()
-    print(*door.lines, sep="\n", flush=True)
+    for line in door.lines:
+        print(line, flush=True)
 
 
-def run(settings: Settings | None = None) -> None:
-    """`serve` in an event loop of its own: uvloop's where it is installed."""
+def run(service: Coroutine[None, None, None]) -> None:
+    """Run `serve` or `work` in an event loop of its own: uvloop's where it is installed."""
     _allow_files()
     try:
         import uvloop
     except ImportError:
-        asyncio.run(serve(settings))
+        asyncio.run(service)
     else:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(serve(settings))
+            runner.run(service)
 
 
 def _allow_files() -> None:
@@ -79,12 +132,15 @@ class Server:
 
     Attributes:
         doors: the open ones; the WebSocket is the first.
+
+    Args:
+        worker: the number of this one among several; then connections are only those it is told to `take`.
     """
 
-    def __init__(self, settings: Settings | None = None) -> None:
+    def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
         self.settings = settings or Settings()
-        self._shell = Shell(self.settings)
-        self._web = WebSocketDoor(self._shell, self.settings)
+        self._shell = Shell(self.settings, worker)
+        self._web = WebSocketDoor(self._shell, self.settings, listens=worker is None)
         self.doors: list[Door] = []
         self._closed = asyncio.Event()
 
@@ -123,6 +179,10 @@ class Server:
         # What large blocks need is loaded while the first clients come, not while the first block waits.
         asyncio.get_running_loop().run_in_executor(None, warm_up)
         return self
+
+    def take(self, client: socket.socket) -> None:
+        """Serve a connection that another process has accepted."""
+        self._web.take(client)
 
     async def drain(self) -> None:
         """Take no more connections and documents; wait for what plays, at most `settings.drain` seconds."""

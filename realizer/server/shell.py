@@ -18,6 +18,7 @@ from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import Hub
 from realizer.server.session import Session
 from realizer.server.studio import Studio
+from realizer.server.workers import worker_of
 from realizer.settings import Settings
 
 __all__ = ["Shell"]
@@ -40,11 +41,18 @@ class Shell:
 
     It is told what comes from a connection by the number that `join` gave, and hands what goes to it to the
     Client that joined.
+
+    Args:
+        worker: the number of this process among `settings.workers`; None where it is the only one.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, worker: int | None = None) -> None:
         self.settings = settings
-        self._hub = Hub(self._make, settings.max_sessions)
+
+        def ours(session: str) -> bool:
+            return worker is None or worker_of(session, settings.workers, settings) == worker
+
+        self._hub = Hub(self._make, settings.max_sessions, ours)
         self._studio = Studio(settings.deformer)
         self._clients: dict[int, Client] = {}
         self._timers: dict[Session, _Timer] = {}

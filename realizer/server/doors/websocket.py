@@ -5,7 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http
+import socket
+import tempfile
 from collections import Counter
+from collections.abc import Mapping
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import Server as SocketServer
@@ -14,24 +18,33 @@ from websockets.asyncio.server import serve as listen
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
+from websockets.server import ServerProtocol
 
 from realizer.server.hub import HubError
 from realizer.server.shell import Shell
 from realizer.server.site import Answer, Site
 from realizer.settings import Settings
 
-__all__ = ["WebSocketDoor"]
+__all__ = ["WebSocketDoor", "lines"]
 
 
+# How often a client is asked whether it is there, and how long it has for the answer.
+PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 # A client that has not answered the close by then is gone.
 GOODBYE = 2.0  # s
 
 
 class WebSocketDoor:
-    """Serves `settings.host`; `port` is the one that is open after `start`."""
+    """Serves `settings.host`; `port` is the one that is open after `start`.
 
-    def __init__(self, shell: Shell, settings: Settings) -> None:
+    Args:
+        listens: or not: then it serves what it is told to `take`.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings, *, listens: bool = True) -> None:
         self.port = settings.port
+        self._listens = listens
+        self._taking: set[asyncio.Task[Any]] = set()
         self._shell = shell
         self._settings = settings
         self._site = Site(shell.health, settings)
@@ -43,31 +56,45 @@ class WebSocketDoor:
     @property
     def url(self) -> str:
         """Where BML goes."""
-        return f"ws://{self._host}:{self.port}/ws"
+        return f"ws://{_authority(self._settings, self.port)}/ws"
 
     @property
     def page(self) -> str:
         """The page's address."""
-        return f"http://{self._host}:{self.port}/"
+        return f"http://{_authority(self._settings, self.port)}/"
 
     @property
     def lines(self) -> tuple[str, ...]:
-        return f"listening on {self.url}", f"page at {self.page}"
+        return lines(self._settings, self.port) if self._listens else ()
 
     async def start(self) -> None:
+        where: dict[str, Any] = {"host": self._settings.host, "port": self.port}
+        if not self._listens:
+            where = {"unix": True, "sock": _nowhere()}
         self._socket = await listen(
             self._handle,
-            self._settings.host,
-            self._settings.port,
             process_request=self._http,
             compression=None,  # frames are dense and late is worse than large
             max_size=self._settings.max_message,
-            ping_interval=20,
-            ping_timeout=60,
             close_timeout=GOODBYE,
             server_header=None,
+            **PATIENCE,
+            **where,
         )
-        self.port = next(iter(self._socket.sockets)).getsockname()[1]
+        if self._listens:
+            self.port = next(iter(self._socket.sockets)).getsockname()[1]
+
+    def take(self, client: socket.socket) -> None:
+        """Serve a connection that another process has accepted."""
+        loop = asyncio.get_running_loop()
+        taking = loop.create_task(loop.connect_accepted_socket(self._connection, client))
+        self._taking.add(taking)
+        taking.add_done_callback(self._taking.discard)
+
+    def _connection(self) -> ServerConnection:
+        assert self._socket is not None
+        protocol = ServerProtocol(max_size=self._settings.max_message)
+        return ServerConnection(protocol, self._socket, close_timeout=GOODBYE, **PATIENCE)
 
     async def ready(self) -> None:
         return
@@ -166,13 +193,6 @@ class WebSocketDoor:
                     told = await loop.run_in_executor(None, faults, text, self._settings)
                 await socket.send(told)
 
-    @property
-    def _host(self) -> str:
-        host = self._settings.host
-        if host in ("", "0.0.0.0", "::"):
-            return "127.0.0.1"
-        return f"[{host}]" if ":" in host else host
-
 
 class _Client:
     """The way out to one WebSocket: what is sent is written at once, or waits in the socket's own buffer."""
@@ -208,6 +228,28 @@ def _address(socket: ServerConnection) -> str:
     """Without the port; "" where the socket has none."""
     remote = socket.remote_address
     return str(remote[0]) if isinstance(remote, tuple) else ""
+
+
+def _nowhere() -> socket.socket:
+    """A socket to listen on that nobody can reach: the package's server must listen to serve at all."""
+    here = socket.socket(socket.AF_UNIX)
+    with tempfile.TemporaryDirectory() as folder:
+        here.bind(f"{folder}/s")
+    here.setblocking(False)
+    return here
+
+
+def lines(settings: Settings, port: int) -> tuple[str, ...]:
+    """What a service prints that is open at a port."""
+    where = _authority(settings, port)
+    return f"listening on ws://{where}/ws", f"page at http://{where}/"
+
+
+def _authority(settings: Settings, port: int) -> str:
+    host = settings.host
+    if host in ("", "0.0.0.0", "::"):
+        host = "127.0.0.1"
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def _query(request: Request) -> tuple[str | None, int | None]:

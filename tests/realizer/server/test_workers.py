@@ -1,0 +1,181 @@
+"""Several processes behind one port: a session has one of them, whoever comes to it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import urllib.request
+from collections.abc import Coroutine, Iterator
+from typing import TypeVar
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+
+from realizer.server.workers import Workers, worker_of
+from realizer.settings import Settings
+
+T = TypeVar("T")
+LIMIT = 60  # s; a hung test ends
+NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Workers]:
+    """Two, in an event loop of their own."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+
+    def wait(coroutine: Coroutine[None, None, T]) -> T:
+        return asyncio.run_coroutine_threadsafe(coroutine, loop).result(LIMIT)
+
+    there = wait(Workers(Settings(port=0, voice="silent", workers=2)).start())
+    yield there
+    wait(there.close())
+    loop.call_soon_threadsafe(loop.stop)
+    thread.join()
+    loop.close()
+
+
+def played(test: Coroutine[None, None, None]) -> None:
+    """Run a client to its end."""
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT):
+            await test
+
+    asyncio.run(run())
+
+
+def address(workers: Workers) -> str:
+    return f"ws://127.0.0.1:{workers.port}/ws"
+
+
+def one_of(number: int) -> str:
+    """The name of a session that a worker has."""
+    return next(f"s{k}" for k in range(100) if worker_of(f"s{k}", 2, Settings()) == number)
+
+
+async def told(client: ClientConnection, what: str) -> str:
+    """The first text message that holds `what`."""
+    async for message in client:
+        if isinstance(message, str) and what in message:
+            return message
+    raise AssertionError(f"the connection ended before {what!r}")
+
+
+def test_clients_meet_in_the_session_they_name_whichever_worker_has_it(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        for number in (0, 1):
+            name = one_of(number)
+            async with connect(f"{url}?session={name}") as sends, connect(f"{url}?session={name}") as looks:
+                await sends.send(NOD.format(f"b{number}"))
+                assert "blockProgress" in await told(looks, f'"b{number}:start"')
+
+    played(test())
+
+
+def test_a_session_that_another_worker_has_says_how_it_is_reached(
+    workers: Workers,
+) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        async with connect(f"{url}?session={one_of(0)}") as client:
+            await client.send(json.dumps({"type": "hello", "version": 1, "session": one_of(1)}))
+            error = json.loads(await told(client, '"error"'))
+            assert f"/ws?session={one_of(1)}" in error["message"]
+            await client.send(NOD.format("b"))  # and plays on where it is
+            await told(client, '"b:end"')
+
+    played(test())
+
+
+def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        async with connect(f"{url}?session={one_of(0)}") as stays:
+            async with connect(f"{url}?session={one_of(1)}") as client:
+                await client.send(NOD.format("b"))
+                await told(client, '"b:start"')
+                os.kill(workers.processes[1], signal.SIGKILL)
+                with contextlib.suppress(Exception):
+                    async for _ in client:
+                        pass
+            await stays.send(NOD.format("c"))
+            await told(stays, '"c:end"')
+            async with connect(f"{url}?session={one_of(1)}") as client:
+                await client.send(NOD.format("d"))
+                await told(client, '"d:end"')
+
+    played(test())
+
+
+def test_a_client_that_says_nothing_or_half_a_line_keeps_nobody_waiting(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        silent = [socket.create_connection(("127.0.0.1", workers.port)) for _ in range(20)]
+        silent[0].sendall(b"GET /ws?sess")
+        async with connect(url) as client:
+            await client.send(NOD.format("b"))
+            await told(client, '"b:start"')
+        silent[0].sendall(b"ion=x HTTP/1.1\r\nHost: x\r\n\r\n")
+        answer = await asyncio.to_thread(silent[0].recv, 4096)
+        assert b" 426 " in answer
+        for one in silent:
+            one.close()
+
+    played(test())
+
+
+def test_sessions_of_other_doors_are_where_these_doors_are() -> None:
+    for name in ("asap-127.0.0.1", "xface-127.0.0.1", "stomp-json", "xface-player"):
+        assert worker_of(name, 7, Settings()) == 0
+    assert {worker_of(f"session-{k}", 7, Settings()) for k in range(100)} == set(range(7))
+
+
+def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "realizer",
+        "serve",
+        "--port",
+        "0",
+        "--voice",
+        "silent",
+        "--workers",
+        "2",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        url = service.stdout.readline().split()[2]
+        page = service.stdout.readline().split()[2]
+        with urllib.request.urlopen(page + "healthz", timeout=LIMIT) as answer:
+            assert json.loads(answer.read())["status"] == "ok"
+
+        async def play() -> None:
+            async with connect(url) as client:
+                await client.send(NOD.format("b"))
+                await told(client, '"b:start"')
+                service.send_signal(signal.SIGTERM)
+                await told(client, '"b:end"')
+
+        played(play())
+        assert service.wait(LIMIT) == 0
+
+
+def test_an_address_that_is_taken_is_said_before_a_worker_starts() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
+        asyncio.run(Workers(Settings(port=taken.getsockname()[1], workers=2)).start())
