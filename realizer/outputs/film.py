@@ -1,9 +1,9 @@
-"""A realization as a film (.mp4: H.264 and AAC; .webm: VP9 and Opus), with its sound."""
+"""A realization as a film (.mp4: H.264 and AAC; .webm: VP9 and Opus), with its sound and subtitles."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
@@ -14,8 +14,10 @@ import numpy as np
 
 from realizer.arrays import Int16, UInt8
 from realizer.errors import RealizerError
+from realizer.outputs.captions import Track, captions
 from realizer.outputs.files import replacing
 from realizer.outputs.output import Drawing, Output
+from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
     from realizer.pipeline import Realization
@@ -36,7 +38,7 @@ class Format:
     """What goes into a film file.
 
     Attributes:
-        container, video, audio: FFmpeg's names.
+        container, video, audio, subtitles: FFmpeg's names.
         options: of the video encoder. Fixed threads, so that two machines write the same bytes.
         container_options: bitexact leaves out the writer's version and random identifiers.
     """
@@ -44,6 +46,7 @@ class Format:
     container: str
     video: str
     audio: str
+    subtitles: str
     bit_rate: int
     options: Mapping[str, str]
     container_options: Mapping[str, str] = field(default_factory=lambda: {"fflags": "+bitexact"})
@@ -54,6 +57,7 @@ FORMATS: Mapping[str, Format] = {
         "mp4",
         "libx264",
         "aac",
+        "mov_text",
         96_000,
         {"preset": "veryfast", "crf": "19", "threads": "2", "bf": "2", "g": "50"},
         {"fflags": "+bitexact", "movflags": "+faststart"},
@@ -62,6 +66,7 @@ FORMATS: Mapping[str, Format] = {
         "webm",
         "libvpx-vp9",
         "libopus",
+        "webvtt",
         64_000,
         {
             "deadline": "realtime",
@@ -84,6 +89,7 @@ def encode_film(
     fps: float,
     sound: Int16,
     rate: int = RATE,
+    lines: Sequence[Span] = (),
 ) -> None:
     """Write a film: picture k is shown at k / fps, the first sample sounds at 0.
 
@@ -92,6 +98,7 @@ def encode_film(
     Args:
         pictures: `count` times (h, w, 3) uint8; an odd last row or column is left out: 4:2:0 wants even.
         sound: (n,) int16 mono at `rate`.
+        lines: subtitles, in order; without any there is no track of them.
 
     Raises:
         RealizerError: PyAV is not installed, or lacks an encoder.
@@ -103,7 +110,7 @@ def encode_film(
     pcm[: min(len(sound), length)] = sound[:length]
     try:
         with av.open(str(path), "w", format=form.container, options=dict(form.container_options)) as film:
-            _write(av, film, form, pictures, pace, pcm, rate, count)
+            _write(av, film, form, pictures, pace, pcm, rate, count, lines)
     except (av.error.FFmpegError, ValueError) as error:
         raise RealizerError(f"the film could not be written: {error}") from error
 
@@ -117,6 +124,7 @@ def _write(
     pcm: Int16,
     rate: int,
     count: int,
+    lines: Sequence[Span],
 ) -> None:
     video = film.add_stream(form.video, rate=pace, options={**form.options, **_steady(form.video)})
     audio = film.add_stream(form.audio, rate=rate, layout="mono")
@@ -124,6 +132,7 @@ def _write(
     # Without this an encoder writes its version into the stream, or picks threads by the machine.
     for stream in (video, audio):
         stream.codec_context.flags |= av.codec.context.Flags.bitexact
+    track = Track(av, film, form.subtitles, lines, float(count / pace)) if lines else None
     heard = 0
     converter = av.video.reformatter.VideoReformatter()  # a new one each frame costs as much as converting
     for k, picture in enumerate(pictures):
@@ -138,6 +147,8 @@ def _write(
         if until > heard:
             film.mux(audio.encode(_sound(av, pcm[heard:until], rate, heard)))
             heard = until
+        if track is not None:
+            track.write(float((k + 1) / pace))
         if (k + 1) % REPORT == 0:
             log.info("film: %d of %d pictures", k + 1, count)
     film.mux(video.encode(None))
@@ -181,7 +192,8 @@ def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
     rows = realization.poses
     with replacing(path) as draft, drawing.renderer(realization, size) as renderer:
         pictures = renderer.frames(rows)
-        encode_film(draft, form, pictures, len(rows), realization.fps, realization.sound(RATE))
+        sound, lines = realization.sound(RATE), captions(realization)
+        encode_film(draft, form, pictures, len(rows), realization.fps, sound, lines=lines)
 
 
 def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
@@ -198,6 +210,6 @@ def _av() -> Any:
 
 
 OUTPUTS = (
-    Output(".mp4", "video/mp4", "film with sound, H.264 and AAC", write_film, "film", _draws),
-    Output(".webm", "video/webm", "film with sound, VP9 and Opus", write_film, "film", _draws),
+    Output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC", write_film, "film", _draws),
+    Output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus", write_film, "film", _draws),
 )

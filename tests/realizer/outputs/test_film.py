@@ -11,6 +11,7 @@ import pytest
 
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.film import FORMATS, RATE, encode_film
+from realizer.outputs.said import Span
 
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")
 
@@ -146,3 +147,50 @@ def test_a_realization_becomes_a_film_of_its_face(realization, tmp_path, suffix)
     assert shown[0][1].std() > 20
     assert np.abs(shown[0][1].astype(int) - shown[10][1]).max() > 20
     assert np.abs(heard(path)[int(0.4 * RATE) : RATE]).max() > 0.1
+    assert subtitles(path) == [(0.25, 1.52, "Hello R&D <team>")]
+
+
+def subtitles(path):
+    """(start, end, text) of a film's subtitles, in seconds."""
+    with av.open(str(path)) as film:
+        (track,) = film.streams.subtitles
+        found = []
+        for packet in film.demux(track):
+            if not packet.duration:
+                continue
+            text = "\n".join(rect.dialogue.decode() for rect in packet.decode())
+            start, length = (float(t * packet.time_base) for t in (packet.pts, packet.duration))
+            # FFmpeg tells of line ends as ASS has them.
+            found.append((round(start, 3), round(start + length, 3), text.replace("\\N", "\n").strip()))
+        return [line for line in found if line[2]]
+
+
+LINES = (Span(0.2, 0.6, "Grüß Gott"), Span(0.6, 0.7, "a & <b>"), Span(0.9, 1.2, "ann\nbob"))
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_subtitles_are_read_as_they_were_given(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    encode_film(path, FORMATS[suffix], pictures(), COUNT, FPS, beep(0.5), lines=LINES)
+    assert subtitles(path) == [(line.start, line.end, line.text) for line in LINES]
+    assert len(seen(path)) == COUNT
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_subtitle_does_not_make_a_film_longer(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    late = Span(1.0, 9.0, "and so on")
+    encode_film(path, FORMATS[suffix], pictures(), COUNT, FPS, beep(0.5), lines=[late])
+    assert subtitles(path) == [(1.0, COUNT / FPS, "and so on")]
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_two_films_with_subtitles_are_the_same(tmp_path, suffix):
+    for k in range(2):
+        encode_film(tmp_path / f"{k}{suffix}", FORMATS[suffix], pictures(), COUNT, FPS, beep(0), lines=LINES)
+    assert (tmp_path / f"0{suffix}").read_bytes() == (tmp_path / f"1{suffix}").read_bytes()
+
+
+def test_where_nobody_speaks_there_are_no_subtitles(tmp_path):
+    with av.open(str(film_of(tmp_path / "x.mp4", ".mp4", beep(0.3)))) as film:
+        assert len(film.streams) == 2

@@ -1,0 +1,96 @@
+"""A realization in, what is said by the line out, and such lines as a track of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from realizer.outputs import said
+from realizer.outputs.said import Span
+
+if TYPE_CHECKING:
+    from realizer.composition.playing import Speaking
+    from realizer.pipeline import Realization
+
+__all__ = ["Track", "captions"]
+
+# As subtitles are usually made: about 40 letters a line, a new one where the voice rests.
+MOST, ENOUGH = 42, 20  # letters; a line that has enough ends at a short rest
+REST, LONG_REST = 0.12, 0.6  # s
+LINGER = 0.4  # s that a line stays when it has been said
+CLOCK = Fraction(1, 1000)
+# What the encoder of MP4's subtitles makes its description of looks from.
+STYLE = (
+    b"[Script Info]\nScriptType: v4.00+\nPlayResX: 384\nPlayResY: 288\n\n[V4+ Styles]\n"
+    b"Format: Name, Fontname, Fontsize, PrimaryColour, SecondaryColour, OutlineColour, BackColour, Bold, "
+    b"Italic, Underline, StrikeOut, ScaleX, ScaleY, Spacing, Angle, BorderStyle, Outline, Shadow, Alignment, "
+    b"MarginL, MarginR, MarginV, Encoding\n"
+    b"Style: Default,Arial,16,&Hffffff,&Hffffff,&H0,&H0,0,0,0,0,100,100,0,0,1,1,0,2,10,10,10,1\n\n"
+    b"[Events]\nFormat: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text\n"
+)
+
+
+def captions(realization: Realization) -> tuple[Span, ...]:
+    """Spans in order that do not overlap; what is said at once stands in lines of its own."""
+    lines = [line for speaking in realization.speaking for line in _lines(speaking)]
+    bounds = sorted({time for line in lines for time in (line.start, line.end)})
+    found = []
+    for start, end in pairwise(bounds):
+        shown = [line.text for line in lines if line.start < end and line.end > start]
+        if shown and end - start >= said.LEAST:
+            found.append(Span(start, end, "\n".join(shown)))
+    return tuple(found)
+
+
+def _lines(speaking: Speaking) -> Iterator[Span]:
+    """The words of an utterance by the line; each stays a little, but not into the next."""
+    lines: list[Span] = []
+    for word in said.words(speaking):
+        if lines:
+            line = lines[-1]
+            rest, text = word.start - line.end, f"{line.text} {word.text}"
+            if len(text) <= MOST and rest < (REST if len(line.text) >= ENOUGH else LONG_REST):
+                lines[-1] = Span(line.start, word.end, text)
+                continue
+        lines.append(word)
+    for line, after in zip(lines, [*lines[1:], None], strict=True):
+        end = line.end + LINGER
+        yield Span(line.start, end if after is None else min(end, max(after.start, line.end)), line.text)
+
+
+class Track:
+    """Captions as a stream of a film."""
+
+    def __init__(self, av: Any, film: Any, codec: str, lines: Sequence[Span], end: float) -> None:
+        """A new stream, shown by players unless they are told not to.
+
+        Args:
+            codec: FFmpeg's name: mov_text for MP4, webvtt for WebM.
+            lines: in order.
+            end: of the film, in seconds; no line is longer there.
+        """
+        self._av, self._film, self._codec, self._end = av, film, codec, end
+        self._left = list(reversed(lines))
+        self._stream = film.add_stream(codec)
+        self._stream.codec_context.subtitle_header = STYLE
+        self._stream.codec_context.time_base = self._stream.time_base = CLOCK
+
+    def write(self, until: float) -> None:
+        """Those that begin before a time, in seconds; once each."""
+        while self._left and self._left[-1].start < until:
+            line = self._left.pop()
+            packet = self._av.Packet(_coded(self._codec, line.text))
+            packet.stream, packet.time_base = self._stream, CLOCK
+            packet.pts = packet.dts = round(line.start / CLOCK)
+            packet.duration = max(1, round(min(line.end, self._end) / CLOCK) - packet.pts)
+            self._film.mux(packet)
+
+
+def _coded(codec: str, text: str) -> bytes:
+    if codec == "mov_text":
+        # 3GPP TS 26.245, 5.17: the length in bytes, then the text; no boxes after it.
+        raw = text.encode()
+        return len(raw).to_bytes(2, "big") + raw
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").encode()

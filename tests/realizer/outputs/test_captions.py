@@ -1,0 +1,57 @@
+"""What is said, by the line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from realizer.outputs.captions import MOST, captions
+from realizer.outputs.said import Span
+from realizer.speech.utterance import Word
+
+
+def spoken(realization, *told, until=99.0, also=()):
+    """The realization, with these words said from 1 s on; `also` by somebody else."""
+    (speaking,) = realization.speaking
+
+    def says(words, character):
+        utterance = replace(speaking.utterance, words=tuple(Word(*word) for word in words))
+        return replace(speaking, start=1.0, until=until, utterance=utterance, character=character)
+
+    return replace(realization, speaking=(says(told, 0), *([says(also, 1)] if also else ())))
+
+
+def test_a_line_ends_where_the_voice_rests_or_it_is_full(realization):
+    words = [(0.3 * k, 0.3 * k + 0.3, f"wonderful{k}") for k in range(8)]
+    found = captions(spoken(realization, *words, (4.0, 4.3, "after"), (4.3, 4.5, "all")))
+    assert [line.text for line in found] == [
+        "wonderful0 wonderful1 wonderful2",
+        "wonderful3 wonderful4 wonderful5",
+        "wonderful6 wonderful7",
+        "after all",
+    ]
+    assert all(len(line.text) <= MOST for line in found)
+    assert all(before.end <= after.start for before, after in pairwise(found))
+    assert found[0].start == 1.0
+    assert found[-1].end == pytest.approx(5.9)  # a little longer than it is heard
+
+
+def test_a_word_longer_than_a_line_is_a_line(realization):
+    found = captions(spoken(realization, (0, 1, "x" * 60), (1, 2, "y")))
+    assert [line.text for line in found] == ["x" * 60, "y"]
+
+
+def test_what_is_said_at_once_stands_in_lines_of_its_own(realization):
+    found = captions(spoken(realization, (0.0, 1.0, "one"), also=((0.5, 1.5, "two"),)))
+    assert found == (
+        Span(1.0, 1.5, "one"),
+        Span(1.5, 2.4, "one\ntwo"),
+        Span(2.4, 2.9, "two"),
+    )
+
+
+def test_words_that_were_cut_off_are_in_no_line(realization):
+    found = captions(spoken(realization, (0, 1, "heard"), (1, 2, "lost"), until=2.0))
+    assert [line.text for line in found] == ["heard"]
