@@ -21,6 +21,8 @@ from realizer.scheduling.timing import Timing
 __all__ = ["KINDS"]
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+PLAIN = re.compile(r"[0-9.eE+\-\s]*")  # what numbers are made of; float reads more than that
+MOST = 1e6
 PART = {
     "FAPS": re.compile(r"\d{1,3}"),
     "FACS": re.compile(r"(\d{1,3})(?:\.(LEFT|RIGHT|BOTH))?", re.IGNORECASE),
@@ -101,22 +103,42 @@ def _read(type: str, parts: str, text: str) -> Keys:
     lines = [line.split() for line in text.splitlines() if line.strip()]
     if len(lines) < 2:
         raise Bad(f"keys: wanted at least two lines, got {len(lines)}")
+    rows = _at_once(lines, len(found) + 1) if PLAIN.fullmatch(text) else None
+    if rows is None or (type == "FACS" and not ((rows[:, 1:] >= 0) & (rows[:, 1:] <= 1)).all()):
+        rows = _by_lines(type, lines, len(found))
+    return Keys(found, rows[:, 0], rows[:, 1:])
+
+
+def _at_once(lines: list[list[str]], width: int) -> Float64 | None:
+    """(k, width) the numbers, where nothing is wrong with them; tables of minutes are as long as books."""
+    if any(len(words) != width for words in lines):
+        return None
+    try:
+        rows = np.array([[float(word) for word in words] for words in lines])
+    except ValueError:
+        return None
+    sound = (np.abs(rows) <= MOST).all() and (np.diff(rows[:, 0]) > 0).all()
+    return rows if sound else None
+
+
+def _by_lines(type: str, lines: list[list[str]], count: int) -> Float64:
+    """(k, 1 + count) the numbers, or what is wrong with the first line that is."""
     before = -np.inf
-    rows = np.empty((len(lines), len(found) + 1))
+    rows = np.empty((len(lines), count + 1))
     for row, words in enumerate(lines):
         place, said = f"line {row + 1} of the keys", " ".join(words)[:60]
-        wanted = f"wanted a time and {len(found)} value{'s' * (len(found) != 1)}"
-        if len(words) != len(found) + 1 or not all(map(NUMBER.fullmatch, words)):
+        wanted = f"wanted a time and {count} value{'s' * (count != 1)}"
+        if len(words) != count + 1 or not all(map(NUMBER.fullmatch, words)):
             raise Bad(f"{place}: {wanted}, got {said!r}")
         rows[row] = [float(word) for word in words]
-        if not np.all(np.abs(rows[row]) <= 1e6):
+        if not np.all(np.abs(rows[row]) <= MOST):
             raise Bad(f"{place}: wanted numbers within a million, got {said!r}")
         if rows[row, 0] <= before:
             raise Bad(f"{place}: wanted a time after {before:g}, got {words[0]}")
         if type == "FACS" and not (np.all(rows[row, 1:] >= 0) and np.all(rows[row, 1:] <= 1)):
             raise Bad(f"{place}: wanted action units 0..1, got {said!r}")
         before = rows[row, 0]
-    return Keys(found, rows[:, 0], rows[:, 1:])
+    return rows
 
 
 def _parts(type: str, text: str) -> tuple[int | tuple[int, str], ...]:

@@ -23,8 +23,8 @@ __all__ = ["XfaceDoor"]
 log = logging.getLogger(__name__)
 
 READ = 64 * 1024  # bytes
-# Of one task: some ten minutes of FAP text, as much as is read of a file.
-LIMIT = 8 * 2**20  # bytes
+# Of one task: minutes of FAP text, and more than plays as one document.
+LIMIT = 4 * 2**20  # bytes
 MOST_CLIENTS = 64  # a player is steered by one or two; each may hold a task that has not come to its end
 # What is understood at once; more of it goes to a thread, so that the frames of others are not late.
 SMALL = 16 * 1024  # characters
@@ -46,6 +46,8 @@ class XfaceDoor:
         self.port = settings.xface_port
         self._host = settings.host
         self._media = settings.media
+        # A block has more to it than its keys.
+        self._most = settings.max_document - 2**10
         self._shell = shell
         self._server: asyncio.Server | None = None
         self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
@@ -116,9 +118,9 @@ class XfaceDoor:
         while data := await reader.read(READ):
             for found in tasks.feed(data):
                 match found:
-                    case Fault(text):
+                    case Fault(text, large):
                         log.info("xface: client %d: %s", seat.desk.owner, text)
-                        seat.do([ERROR])
+                        seat.do([ERROR] if large is None else seat.desk.refuse(large))
                     case Task():
                         seat.do(seat.desk.accept(found))
                         brought = await self._prepared(found)
@@ -134,9 +136,9 @@ class XfaceDoor:
     async def _prepared(self, task: Task) -> Brought:
         try:
             if sum(map(len, task.params)) < SMALL and task.name != "LOAD_FAP":
-                return prepare(task, self._media)
+                return prepare(task, self._media, self._most)
             loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(None, prepare, task, self._media)
+            return await loop.run_in_executor(None, prepare, task, self._media, self._most)
         except RealizerError as error:
             return error
         except OSError as error:

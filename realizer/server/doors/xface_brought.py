@@ -11,6 +11,7 @@ from realizer.animation.fap_clip import FAPClip
 from realizer.animation.fap_reader import read_fap
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.fap_compound import shown
+from realizer.behaviours.fap_document import document_of
 from realizer.behaviours.fap_values import MOST_BYTES
 from realizer.behaviours.kind import World
 from realizer.behaviours.media import media_file
@@ -35,23 +36,24 @@ class Empty(RealizerError):
     """A task without what it should bring."""
 
 
-def prepare(task: Task, media: Path | None) -> FAPClip | Script | None:
+def prepare(task: Task, media: Path | None, most: int) -> FAPClip | Script | None:
     """What a task brings, understood; this may take a second. None where it brings nothing.
 
     Args:
         media: the folder that LOAD_FAP reads from.
+        most: bytes of the document that a file plays as.
 
     Raises:
         RealizerError: it cannot be understood.
     """
     match task.name, task.params:
         case "UPLOAD_FAP", (text, *_) if text.strip():
-            return _clip(text)
+            return _clip(text, most)
         case "LOAD_FAP", (name, *_) if name.strip():
             path = media_file(name, World(media=media))
             if (size := path.stat().st_size) > MOST_BYTES:
                 raise RealizerError(f"wanted at most {MOST_BYTES} bytes of FAP text, got {size}")
-            return _clip(path.read_bytes())
+            return _clip(path.read_bytes(), most)
         case "UPLOAD_SCRIPT", (text, processor, *_) if processor.strip().upper() == "BML":
             script = text if "<" in text else unescape(text)
             items = list(read(script, VOCABULARY))
@@ -67,8 +69,11 @@ def prepare(task: Task, media: Path | None) -> FAPClip | Script | None:
     return None
 
 
-def _clip(text: str | bytes) -> FAPClip:
+def _clip(text: str | bytes, most: int) -> FAPClip:
     clip = shown(read_fap(text))
     if not len(clip.values):
         raise RealizerError("wanted frames, got none")
+    if len(clip.values) > 1 and clip.mask.any() and len(document_of(clip, "")) > most:
+        got = f"{len(clip.values)} frames of {clip.mask.sum()} FAPs"
+        raise RealizerError(f"wanted a file that plays as at most {most} bytes of BML, got {got}: send parts")
     return clip

@@ -20,9 +20,10 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A stretch of the stream that is no task, and why."""
+    """A stretch of the stream that is no task, and why; `task` where it is one that is too large."""
 
     text: str
+    task: Task | None = None
 
 
 _OPEN = re.compile(rb"<task(?=[\s/>])")
@@ -104,11 +105,11 @@ class TaskReader:
                 got = "a NUL" if end[0] == b"\0" else "another <task"
                 return self._give_up(f"wanted </task>, got {got}: half a task", found)
             if len(self._data) > self._limit:
-                return self._give_up(f"wanted a task of at most {self._limit} bytes, got more", found)
+                return self._too_large(start[1], found)
             self._looked = max(start.end(), len(self._data) - 80)  # an end may have come in half
             return False
         if end.end() > self._limit:
-            return self._give_up(f"wanted a task of at most {self._limit} bytes, got {end.end()}", found)
+            return self._too_large(start[1], found)
         self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), found)
         return True
 
@@ -134,8 +135,13 @@ class TaskReader:
         self._content = None
         return True
 
-    def _give_up(self, text: str, found: list[Task | Content | Fault]) -> bool:
-        found.append(Fault(text))
+    def _too_large(self, tag: bytes, found: list[Task | Content | Fault]) -> bool:
+        task = _task(tag.decode("utf-8", "replace"), "")
+        text = f"wanted a task of at most {self._limit} bytes, got more"
+        return self._give_up(text, found, task if isinstance(task, Task) else None)
+
+    def _give_up(self, text: str, found: list[Task | Content | Fault], task: Task | None = None) -> bool:
+        found.append(Fault(text, task))
         self._lost = True
         self._drop(1)  # at least the mark that was misunderstood
         return True

@@ -91,6 +91,10 @@ class Desk:
         elif task.name != "KILL_APP":
             yield from _told(task, Status.QUEUED)
 
+    def refuse(self, task: Task) -> Iterator[Answer]:
+        """What is said of a task that is too large to be looked at."""
+        yield from _told(task, Status.ERROR)
+
     def run(self, task: Task, brought: Brought, now: float) -> Iterator[Answer]:
         """Do what a task asks, once it has been accepted.
 

@@ -402,7 +402,7 @@ def test_a_task_that_is_too_large_is_an_error_and_others_notice_nothing(
             assert await other.statuses(6) == [1, 2, 3]
             client.send(task("STOP_PLAYBACK", 1, 9))
             assert await client.statuses(9) == [1, 3]
-            assert [note for note in client.notes if note[2] != 9] == [ERROR]
+            assert [note for note in client.notes if note[2] != 9] == [("UPLOAD_FAP", 1, 5, 7)]
 
     serving(test)
 

@@ -78,6 +78,14 @@ def test_what_is_no_task_is_one_fault_and_the_next_task_is_read(data: bytes, say
     assert rest == [STOP]
 
 
+def test_a_task_that_is_too_large_is_known_by_its_head() -> None:
+    head = b'<task name="A" ownerId="1" taskId="7">'
+    for cut in (50, 10_000):
+        fault, *rest = found(head + b"x" * 3000 + b"</task>\0" + NEXT, cut)
+        assert fault == Fault("wanted a task of at most 2000 bytes, got more", Task("A", 1, 7))
+        assert rest == [STOP]
+
+
 def test_another_beginning_ends_half_a_task_where_there_is_no_nul() -> None:
     fault, *rest = found(b'<task name="A"><param>1' + NEXT)
     assert fault == Fault("wanted </task>, got another <task: half a task")
