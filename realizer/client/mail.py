@@ -9,21 +9,13 @@ from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.errors import RealizerError
-from realizer.server.wire import FrameKind, WireFrame, unpack
+from realizer.server.wire import PAYLOADS, WireFrame, unpack
 
 __all__ = ["ClientError", "Frame"]
 
 # Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
 KEPT = 1_000
 KEPT_FEEDBACK = 10_000
-STREAM_OF = {
-    FrameKind.FAP: "fap",
-    FrameKind.AU: "au",
-    FrameKind.PICTURE: "video",
-    FrameKind.SOUND: "audio",
-    FrameKind.MESH: "mesh",
-    FrameKind.ARKIT: "arkit",
-}
 # Type of a control message -> type of its answer; the others have none.
 ANSWERS = {"hello": "welcome", "subscribe": "subscribed", "state": "state", "ping": "pong"}
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
@@ -81,7 +73,7 @@ class Mail:
     def put(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
             frame = unpack(message)
-            self.of(STREAM_OF[frame.kind]).append(frame)
+            self.of(PAYLOADS[frame.kind][0]).append(frame)
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] == "schedule" or "values" in reply:

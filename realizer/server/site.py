@@ -57,6 +57,8 @@ class Site:
         path = unquote(path)
         if path == "/healthz":
             return Answer(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
+        if path == "/asyncapi.json":
+            return Answer(200, JSON, files("realizer.server").joinpath("asyncapi.json").read_bytes())
         if path == "/examples.json":
             return Answer(200, JSON, _examples())
         if path == "/vocabulary.json":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -15,6 +16,7 @@ from realizer.errors import RealizerError
 __all__ = [
     "FINAL",
     "FORGET",
+    "PAYLOADS",
     "VERSION",
     "ClipPiece",
     "FrameKind",
@@ -46,12 +48,26 @@ class WireError(RealizerError):
 class FrameKind(IntEnum):
     """The first byte of a binary message."""
 
-    FAP = 1  # 68 int32, column = FAP - 1
-    AU = 2  # float32, 0..1, columns as named by `subscribed`
-    PICTURE = 3  # a JPEG, PNG or WebP
-    SOUND = 4  # mono int16 PCM, 20 ms
-    MESH = 5  # (n, 3) int16; vertex in metres = int16 x scale + offset, both in `subscribed`
-    ARKIT = 6  # 59 float32: ARKit's 52 weights, then the turns of head and eyes in radians
+    FAP = 1
+    AU = 2
+    PICTURE = 3
+    SOUND = 4
+    MESH = 5
+    ARKIT = 6
+
+
+# kind -> stream, and what follows the header.
+PAYLOADS: Mapping[FrameKind, tuple[str, str]] = {
+    FrameKind.FAP: ("fap", "68 int32 in FAPU, column = FAP - 1"),
+    FrameKind.AU: ("au", "float32, 0..1, as `names` of `subscribed` has them"),
+    FrameKind.PICTURE: ("video", "a JPEG, PNG or WebP file"),
+    FrameKind.SOUND: ("audio", "20 ms of mono int16 PCM, at most 100 ms ahead; none in silence"),
+    FrameKind.MESH: ("mesh", "three int16 a vertex; metres = int16 x `scale` + `offset` of `subscribed`"),
+    FrameKind.ARKIT: (
+        "arkit",
+        "59 float32: ARKit's 52 weights, 0..1, then turns of head and eyes in radians",
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)

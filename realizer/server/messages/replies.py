@@ -12,6 +12,7 @@ __all__ = [
     "BlockState",
     "Capabilities",
     "CharacterState",
+    "ErrorCode",
     "ErrorMessage",
     "FrameMessage",
     "Gap",

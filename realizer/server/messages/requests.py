@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field, field_validator
+from pydantic import AliasChoices, ConfigDict, Field, field_validator
 
 from realizer.server.messages.common import MAX_FPS, PROTOCOL, Encoding, Message, Picture, Stream
 
@@ -23,8 +23,6 @@ __all__ = [
 ]
 
 FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
-
-
 Side = Annotated[int, Field(ge=16)]
 
 
@@ -34,6 +32,10 @@ class Hello(Message):
     Another version is answered by an error with code `version`, which names ours, and by nothing else: the
     connection goes on as it was.
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"type": "hello", "version": 1, "session": "show", "seen": 12}]}
+    )
 
     type: Literal["hello"]
     version: int = Field(PROTOCOL, description="of the protocol that the client speaks")
@@ -48,14 +50,35 @@ class Subscribe(Message):
     Any number of streams run side by side. Every connection gets all feedback until it asks for some of it.
     """
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
+                {
+                    "type": "subscribe",
+                    "stream": "video",
+                    "size": [640, 480],
+                    "format": "webp",
+                    "light": "evening",
+                },
+                {
+                    "type": "subscribe",
+                    "stream": "feedback",
+                    "elements": ["blockProgress"],
+                    "character": "Ada",
+                },
+            ]
+        }
+    )
+
     type: Literal["subscribe"]
     stream: Stream
     encoding: Encoding | None = Field(None, description="None: the stream's first")
     fps: float | None = Field(None, gt=0, le=MAX_FPS, description="None: the service's own rate")
     character: str | None = Field(None, max_length=256, description="None: the first")
     size: tuple[Side, Side] = Field((512, 512), description="video: width, height in pixels")
-    camera: str | None = Field(None, max_length=64, description="video; None: the service's own")
-    light: str | None = Field(None, max_length=64, description="video; None: the service's own")
+    camera: str | None = Field(None, max_length=64, description="video: None: the service's own")
+    light: str | None = Field(None, max_length=64, description="video: None: the service's own")
     background: str | None = Field(
         None,
         pattern="^(#[0-9a-fA-F]{6}|transparent)$",
@@ -70,6 +93,8 @@ class Subscribe(Message):
 
 class Unsubscribe(Message):
     """Ends a stream."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "unsubscribe", "stream": "fap"}]})
 
     type: Literal["unsubscribe"]
     stream: Stream
@@ -89,6 +114,12 @@ class SceneMessage(Message):
 
     Objects come as {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}]
+        }
+    )
 
     type: Literal["scene"]
     objects: dict[str, Point] | None = Field(max_length=10_000)
@@ -114,6 +145,10 @@ class SceneMessage(Message):
 class CharacterMessage(Message):
     """Gives a character its face and its voice."""
 
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"type": "character", "id": "Ada", "face": "ada", "voice": "silent"}]}
+    )
+
     type: Literal["character"]
     id: str | None = Field(None, min_length=1, max_length=256, description="none: the first")
     face: str | None = Field(None, max_length=64)
@@ -138,6 +173,14 @@ class SetMessage(Message):
     that is set is what it is set to, and so is a FAP, whatever AUs and speech ask of it.
     """
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"type": "set", "emotion": {"name": "joy"}, "aus": {"12L": 0.5}, "faps": {"open_jaw": 200}}
+            ]
+        }
+    )
+
     type: Literal["set"]
     emotion: Feeling | None = None
     aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] = Field(
@@ -158,6 +201,10 @@ class Anticipate(Message):
     It may be sent again and again while the estimate moves; what has not passed follows.
     """
 
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"type": "anticipate", "id": "clock", "syncs": {"beat": 12.5}}]}
+    )
+
     type: Literal["anticipate"]
     id: str = Field(min_length=1, max_length=256, pattern=r"^[^\s:]+$")
     syncs: dict[SyncName, Annotated[float, Field(ge=0, le=1e9)]] = Field(
@@ -168,6 +215,8 @@ class Anticipate(Message):
 class Stop(Message):
     """Ends blocks gracefully: those named, or all."""
 
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "stop", "blocks": ["b"]}]})
+
     type: Literal["stop"]
     blocks: list[str] | None = None
 
@@ -175,11 +224,15 @@ class Stop(Message):
 class StateQuery(Message):
     """Asks for `state`."""
 
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "state"}]})
+
     type: Literal["state"]
 
 
 class Ping(Message):
     """Asks for `pong`, which carries the session's time."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "ping", "id": 1}]})
 
     type: Literal["ping"]
     id: int | str | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import AliasChoices, Field, field_validator, model_validator
+from pydantic import AliasChoices, ConfigDict, Field, field_validator, model_validator
 
 from realizer.server.messages.common import Message
 
@@ -43,6 +43,16 @@ class SpeechMessage(Message):
     piece), u32 number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a WAV,
     FLAC, Ogg, MP3 or WebM file), u8 length of the id, the id, sound. Documents name it as a file: `clip:ID`.
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"type": "speech", "id": "turn", "append": 'Hello <sync id="m"/>there. '},
+                {"type": "speech", "id": "turn", "close": True},
+                {"type": "speech", "clip": "c", "words": [{"start": 0.1, "end": 0.4, "text": "Hello"}]},
+            ]
+        }
+    )
 
     type: Literal["speech"]
     id: str | None = Field(None, pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")

@@ -24,6 +24,11 @@ def test_the_examples_are_documents_with_titles() -> None:
     assert all(row["title"] and "<bml" in row["bml"] for row in rows)
 
 
+def test_the_protocol_is_described() -> None:
+    answer = SITE.answer("/asyncapi.json")
+    assert (answer.status, json.loads(answer.body)["asyncapi"]) == (200, "3.0.0")
+
+
 def test_a_face_is_a_glb_and_an_unknown_one_is_not_found() -> None:
     answer = SITE.answer("/faces/default")
     assert (answer.status, answer.media_type, answer.body[:4]) == (200, "model/gltf-binary", b"glTF")
@@ -46,7 +51,13 @@ def test_the_light_is_the_one_of_the_stills() -> None:
 
 @pytest.mark.skipif(not BUILT, reason="the page was not bundled: build the package where npm is")
 @pytest.mark.parametrize(
-    ("path", "media_type"), [("/", "text/html"), ("/app.js", "text/javascript"), ("/style.css", "text/css")]
+    ("path", "media_type"),
+    [
+        ("/", "text/html"),
+        ("/app.js", "text/javascript"),
+        ("/style.css", "text/css"),
+        ("/realizer.js", "text/javascript"),
+    ],
 )
 def test_the_page_is_served_with_its_types(path, media_type) -> None:
     answer = SITE.answer(path + "?session=x")

@@ -1,0 +1,257 @@
+"""The models of the messages in; realizer/server/asyncapi.json and the README's tables out.
+
+`python -m tests.protocol` writes both. All of it is read from the models, the streams and the kinds of binary
+messages, so that nothing is described twice.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+import realizer
+from realizer.server.messages import (
+    PROTOCOL,
+    STREAMS,
+    SUPPORTED,
+    Control,
+    ErrorCode,
+    ErrorMessage,
+    FrameMessage,
+    Gap,
+    Pong,
+    ScheduleMessage,
+    StateMessage,
+    Subscribe,
+    Subscribed,
+    Welcome,
+)
+from realizer.server.wire import FINAL, FORGET, PAYLOADS, VERSION
+
+__all__ = ["BEGIN", "END", "FILE", "README", "asyncapi", "render", "tables", "within"]
+
+FILE = Path(realizer.__path__[0]) / "server" / "asyncapi.json"
+README = Path(__file__).parent.parent / "README.md"
+BEGIN = "<!-- protocol: written by python -m tests.protocol -->"
+END = "<!-- end of protocol -->"
+
+REQUESTS: dict[str, type[BaseModel]] = {
+    model.model_fields["type"].annotation.__args__[0]: model  # type: ignore[union-attr]
+    for model in get_args(Control)
+}
+REPLIES: dict[str, type[BaseModel]] = {
+    "welcome": Welcome,
+    "subscribed": Subscribed,
+    "state": StateMessage,
+    "pong": Pong,
+    "gap": Gap,
+    "error": ErrorMessage,
+    "frame": FrameMessage,
+    "schedule": ScheduleMessage,
+}
+ANSWERS = {"hello": ["welcome", "gap"], "subscribe": ["subscribed"], "state": ["state"], "ping": ["pong"]}
+BML = (
+    "One or more BML documents, in any text that starts with `<`. A broken stretch is one warning, and "
+    "reading goes on at the next `<bml>`."
+)
+FEEDBACK = (
+    "One element of BML 1.0 feedback a message, with an attribute `seq` (1, 2, ...) in the namespace "
+    "urn:bml-realizer:1."
+)
+HEADER = (
+    f"Little-endian: u8 kind, u8 version ({VERSION}), u16 flags, u32 frame, f64 time in seconds on the "
+    "session clock; then what the kind says"
+)
+FLAGS = (
+    "The low byte of flags is the `index` of `subscribed`; "
+    f"{FORGET:#x} on sound means: forget everything from this time on."
+)
+CLIP = (
+    f"A piece of a sound clip: u8 kind 4, u8 version {VERSION}, u16 flags ({FINAL:#x}: the last piece), u32 "
+    "number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a sound file), u8 "
+    "length of the id, the id, sound. Documents name it `clip:ID`."
+)
+ABOUT = (
+    "BML in; feedback and a living face out. `hello` names the version of the protocol: one that the "
+    "service does not speak is answered by an error with code `version`, and changes nothing."
+)
+CHANNEL = "One WebSocket is a connection of a session; sessions are joined or made by name."
+
+
+def asyncapi() -> dict[str, Any]:
+    """The document, AsyncAPI 3.0.0, from the service's side."""
+    modes = [(m, "validation") for m in REQUESTS.values()] + [(m, "serialization") for m in REPLIES.values()]
+    _, definitions = models_json_schema(
+        modes,  # type: ignore[arg-type]
+        ref_template="#/components/schemas/{model}",
+    )
+    messages = {
+        **{name: _message(model, name) for name, model in REQUESTS.items()},
+        **{_out(name): _message(model, _out(name)) for name, model in REPLIES.items()},
+        "bml": _text("bml", BML),
+        "feedback": _text("feedback", FEEDBACK),
+        "clip": _binary("clip", CLIP),
+        **{stream: _binary(stream, f"{HEADER}: {says}. {FLAGS}") for stream, says in _kinds()},
+    }
+    return {
+        "asyncapi": "3.0.0",
+        "info": {
+            "title": "bml-realizer",
+            "version": str(PROTOCOL),
+            "description": ABOUT,
+            "license": {"name": "MIT"},
+        },
+        "defaultContentType": "application/json",
+        "servers": {"service": {"host": "127.0.0.1:8765", "protocol": "ws"}},
+        "channels": {
+            "ws": {
+                "address": "/ws",
+                "description": CHANNEL,
+                "messages": {name: {"$ref": f"#/components/messages/{name}"} for name in messages},
+                "bindings": {
+                    "ws": {
+                        "query": {
+                            "type": "object",
+                            "properties": {
+                                "session": {"type": "string", "pattern": "^[A-Za-z0-9._~-]{1,64}$"},
+                                "seen": {"type": "integer", "minimum": 0},
+                            },
+                        },
+                        "bindingVersion": "0.1.0",
+                    }
+                },
+            }
+        },
+        "operations": dict(_operations()),
+        "components": {"messages": messages, "schemas": definitions["$defs"]},
+    }
+
+
+def _operations() -> Iterator[tuple[str, dict[str, Any]]]:
+    channel = {"$ref": "#/channels/ws"}
+
+    def refs(names: list[str]) -> list[dict[str, str]]:
+        return [{"$ref": f"#/channels/ws/messages/{name}"} for name in names]
+
+    for name in ("bml", "clip", *REQUESTS):
+        operation = {"action": "receive", "channel": channel, "messages": refs([name])}
+        if name in ANSWERS:
+            answers = [_out(answer) for answer in (*ANSWERS[name], "error")]
+            operation["reply"] = {"channel": channel, "messages": refs(answers)}
+        yield f"receive-{name}", operation
+    for name in ("feedback", "error-message", "frame", "schedule", *(stream for stream, _ in _kinds())):
+        yield f"send-{name}", {"action": "send", "channel": channel, "messages": refs([_out(name)])}
+
+
+def _out(name: str) -> str:
+    """`state` is both asked for and told."""
+    return {"state": "state-message", "error": "error-message"}.get(name, name)
+
+
+def _kinds() -> list[tuple[str, str]]:
+    return [(stream, f"kind {kind:d}, {says}") for kind, (stream, says) in PAYLOADS.items()]
+
+
+def _message(model: type[BaseModel], name: str) -> dict[str, Any]:
+    first, _, rest = inspect.cleandoc(model.__doc__ or "").partition("\n")
+    said = {"name": name, "summary": first, "payload": {"$ref": f"#/components/schemas/{model.__name__}"}}
+    return said | ({"description": rest.strip()} if rest.strip() else {})
+
+
+def _text(name: str, says: str) -> dict[str, Any]:
+    return {"name": name, "description": says, "contentType": "text/xml", "payload": {"type": "string"}}
+
+
+def _binary(name: str, says: str) -> dict[str, Any]:
+    payload = {"type": "string", "format": "binary"}
+    return {"name": name, "description": says, "contentType": "application/octet-stream", "payload": payload}
+
+
+def render() -> str:
+    """The text of the file."""
+    return json.dumps(asyncapi(), indent=1, ensure_ascii=False) + "\n"
+
+
+def tables() -> str:
+    """The README's part: messages in, streams, messages out."""
+    lines = ["| in | with | |", "|---|---|---|", f"| text | | {_cell(BML)} |"]
+    for name in SUPPORTED:
+        model = REQUESTS[name]
+        example = json.dumps(_examples(model)[0], separators=(",", ":"))
+        lines.append(f"| `{example}` | {_fields(model)} | {_cell(_first(model))} |")
+    lines.append(f"| binary | | {_cell(CLIP)} |")
+    lines += ["", "| stream | encodings | takes | binary: the header, then |", "|---|---|---|---|"]
+    kinds = {stream: f"{kind:d}: {says}" for kind, (stream, says) in PAYLOADS.items()}
+    for stream, encodings in STREAMS.items():
+        takes = ", ".join(f"`{name}`" for name in _takes(stream, encodings))
+        lines.append(f"| `{stream}` | {', '.join(encodings)} | {takes} | {_cell(kinds.get(stream, ''))} |")
+    lines += ["", "| out | with | |", "|---|---|---|", f"| XML | | {_cell(FEEDBACK)} |"]
+    for name, model in REPLIES.items():
+        called = "fap`, `au`, `arkit" if name == "frame" else name
+        codes = f" Codes: {', '.join(get_args(ErrorCode))}." if name == "error" else ""
+        lines.append(f"| `{called}` | {_fields(model)} | {_cell(_first(model))}{codes} |")
+    lines.append(f"| binary | | {_cell(f'{HEADER}. {FLAGS}')} |")
+    return "\n".join(lines) + "\n"
+
+
+def _takes(stream: str, encodings: tuple[str, ...]) -> list[str]:
+    """What `subscribe` takes for a stream: what its description says first, and what all frames have."""
+    common = {"feedback": ["character"], "schedule": ["character"], "audio": ["character"]}
+    names = common.get(stream, ["fps", "character"])
+    own = [
+        name
+        for name, field in Subscribe.model_fields.items()
+        if (field.description or "").startswith(f"{stream}:")
+    ]
+    return [*names, *own]
+
+
+def _fields(model: type[BaseModel]) -> str:
+    if model is Subscribe:
+        return "`stream`, `encoding`, and what the stream takes"
+    return ", ".join(f"`{field}`" for field in model.model_fields if field != "type")
+
+
+def _examples(model: type[BaseModel]) -> list[dict[str, Any]]:
+    extra: Any = model.model_config["json_schema_extra"]
+    examples: list[dict[str, Any]] = extra["examples"]
+    return examples
+
+
+def _first(model: type[BaseModel]) -> str:
+    """The first paragraph of what the model says of itself."""
+    return " ".join(inspect.cleandoc(model.__doc__ or "").partition("\n\n")[0].split())
+
+
+def _cell(text: str) -> str:
+    return re.sub(r"(?<!\\)\|", r"\\|", text)
+
+
+def within(text: str) -> str:
+    """A README with the tables between its markers.
+
+    Raises:
+        ValueError: it has no markers.
+    """
+    before, found, rest = text.partition(BEGIN)
+    _, ends, after = rest.partition(END)
+    if not found or not ends:
+        raise ValueError(f"wanted the lines {BEGIN} and {END}")
+    return f"{before}{BEGIN}\n{tables()}{END}{after}"
+
+
+if __name__ == "__main__":
+    FILE.write_text(render(), "utf-8")
+    print(f"{FILE}: written")
+    try:
+        README.write_text(within(README.read_text("utf-8")), "utf-8")
+        print(f"{README}: written")
+    except ValueError as error:
+        print(f"{README}: {error}")

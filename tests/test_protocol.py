@@ -1,0 +1,152 @@
+"""The protocol is described once: the file and the tables are current, and what is sent is as described."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import connect
+
+from realizer.server.messages import STREAMS, SUPPORTED, ErrorMessage, parse_control
+from realizer.server.serve import Server
+from realizer.server.wire import PAYLOADS
+from realizer.settings import Settings
+from tests.protocol import (
+    ANSWERS,
+    BEGIN,
+    END,
+    FILE,
+    README,
+    REPLIES,
+    REQUESTS,
+    asyncapi,
+    render,
+    tables,
+    within,
+)
+
+LIMIT = 30  # s
+DOCUMENT = asyncapi()
+
+
+def references(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        if isinstance(node.get("$ref"), str):
+            yield node["$ref"]
+        for value in node.values():
+            yield from references(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from references(value)
+
+
+def resolved(reference: str) -> Any:
+    node: Any = DOCUMENT
+    for part in reference.removeprefix("#/").split("/"):
+        node = node[part]
+    return node
+
+
+def validator(schema: dict[str, Any]) -> Any:
+    """Of a payload, with the schemas of the document at hand."""
+    jsonschema = pytest.importorskip("jsonschema", reason="needs the test extra")
+    return jsonschema.Draft202012Validator({**schema, "components": DOCUMENT["components"]})
+
+
+def test_the_file_is_current() -> None:
+    assert FILE.read_text("utf-8") == render(), "run: python -m tests.protocol"
+
+
+def test_the_readme_is_current() -> None:
+    if not README.is_file() or BEGIN not in (text := README.read_text("utf-8")):
+        pytest.skip("no README with tables of the protocol beside the tests")
+    assert within(text) == text, "run: python -m tests.protocol"
+
+
+def test_tables_go_between_their_markers_alone() -> None:
+    text = f"before\n{BEGIN}\nold\n{END}\nafter\n"
+    assert within(text) == f"before\n{BEGIN}\n{tables()}{END}\nafter\n"
+    with pytest.raises(ValueError, match="wanted the lines"):
+        within("nothing")
+
+
+def test_everything_that_is_named_is_there_and_everything_there_is_named() -> None:
+    named = set(references(DOCUMENT))
+    for reference in named:
+        assert resolved(reference)
+    for message in DOCUMENT["components"]["messages"]:
+        assert f"#/components/messages/{message}" in named
+        assert f"#/channels/ws/messages/{message}" in named
+    assert set(SUPPORTED) == set(REQUESTS) == set(REQUESTS) & set(DOCUMENT["components"]["messages"])
+    assert ANSWERS.keys() < REQUESTS.keys()
+    assert {answer for answers in ANSWERS.values() for answer in answers} < REPLIES.keys()
+    assert {stream for stream, _ in PAYLOADS.values()} < STREAMS.keys()
+
+
+@pytest.mark.parametrize("name", sorted(DOCUMENT["components"]["schemas"]))
+def test_each_schema_is_one(name: str) -> None:
+    validator({}).check_schema(DOCUMENT["components"]["schemas"][name])
+
+
+@pytest.mark.parametrize("name", SUPPORTED)
+def test_each_example_is_taken_and_fits_its_schema(name: str) -> None:
+    examples = resolved(DOCUMENT["components"]["messages"][name]["payload"]["$ref"])["examples"]
+    assert examples
+    for example in examples:
+        message = parse_control(json.dumps(example))
+        assert not isinstance(message, ErrorMessage), message
+        assert message.type == name
+        validator(DOCUMENT["components"]["messages"][name]["payload"]).validate(example)
+
+
+def test_a_table_names_every_message_stream_and_kind() -> None:
+    text = tables()
+    for name in SUPPORTED:
+        assert f'"type":"{name}"' in text
+    for name in (*STREAMS, *REPLIES.keys() - {"frame"}):
+        assert f"| `{name}` |" in text
+    assert all(f"| {kind:d}: {says} |" in text for kind, (_, says) in PAYLOADS.items())
+
+
+def test_what_the_service_says_fits_the_file() -> None:
+    told: list[dict[str, Any]] = []
+    asked = [
+        {"type": "hello", "seen": 99},
+        {"type": "hello", "version": 7},
+        *({"type": "subscribe", "stream": s, "encoding": "json"} for s in ("fap", "au", "arkit", "schedule")),
+        *({"type": "subscribe", "stream": s, "fps": 10} for s in ("mesh", "audio", "feedback")),
+        {"type": "subscribe", "stream": "smell"},
+        {"type": "set", "aus": {"12": 0.5}},
+        {"type": "state"},
+        {"type": "ping", "id": "x"},
+    ]
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
+            socket = await connect(server.url)
+            async with socket:
+                await socket.send('<bml id="b"><speech id="s"><text>One two.</text></speech></bml>')
+                for message in asked:
+                    await socket.send(json.dumps(message))
+                async for text in socket:
+                    if isinstance(text, str) and text.startswith("{"):
+                        told.append(json.loads(text))
+                    if isinstance(text, str) and 'id="b:end"' in text:
+                        return
+
+    asyncio.run(run())
+    payloads = {
+        name: DOCUMENT["components"]["messages"][name]["payload"]
+        for name in REPLIES
+        if name not in ("state", "error")
+    }
+    payloads |= {
+        name: DOCUMENT["components"]["messages"][f"{name}-message"]["payload"] for name in ("state", "error")
+    }
+    payloads |= dict.fromkeys(("fap", "au", "arkit"), payloads.pop("frame"))
+    assert {message["type"] for message in told} == set(payloads)
+    for message in told:
+        validator(payloads[message["type"]]).validate(message)
