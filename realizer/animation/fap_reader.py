@@ -19,7 +19,8 @@ from realizer.tables import faps
 __all__ = ["read_fap"]
 
 FPS = 25.0  # where there is no header: the rate of Xface and Greta
-COLUMNS = (68, 69)  # Greta writes a null FAP 0 first
+MASK = 68
+COLUMNS = (MASK, 69)  # Greta writes a null FAP 0 first
 WIDTHS = {1: (4, 1), 2: (6, 1)}  # numbers a compound FAP takes; Greta and Xface write one
 COMPOUND = {1: 69, 2: 73}  # the columns of their numbers, behind those of FAP 0 to 68
 INT32 = 2**31 - 1
@@ -58,8 +59,9 @@ def read_fap(text: str | bytes) -> FAPClip:
 
     Survives comments, a byte order mark, CRLF, tabs, a missing header or last newline, names with blanks or
     paths, 69 columns, masks that vary, frame numbers that start anywhere or have gaps, compound FAPs as one
-    number, floats and rubbish (0) for integers, values out of range, a wrong frame count. Where a frame does
-    not give a FAP it is neutral, as all readers have it. Version 2.0 is read like 2.1.
+    number, floats and rubbish (0) for integers, values out of range, a wrong frame count, frames that are
+    broken over lines. Where a frame does not give a FAP it is neutral, as all readers have it. Version 2.0 is
+    read like 2.1.
 
     Raises:
         RealizerError: no FAP text: a body animation (version 3.x), or a line that is neither mask nor values.
@@ -72,7 +74,14 @@ def read_fap(text: str | bytes) -> FAPClip:
     if any(words[0].startswith("#") for _, words in lines):
         lines = [(number, words) for number, words in lines if not words[0].startswith("#")]
     name, fps, count, lines = _header(lines, text, notes)
-    frames = [_frame(mask, values, notes) for mask, values in _pairs(lines)]
+    try:
+        pairs = list(_pairs(lines))
+    except RealizerError:
+        if (stream := _stream(lines)) is None:
+            raise
+        pairs = stream
+        notes.add("frames are not lines; read as one stream of numbers, as Xface does", lines[0][0])
+    frames = [_frame(mask, values, notes) for mask, values in pairs]
     if count is not None and count != len(frames):
         notes.add(f"the header says {count} frames, there are {len(frames)}", 1)
     return _clip(name, fps, frames, notes)
@@ -125,6 +134,25 @@ def _pairs(lines: list[Line]) -> Iterator[tuple[Line, Line]]:
         yield mask, values
     if len(lines) % 2 and not _is_mask(lines[-1][1]):
         raise RealizerError(f"line {lines[-1][0]}: wanted a mask of 68 columns, got {len(lines[-1][1])}")
+
+
+def _stream(lines: list[Line]) -> list[tuple[Line, Line]] | None:
+    """Mask and values of each frame wherever lines end; None where the numbers do not come out even."""
+    words = [(number, word) for number, line in lines for word in line]
+    pairs: list[tuple[Line, Line]] = []
+    at = 0
+    while at < len(words):
+        mask = [word for _, word in words[at : at + MASK]]
+        if len(mask) < MASK or not _is_mask(mask):
+            return None
+        used = [fap for fap, bit in enumerate(mask, 1) if int(bit) != 0]
+        count = 1 + sum(WIDTHS[fap][0] if fap in WIDTHS else 1 for fap in used)
+        values = words[at + MASK : at + MASK + count]
+        if len(values) < count:
+            return None
+        pairs.append(((words[at][0], mask), (values[0][0], [word for _, word in values])))
+        at += MASK + count
+    return pairs
 
 
 def _frame(mask: Line, values: Line, notes: _Notes) -> _Frame:

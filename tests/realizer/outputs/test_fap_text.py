@@ -144,6 +144,17 @@ ODD = {
         clip(fap3=[10, 0, 20], fap4=[-1, 0, -2]),
         "gaps",
     ),
+    "frames broken over lines": (
+        f"2.1 x 25 2\n{BODY}".replace(" 0 0 0 0 ", " 0 0\n0 0 ").replace("10 -1", "10\n-1"),
+        PLAIN,
+        "not lines",
+    ),
+    "a frame a line": (f"2.1 x 25 2\n{M} 0 10 -1\n{M} 1 20 -2\n", PLAIN, "not lines"),
+    "all frames in one line": (
+        f"2.1 x 25 2\n{BODY}".replace("\n", " ").replace("25 2 ", "25 2\n"),
+        PLAIN,
+        "not lines",
+    ),
     "wild frame numbers": (f"2.1 x 25 2\n{M}\n0 10 -1\n{M}\n2000000000 20 -2\n", PLAIN, "jump wildly"),
 }
 
