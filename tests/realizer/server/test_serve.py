@@ -231,20 +231,23 @@ def command(*arguments: str, **variables: str) -> subprocess.Popen[str]:
     )
 
 
-def test_each_open_door_prints_a_line_and_a_broker_that_is_not_there_stops_none() -> None:
+def test_each_open_door_prints_a_line_and_one_that_waits_for_somebody_stops_none() -> None:
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))  # bound, but nobody listens
-        broker = f"127.0.0.1:{nobody.getsockname()[1]}"
-        with command("--asap-ports", "0", "7501", "--stomp", broker) as serving:
+        there = f"127.0.0.1:{nobody.getsockname()[1]}"
+        ours = ("--asap-ports", "0", "7501", "--xface-port", "0")
+        with command(*ours, "--stomp", there, "--xface-player", there) as serving:
             assert serving.stdout is not None
             assert serving.stderr is not None
-            lines = [serving.stdout.readline() for _ in range(3)]
-            told = serving.stderr.readline()
+            lines = [serving.stdout.readline() for _ in range(4)]
+            told = sorted(serving.stderr.readline() for _ in range(2))
             serving.send_signal(signal.SIGTERM)
             assert (serving.wait(LIMIT), serving.stdout.read()) == (0, "")
     starts = ["listening on ws://127.0.0.1:", "page at http://127.0.0.1:", "asap: BML at 127.0.0.1:"]
+    starts.append("xface: tasks at 127.0.0.1:")
     assert all(line.startswith(start) for line, start in zip(lines, starts, strict=True))
-    assert told == f"realizer: stomp: no broker at {broker} (nobody answers); looking for it\n"
+    assert told[0] == f"realizer: stomp: no broker at {there} (nobody answers); looking for it\n"
+    assert told[1].startswith(f"realizer: xface player: no player at {there} (")
 
 
 def test_a_door_that_needs_something_names_it_in_one_sentence(tmp_path: Path) -> None:
