@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__: list[str] = []
 
-PICTURES = (".png", ".mp4", ".webm")
+PICTURES = (".png", ".webp", ".mp4", ".webm")
 TRANSPARENT = "transparent"
 
 

@@ -19,6 +19,7 @@ MODULES = (
     "wav",
     "png",
     "film",
+    "webp",
     "glb",
     "arkit_csv",
     "talkinghead",

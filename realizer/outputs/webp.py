@@ -1,0 +1,83 @@
+"""A realization as an animated picture (.webp), for pages and messages that take no film."""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realizer.arrays import UInt8
+from realizer.outputs.files import write_bytes
+from realizer.outputs.output import Drawing, Output
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "encode_webp", "write_webp"]
+
+PACE = 25  # pictures a second at most: more than that is a film
+QUALITY, METHOD = 75, 4  # 160 kB a second at 512x512
+MOST = 2**24 - 1  # of what a number of three bytes can say
+ANIMATED, WHOLE = 0x02, 0x02  # flags: of the file; of a picture that covers what was there
+
+
+def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) -> bytes:
+    """The file; it plays again and again.
+
+    Each picture is coded by itself, as it comes, so that only one is in memory.
+
+    Args:
+        pictures: (h, w, 3) uint8, all of one size.
+        starts: seconds, when each is shown; in order, from 0.
+        end: seconds, when the last one has been shown.
+
+    Source: RFC 9649, WebP image format, 2.7.
+    """
+    from PIL import Image
+
+    stamps = [round(1000 * time) for time in (*starts, end)]
+    parts, size = [], (0, 0)
+    for picture, start, after in zip(pictures, stamps, stamps[1:], strict=False):
+        buffer = io.BytesIO()
+        image = Image.fromarray(np.ascontiguousarray(picture))
+        image.save(buffer, "WEBP", quality=QUALITY, method=METHOD)
+        size = image.size
+        head = b"\0\0\0" * 2 + _three(size[0] - 1) + _three(size[1] - 1) + _three(after - start)
+        # Without the head of a file of its own: 12 bytes.
+        parts.append(_chunk(b"ANMF", head + bytes([WHOLE]) + buffer.getvalue()[12:]))
+    look = struct.pack("<B3x", ANIMATED) + _three(size[0] - 1) + _three(size[1] - 1)
+    body = b"WEBP" + _chunk(b"VP8X", look) + _chunk(b"ANIM", b"\xff\xff\xff\xff\0\0") + b"".join(parts)
+    return b"RIFF" + struct.pack("<I", len(body)) + body
+
+
+def write_webp(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """Every frame, or at higher rates every second, third, ...: at most 25 pictures a second."""
+    step = math.ceil(realization.fps / PACE)
+    rows = realization.poses[::step]
+    starts = [k * step / realization.fps for k in range(len(rows))]
+    size, _ = _draws(drawing)
+    with drawing.renderer(realization, size) as renderer:
+        content = encode_webp(renderer.frames(rows), starts, starts[-1] + step / realization.fps)
+    write_bytes(path, content)
+
+
+def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
+    return drawing.size, False
+
+
+def _three(number: int) -> bytes:
+    return min(max(number, 0), MOST).to_bytes(3, "little")
+
+
+def _chunk(name: bytes, content: bytes) -> bytes:
+    return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
+
+
+OUTPUTS = (
+    Output(".webp", "image/webp", "animated picture without sound", write_webp, "render", _draws),
+)  # fmt: skip
