@@ -249,8 +249,8 @@ class Settings:
             raise SettingsError("setting tls_key: wanted tls_cert too, got none")
         if self.tls_cert is not None and self.workers > 1:
             raise SettingsError(
-                f"setting tls_cert: wanted workers = 1, got {self.workers}: what hands connections to several "
-                "workers reads their first line; let a proxy in front speak TLS"
+                f"setting tls_cert: wanted workers = 1, got {self.workers}: what hands connections to "
+                "several workers reads their first line; let a proxy in front speak TLS"
             )
         open_doors = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
         if self.token is not None and open_doors and self.host not in ("127.0.0.1", "localhost", "::1"):

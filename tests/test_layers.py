@@ -21,6 +21,7 @@ MAY: dict[str, set[str]] = {
     "realizer.arrays": set(),
     "realizer.colours": {"realizer.arrays"},
     "realizer.errors": set(),
+    "realizer.logs": set(),
     "realizer.units": set(),
     "realizer.settings": {"realizer.errors"},
     "realizer.examples": set(),

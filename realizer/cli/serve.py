@@ -19,6 +19,28 @@ __all__: list[str] = []
     "--workers", type=int, help="Processes that serve the port, each its own sessions.  [default: 1]"
 )
 @click.option(
+    "--token",
+    metavar="WORD",
+    help="What clients of the WebSocket must bring; REALIZER_TOKEN is not seen by who lists processes.",
+)
+@click.option(
+    "--origin",
+    "origins",
+    multiple=True,
+    metavar="ADDRESS",
+    callback=lambda context, parameter, value: value or None,
+    help="A page elsewhere that may open a WebSocket, as https://example.org; may be given several times.",
+)
+@click.option(
+    "--tls-cert",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Certificates in PEM: the service speaks TLS.",
+)
+@click.option(
+    "--tls-key", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Its key in PEM."
+)
+@click.option("--log", type=click.Choice(["text", "json"]), help="How logs are written.  [default: text]")
+@click.option(
     "--asap-ports",
     nargs=2,
     type=int,

@@ -10,6 +10,7 @@ from realizer.errors import RealizerError
 from realizer.server.effects import Effect, Move, Send
 from realizer.server.messages import ErrorMessage
 from realizer.server.session import Session
+from realizer.settings import raises
 
 __all__ = ["Hub", "HubError"]
 
@@ -55,7 +56,7 @@ class Hub:
             words = f"session: wanted 1..64 letters, digits or . _ ~ -, got {name[:80]!r}"
             raise HubError(400, words)
         if (name is None or name not in self.sessions) and self._full and not self._left():
-            raise HubError(503, f"{self._most} sessions are open: wanted fewer")
+            raise HubError(503, f"{self._most} sessions are open: wanted fewer {raises('max_sessions')}")
 
     def open(self, connection: int, name: str | None, now: float, seen: int | None = None) -> Session:
         """Let a connection join the named session, or make it; without a name, one of its own.
@@ -95,7 +96,7 @@ class Hub:
                 if not self._ours(effect.session):
                     words = f"wanted another worker's session in the address: /ws?session={effect.session}"
                 elif not self._takes(effect, session):
-                    words = f"{self._most} sessions are open: wanted fewer"
+                    words = f"{self._most} sessions are open: wanted fewer {raises('max_sessions')}"
                 if words is not None:
                     error = ErrorMessage(code="invalid", message=words, where="hello.session")
                     effects.append(Send(effect.connection, error.text()))

@@ -9,6 +9,7 @@ import socket
 from collections.abc import Awaitable, Coroutine
 from types import TracebackType
 
+from realizer.logs import write_json
 from realizer.scheduling import warm_up
 from realizer.server.doors.asap import AsapDoor
 from realizer.server.doors.door import Door
@@ -36,6 +37,8 @@ async def serve(settings: Settings | None = None) -> None:
         RealizerError: something that was asked for is not there.
     """
     settings = settings or Settings()
+    if settings.log == "json":
+        write_json()
     if settings.workers > 1:
         workers = await Workers(settings).start()
         print(*lines(settings, workers.port), sep="\n", flush=True)
@@ -50,6 +53,8 @@ async def serve(settings: Settings | None = None) -> None:
 
 async def work(settings: Settings, number: int, control: socket.socket) -> None:
     """Serve as worker `number`, what comes through `control`, until SIGTERM or until the parent is gone."""
+    if settings.log == "json":
+        write_json()
     loop = asyncio.get_running_loop()
     server = await Server(settings, worker=number).start()
     gone = asyncio.Event()

@@ -143,6 +143,11 @@ class Session:
             if not self.named:
                 self.close()
 
+    def dropped(self, connection: int) -> int:
+        """How many frames, pictures and packets a client did not get because it was slow."""
+        known = self._connections.get(connection)
+        return 0 if known is None else known.dropped
+
     def expired(self, now: float) -> bool:
         """Nobody has been here for `settings.keep` seconds."""
         return self.empty_since is not None and now >= self.empty_since + self.settings.keep

@@ -16,6 +16,7 @@ from realizer.mapping import mapping_of
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import Hub
+from realizer.server.metrics import Metrics
 from realizer.server.session import Session
 from realizer.server.studio import Studio
 from realizer.server.workers import worker_of
@@ -54,6 +55,7 @@ class Shell:
 
         self._hub = Hub(self._make, settings.max_sessions, ours)
         self._studio = Studio(settings.deformer)
+        self.metrics = Metrics(worker)
         self._clients: dict[int, Client] = {}
         self._timers: dict[Session, _Timer] = {}
         self._numbers = itertools.count(1)
@@ -113,6 +115,21 @@ class Shell:
         """How many there are."""
         return {"sessions": len(self._hub.sessions), "connections": len(self._clients)}
 
+    def measured(self) -> str:
+        """What Prometheus reads."""
+        sessions = self._hub.sessions.values()
+        dropped = sum(session.dropped(number) for session in sessions for number in session.connections)
+        return self.metrics.text(
+            {
+                "sessions": len(sessions),
+                "connections": len(self._clients),
+                "blocks_waiting": sum(len(session.preparation) for session in sessions),
+                "blocks_playing": sum(session.player.alive for session in sessions),
+                "unsent_bytes": sum(client.waiting for client in self._clients.values()),
+            },
+            {"frames_dropped": dropped},
+        )
+
     # connections --------------------------------------------------------------------------------
 
     def check(self, name: str | None) -> None:
@@ -140,6 +157,7 @@ class Shell:
         session = self._hub.session_of(number)
         if session is None or session.closed:
             return False
+        self.metrics.counts["messages"] += 1
         try:
             # Who asks and never reads the answers is found here: nothing else may ever be due.
             session.backlog(number, self._clients[number].waiting)
@@ -152,6 +170,8 @@ class Shell:
     def leave(self, number: int) -> None:
         """A connection is gone."""
         left = self._hub.session_of(number)
+        if left is not None:
+            self.metrics.counts["frames_dropped"] += left.dropped(number)
         self._hub.leave(number, self._loop.time())
         self._clients.pop(number, None)
         if left is not None:
@@ -192,18 +212,24 @@ class Shell:
             self._timers[session] = _Timer(when, self._loop.call_at(when, self._tick, session))
 
     def _tick(self, session: Session) -> None:
-        self._timers.pop(session, None)
+        began = self._loop.time()
+        if (timer := self._timers.pop(session, None)) is not None:
+            self.metrics.late.observe(max(0.0, began - timer.when))
+        plans = session.player.revision
         for number in session.connections:
             session.backlog(number, self._clients[number].waiting)
         try:
             session.tick(self._loop.time())
         except Exception:
             self._fail(session)
+        if session.player.revision != plans:
+            self.metrics.planning.observe(self._loop.time() - began)
         self._pump(session)
 
     def _fail(self, session: Session) -> None:
         """A bug: the traceback is ours, this session ends, the others play on."""
         log.exception("session %s ends: it failed", session.id)
+        self.metrics.counts["failures"] += 1
         for number in session.connections:
             self._do(session, Close(number, 1011, "internal error"))
         session.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http
+import logging
 import socket
 import tempfile
 from collections import Counter
@@ -20,13 +21,18 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.server import ServerProtocol
 
+from realizer.server import guard
+from realizer.server.guard import Guard, Pace
 from realizer.server.hub import HubError
+from realizer.server.messages import ErrorMessage
+from realizer.server.metrics import MEDIA_TYPE
 from realizer.server.shell import Shell
 from realizer.server.site import Answer, Site
-from realizer.settings import Settings
+from realizer.settings import Settings, raises
 
 __all__ = ["WebSocketDoor", "lines"]
 
+log = logging.getLogger(__name__)
 
 # How often a client is asked whether it is there, and how long it has for the answer.
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
@@ -47,6 +53,7 @@ class WebSocketDoor:
         self._taking: set[asyncio.Task[Any]] = set()
         self._shell = shell
         self._settings = settings
+        self._guard = Guard(settings)
         self._site = Site(shell.health, settings)
         self._socket: SocketServer | None = None
         self._closing: set[asyncio.Task[None]] = set()
@@ -56,19 +63,23 @@ class WebSocketDoor:
     @property
     def url(self) -> str:
         """Where BML goes."""
-        return f"ws://{_authority(self._settings, self.port)}/ws"
+        return _addresses(self._settings, self.port)[0]
 
     @property
     def page(self) -> str:
         """The page's address."""
-        return f"http://{_authority(self._settings, self.port)}/"
+        return _addresses(self._settings, self.port)[1]
 
     @property
     def lines(self) -> tuple[str, ...]:
         return lines(self._settings, self.port) if self._listens else ()
 
     async def start(self) -> None:
-        where: dict[str, Any] = {"host": self._settings.host, "port": self.port}
+        where: dict[str, Any] = {
+            "host": self._settings.host,
+            "port": self.port,
+            "ssl": self._guard.tls(),
+        }
         if not self._listens:
             where = {"unix": True, "sock": _nowhere()}
         self._socket = await listen(
@@ -117,18 +128,32 @@ class WebSocketDoor:
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
             try:
+                self._guard.request(request.path, _headers(request), later=path == "/ws")
+                self._guard.room()
                 self._room(connection)
                 if path == "/ws":
                     self._shell.check(_query(request)[0])
             except HubError as error:
-                return _response(Answer(error.status, "text/plain; charset=utf-8", f"{error}\n".encode()))
+                return self._refused(connection, error)
             return None
         if path in ("/ws", "/check") or upgrade:
             got = "a WebSocket" if upgrade else "plain HTTP"
             words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
             return _response(Answer(426 if not upgrade else 404, "text/plain; charset=utf-8", words.encode()))
+        if path == "/metrics":
+            try:
+                self._guard.request(request.path, _headers(request))
+            except HubError as error:
+                return self._refused(connection, error)
+            return _response(Answer(200, MEDIA_TYPE, self._shell.measured().encode()))
         loop = asyncio.get_running_loop()
         return _response(await loop.run_in_executor(None, self._site.answer, request.path))
+
+    def _refused(self, connection: ServerConnection, error: HubError) -> Response:
+        self._shell.metrics.counts["refused"] += 1
+        log.info("refused: %s", error, extra={"address": _address(connection), "status": error.status})
+        headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
+        return _response(Answer(error.status, "text/plain; charset=utf-8", f"{error}\n".encode(), headers))
 
     def _room(self, socket: ServerConnection) -> None:
         """Whether one more may come from its address: nobody can take the room of all others.
@@ -138,7 +163,10 @@ class WebSocketDoor:
         """
         most = self._settings.max_connections
         if self._from[_address(socket)] >= most:
-            words = f"{most} connections from {_address(socket)} are open: wanted fewer"
+            words = (
+                f"{most} connections from {_address(socket)} are open: wanted fewer "
+                f"{raises('max_connections')}"
+            )
             raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
 
     async def _handle(self, socket: ServerConnection) -> None:
@@ -163,20 +191,59 @@ class WebSocketDoor:
 
     async def _join(self, socket: ServerConnection, request: Request) -> None:
         client = _Client(socket)
+        greeting = None
+        if not self._guard.request(request.path, _headers(request), later=True):
+            greeting = await self._greeting(socket)
+            if greeting is None:
+                return
         try:
             number = self._shell.join(client, *_query(request))
         except HubError as error:
             await socket.close(1013, str(error)[:120])
             return
+        told = {"connection": number, "address": _address(socket)}
+        log.info("joined", extra=told)
         try:
-            async for message in socket:
-                if not self._shell.receive(number, message):
-                    break
-                await asyncio.sleep(0)  # messages that are there already must not hold up everybody else
+            if greeting is not None:
+                self._shell.receive(number, greeting)
+            await self._read(socket, number, client)
         except ConnectionClosed:
             pass
         finally:
             self._shell.leave(number)
+            log.info("left", extra={**told, "code": socket.close_code})
+
+    async def _read(self, socket: ServerConnection, number: int, client: _Client) -> None:
+        """Hand messages on, no faster than a client may send them: the rest waits in its own buffers."""
+        loop = asyncio.get_running_loop()
+        pace, held = Pace(self._settings.max_rate), False
+        async for message in socket:
+            if not self._shell.receive(number, message):
+                return
+            # 0 too: messages that are there already must not hold up everybody else.
+            pause = pace.wait(loop.time())
+            if pause and not held:
+                words = (
+                    f"wanted at most {self._settings.max_rate:g} messages a second; more are read later "
+                    f"{raises('max_rate')}"
+                )
+                client.send(ErrorMessage(code="rate", message=words).text())
+            held = bool(pause)
+            await asyncio.sleep(pause)
+
+    async def _greeting(self, socket: ServerConnection) -> str | bytes | None:
+        """The first message of a client that has not brought the token yet; None where it is not that."""
+        with contextlib.suppress(ConnectionClosed, TimeoutError):
+            async with asyncio.timeout(guard.PATIENCE):
+                message = await socket.recv()
+            if self._guard.greets(message):
+                return message
+        self._shell.metrics.counts["refused"] += 1
+        words = "token: wanted that of this service in the address, a header or a first hello"
+        with contextlib.suppress(ConnectionClosed):
+            await socket.send(ErrorMessage(code="token", message=words, where="hello.token").text())
+        await socket.close(1008, words)
+        return None
 
     async def _check(self, socket: ServerConnection) -> None:
         """An editor's own WebSocket: a text in, its faults out, one after the other."""
@@ -241,15 +308,22 @@ def _nowhere() -> socket.socket:
 
 def lines(settings: Settings, port: int) -> tuple[str, ...]:
     """What a service prints that is open at a port."""
-    where = _authority(settings, port)
-    return f"listening on ws://{where}/ws", f"page at http://{where}/"
+    service, page = _addresses(settings, port)
+    return f"listening on {service}", f"page at {page}"
 
 
-def _authority(settings: Settings, port: int) -> str:
+def _addresses(settings: Settings, port: int) -> tuple[str, str]:
+    """Where BML goes, and the page's."""
     host = settings.host
     if host in ("", "0.0.0.0", "::"):
         host = "127.0.0.1"
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    where, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
+    return f"ws{s}://{where}/ws", f"http{s}://{where}/"
+
+
+def _headers(request: Request) -> dict[str, str]:
+    """By their names in small letters; of several of one name the last."""
+    return {name.lower(): value for name, value in request.headers.raw_items()}
 
 
 def _query(request: Request) -> tuple[str | None, int | None]:

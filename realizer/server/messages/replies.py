@@ -143,7 +143,17 @@ class StateMessage(Reply):
 
 
 ErrorCode = Literal[
-    "bad-json", "too-large", "unsupported", "invalid", "version", "clip", "face", "voice", "render"
+    "bad-json",
+    "too-large",
+    "unsupported",
+    "invalid",
+    "version",
+    "clip",
+    "face",
+    "voice",
+    "render",
+    "rate",
+    "token",
 ]
 
 

@@ -1,0 +1,169 @@
+"""A request in, whether whoever sends it may come in out; and how fast its messages are read."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+import logging
+import os
+import ssl
+from collections.abc import Iterable, Mapping
+from http import HTTPStatus
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+from realizer.server.hub import HubError
+from realizer.settings import Settings, raises
+
+__all__ = ["Guard", "Pace"]
+
+# Names of this machine for itself.
+LOOPBACK = {"localhost", "127.0.0.1", "::1"}
+# A client that brings its token in `hello` must have said it by then.
+PATIENCE = 10.0  # s
+MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
+
+
+class Guard:
+    """What a service's settings say about who may come in.
+
+    A token may come as `Authorization: Bearer TOKEN`, as `?token=TOKEN` (browsers can send no header with a
+    WebSocket), or in a `hello` that is the first message. It is compared in constant time and never logged.
+
+    A browser says which page opens a WebSocket. Pages of this machine may where the service listens to this
+    machine alone; elsewhere pages of the service's own address may; and those of `settings.origins`.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._token = None if settings.token is None else _digest(settings.token)
+        if self._token is not None:
+            # At its finest the library logs whole requests, with what is in them.
+            logging.getLogger("websockets.server").setLevel(logging.INFO)
+
+    @property
+    def asks(self) -> bool:
+        """Whether a token is wanted."""
+        return self._token is not None
+
+    def knows(self, token: str | None) -> bool:
+        """Whether this is the token; anything is where none is wanted."""
+        if self._token is None:
+            return True
+        return token is not None and hmac.compare_digest(_digest(token), self._token)
+
+    def request(self, target: str, headers: Mapping[str, str], *, later: bool = False) -> bool:
+        """Whether a request has brought the token; where it may not bring it `later`, it must have.
+
+        Args:
+            target: the request's path and query.
+            headers: by their names in small letters.
+
+        Raises:
+            HubError: 403, a page of elsewhere; 401, no token or a wrong one.
+        """
+        self._from_where(headers)
+        scheme, _, credentials = headers.get("authorization", "").partition(" ")
+        query = parse_qs(target.partition("?")[2]).get("token", [None])[-1]
+        token = credentials.strip() if scheme.lower() == "bearer" else query
+        if self.knows(token):
+            return True
+        if token is not None or not later:
+            got = "none" if token is None else "another one"
+            raise HubError(
+                HTTPStatus.UNAUTHORIZED, f"token: wanted that of this service (REALIZER_TOKEN), got {got}"
+            )
+        return False
+
+    def greets(self, message: str | bytes) -> bool:
+        """Whether a first message is a `hello` with the token."""
+        try:
+            hello = json.loads(message) if isinstance(message, str) else None
+        except ValueError:
+            return False
+        if not isinstance(hello, dict) or hello.get("type") != "hello":
+            return False
+        token = hello.get("token")
+        return isinstance(token, str) and self.knows(token)
+
+    def room(self) -> None:
+        """Whether there is memory for more.
+
+        Raises:
+            HubError: 503, there is none.
+        """
+        most = self._settings.max_memory
+        if most is not None and (used := _memory()) > most:
+            raise HubError(
+                HTTPStatus.SERVICE_UNAVAILABLE,
+                f"the service uses {used:.0f} MB: wanted at most {most} {raises('max_memory')}",
+            )
+
+    def tls(self) -> ssl.SSLContext | None:
+        """What speaks TLS with the service's certificate; None where it has none.
+
+        Raises:
+            OSError: the files do not fit each other, or are none.
+        """
+        if self._settings.tls_cert is None:
+            return None
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.minimum_version = ssl.TLSVersion.TLSv1_2
+        context.load_cert_chain(self._settings.tls_cert, self._settings.tls_key)
+        return context
+
+    def _from_where(self, headers: Mapping[str, str]) -> None:
+        origin = headers.get("origin")
+        if origin is None or "*" in self._settings.origins or _same(origin, self._settings.origins):
+            return  # programs that are no browser say none
+        try:
+            parts = urlsplit(origin.lower())
+        except ValueError:
+            parts = urlsplit("")
+        if self._settings.host in LOOPBACK:
+            # Not whatever stands in Host: a name of the attacker's may point to this machine.
+            welcome = parts.hostname in LOOPBACK
+        else:
+            welcome = parts.netloc != "" and parts.netloc == headers.get("host", "").lower()
+        if not welcome:
+            raise HubError(
+                HTTPStatus.FORBIDDEN,
+                f"origin: wanted a page of this service, got one of {origin[:200]!r}; "
+                "REALIZER_ORIGINS lets more in",
+            )
+
+
+class Pace:
+    """How long to wait before a client's next message is read, so that it has no more than its share.
+
+    Args:
+        rate: messages a second; twice as many may come at once after a pause.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._free = float("-inf")  # when everything that came would have come at that rate
+
+    def wait(self, now: float) -> float:
+        """Seconds to wait after a message that came `now`; 0 for a client that keeps to the rate."""
+        self._free = max(self._free, now) + 1.0 / self._rate
+        return max(0.0, self._free - now - 2.0)
+
+
+def _digest(token: str) -> bytes:
+    """As long for every token, so that comparing tells nothing of its length."""
+    return hashlib.sha256(token.encode("utf-8", "surrogateescape")).digest()
+
+
+def _same(origin: str, known: Iterable[str]) -> bool:
+    return origin.rstrip("/").lower() in {one.rstrip("/").lower() for one in known}
+
+
+def _memory() -> float:
+    """Megabytes of this process that are in memory; 0 where the system does not say."""
+    try:
+        pages = int(MEMORY.read_text("ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -1,0 +1,151 @@
+"""Who may come in: tokens, pages of elsewhere, a service that is full; and how fast messages are read."""
+
+from __future__ import annotations
+
+import json
+import logging
+
+import pytest
+
+from realizer.server.guard import Guard, Pace
+from realizer.server.hub import HubError
+from realizer.settings import Settings, SettingsError
+
+TOKEN = "Xk-secret-7"
+
+
+def guard(**settings) -> Guard:
+    return Guard(Settings(**settings))
+
+
+@pytest.mark.parametrize(
+    ("target", "headers"),
+    [
+        (f"/ws?session=a&token={TOKEN}", {}),
+        ("/ws", {"authorization": f"Bearer {TOKEN}"}),
+        ("/ws", {"authorization": f"bearer  {TOKEN} "}),
+    ],
+)
+def test_a_token_comes_in_the_address_or_a_header(target: str, headers: dict[str, str]) -> None:
+    assert guard(token=TOKEN).request(target, headers)
+
+
+@pytest.mark.parametrize(
+    ("target", "headers"),
+    [
+        ("/ws?token=another", {}),
+        ("/ws?token=", {"authorization": "Bearer another"}),
+        ("/ws", {"authorization": "Bearer " + TOKEN + "x"}),
+        ("/ws", {"authorization": "Bearer é\udcff"}),
+    ],
+)
+@pytest.mark.parametrize("later", [True, False])
+def test_a_wrong_token_is_refused_at_once_and_not_repeated(
+    target: str, headers: dict[str, str], later: bool
+) -> None:
+    with pytest.raises(HubError, match="wanted that of this service") as refused:
+        guard(token=TOKEN).request(target, headers, later=later)
+    assert refused.value.status == 401
+    assert TOKEN not in str(refused.value)
+    assert "another" not in str(refused.value).replace("got another one", "")
+
+
+def test_without_a_token_a_client_may_still_greet_with_it() -> None:
+    g = guard(token=TOKEN)
+    assert not g.request("/ws", {}, later=True)
+    assert g.greets(json.dumps({"type": "hello", "token": TOKEN}))
+    with pytest.raises(HubError, match="got none"):
+        g.request("/metrics", {})
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "",
+        "{",
+        "[]",
+        b"\x00",
+        '<bml id="b"/>',
+        '{"type": "hello"}',
+        '{"type": "hello", "token": "x"}',
+        '{"type": "hello", "token": ["' + TOKEN + '"]}',
+        '{"type": "state", "token": "' + TOKEN + '"}',
+    ],
+)
+def test_any_other_first_message_is_no_greeting(message: str | bytes) -> None:
+    assert not guard(token=TOKEN).greets(message)
+
+
+def test_without_a_token_in_the_settings_nobody_is_asked() -> None:
+    assert guard().request("/ws?token=anything", {})
+
+
+@pytest.mark.parametrize(
+    ("host", "headers", "origins", "welcome"),
+    [
+        ("127.0.0.1", {}, (), True),
+        ("127.0.0.1", {"origin": "http://localhost:3000"}, (), True),
+        ("127.0.0.1", {"origin": "http://[::1]:8765"}, (), True),
+        ("127.0.0.1", {"origin": "https://evil.example"}, (), False),
+        ("127.0.0.1", {"origin": "null"}, (), False),
+        ("127.0.0.1", {"origin": "null"}, ("null",), True),
+        # A name of the attacker's that points to this machine.
+        ("127.0.0.1", {"origin": "http://evil.example:8765", "host": "evil.example:8765"}, (), False),
+        ("127.0.0.1", {"origin": "http://localhost.evil.example"}, (), False),
+        ("0.0.0.0", {"origin": "http://face.example:8765", "host": "face.example:8765"}, (), True),
+        ("0.0.0.0", {"origin": "http://evil.example", "host": "face.example:8765"}, (), False),
+        ("0.0.0.0", {"origin": "http://localhost", "host": "face.example"}, (), False),
+        ("0.0.0.0", {"origin": "https://evil.example"}, ("https://app.example/",), False),
+        ("0.0.0.0", {"origin": "https://app.example"}, ("https://app.example/",), True),
+        ("0.0.0.0", {"origin": "https://evil.example"}, ("*",), True),
+        ("0.0.0.0", {"origin": "http://["}, (), False),
+    ],
+)
+def test_pages_of_elsewhere_stay_out(
+    host: str, headers: dict[str, str], origins: tuple[str, ...], welcome: bool
+) -> None:
+    g = guard(host=host, origins=origins)
+    if welcome:
+        assert g.request("/ws", headers)
+        return
+    with pytest.raises(HubError, match="REALIZER_ORIGINS lets more in") as refused:
+        g.request("/ws", headers)
+    assert refused.value.status == 403
+
+
+def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
+    guard(max_memory=10**7).room()
+    full = guard(max_memory=64)
+    with pytest.raises(HubError, match=r"wanted at most 64 \(REALIZER_MAX_MEMORY sets it\)") as refused:
+        full.room()
+    assert refused.value.status == 503
+
+
+def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
+    settings = Settings(token=TOKEN, stomp_password=TOKEN)
+    assert TOKEN not in repr(settings)
+    with pytest.raises(SettingsError, match="setting token: wanted a word, got something else"):
+        Settings(token=[TOKEN])  # type: ignore[arg-type]
+
+
+def test_the_library_below_does_not_log_requests_where_there_is_a_token() -> None:
+    logger = logging.getLogger("websockets.server")
+    before = logger.level
+    try:
+        guard(token=TOKEN)
+        assert not logger.isEnabledFor(logging.DEBUG)
+    finally:
+        logger.setLevel(before)
+
+
+def test_a_client_that_keeps_to_its_rate_never_waits() -> None:
+    pace = Pace(10)
+    assert all(pace.wait(k / 10) == 0.0 for k in range(1000))
+
+
+def test_a_flood_is_read_at_the_rate_after_a_first_burst() -> None:
+    pace, now, read = Pace(10), 0.0, 0
+    while now < 60.0:
+        now += pace.wait(now)
+        read += 1
+    assert 600 <= read <= 10 * 62 + 1
