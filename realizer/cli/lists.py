@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+from importlib.util import find_spec
+
 import click
 
 __all__: list[str] = []
+
+MODULES = {"film": "av"}  # an extra, and what it installs
 
 
 @click.command()
@@ -18,10 +23,21 @@ def voices() -> None:
 
 @click.command()
 def outputs() -> None:
-    """List what `realize -o` can write, by suffix."""
+    """List what `realize -o` can write, by suffix, and how to get what is missing for it."""
     from realizer.outputs import OUTPUTS
 
     width, kinds = (max(map(len, column)) for column in (OUTPUTS, (o.media_type for o in OUTPUTS.values())))
     for suffix, output in sorted(OUTPUTS.items()):
-        needs = f"  (needs bml-realizer[{output.needs}])" if output.needs else ""
-        click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.says}{needs}")
+        fixes = [fix for fix in map(_missing, output.needs) if fix is not None]
+        mark = f"  (missing: {'; '.join(fixes)})" if fixes else ""
+        click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.says}{mark}")
+
+
+@cache
+def _missing(extra: str) -> str | None:
+    """What to do about an extra that is not there, or does not work here."""
+    if extra == "render":
+        from realizer.render import available
+
+        return available()
+    return None if find_spec(MODULES[extra]) else f"pip install 'bml-realizer[{extra}]'"

@@ -209,7 +209,9 @@ def _av() -> Any:
     return av
 
 
+NEEDS = ("render", "film")
+
 OUTPUTS = (
-    Output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC", write_film, "film", _draws),
-    Output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus", write_film, "film", _draws),
+    Output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC", write_film, NEEDS, _draws),
+    Output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus", write_film, NEEDS, _draws),
 )

@@ -58,7 +58,7 @@ class Output:
         media_type: such as "video/mp4".
         says: one line for `realizer outputs`.
         write: (realization, path, drawing) -> None; `path` may be any place that can be written.
-        needs: the extra to install, or "" if it always works.
+        needs: the extras to install; () if it always works.
         draws: width and height of its pictures, and whether they may be transparent; None: there are none.
     """
 
@@ -66,7 +66,7 @@ class Output:
     media_type: str
     says: str
     write: Callable[[Realization, Path, Drawing], None]
-    needs: str = ""
+    needs: tuple[str, ...] = ()
     draws: Callable[[Drawing], tuple[tuple[int, int], bool]] | None = None
 
     def begin(self, drawing: Drawing, face: str, deformer: str | None = None) -> Drawing:

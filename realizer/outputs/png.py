@@ -111,5 +111,5 @@ def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
 
 
 OUTPUTS = (
-    Output(".png", "image/png", "a contact sheet over time, or one instant", write_png, "render", _draws),
+    Output(".png", "image/png", "a contact sheet over time, or one instant", write_png, ("render",), _draws),
 )

@@ -79,5 +79,5 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 
 OUTPUTS = (
-    Output(".webp", "image/webp", "animated picture without sound", write_webp, "render", _draws),
+    Output(".webp", "image/webp", "animated picture without sound", write_webp, ("render",), _draws),
 )  # fmt: skip
