@@ -176,6 +176,7 @@ DOORS = {
     "espeakng_loader": ("realizer.speech.espeak_worker",),
     "hibari": ("realizer.speech.hibari", "realizer.speech.hibari_worker"),
     "onnxruntime": ("realizer.speech.hibari_worker",),
+    "redis": ("realizer.server.journal.shared",),
     "pocketsphinx": ("realizer.speech.align.sphinx",),
     "stomp": ("realizer.server.doors.broker",),
 }

@@ -1,0 +1,22 @@
+"""What happened to a session, kept: another process can go on with it, and anybody can play it again."""
+
+from __future__ import annotations
+
+from realizer.server.journal.entry import Entry, Journal, JournalError, Lost
+
+__all__ = ["Entry", "Journal", "JournalError", "Lost", "journal_at"]
+
+
+def journal_at(where: str) -> Journal:
+    """The journal a setting names: redis://HOST:PORT/N, which many nodes share, or a file of this machine.
+
+    Raises:
+        JournalError: it cannot be opened, or something must be installed.
+    """
+    if where.startswith(("redis://", "rediss://", "unix://")):
+        from realizer.server.journal.shared import SharedJournal
+
+        return SharedJournal(where)
+    from realizer.server.journal.local import LocalJournal
+
+    return LocalJournal(where.removeprefix("sqlite://"))

@@ -1,0 +1,90 @@
+"""A journal in a file of this machine (SQLite): what a service that was killed goes on with afterwards."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+
+from realizer.server.journal.entry import Entry, JournalError, Lost
+
+__all__ = ["LocalJournal"]
+
+TABLES = """
+CREATE TABLE IF NOT EXISTS sessions (id TEXT PRIMARY KEY, owner TEXT NOT NULL, epoch REAL NOT NULL);
+CREATE TABLE IF NOT EXISTS entries (n INTEGER PRIMARY KEY, session TEXT NOT NULL, line TEXT NOT NULL);
+CREATE INDEX IF NOT EXISTS of_session ON entries (session, n);
+"""
+# How long a write waits for another worker's.
+BUSY = 2.0  # s
+
+
+class LocalJournal:
+    """The file of that name, made where it is not there; several workers of one machine may share it.
+
+    A killed process loses nothing of it; a machine that loses power may lose its last moments.
+
+    Raises:
+        JournalError: the file cannot be had.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = path
+        self._owner = secrets.token_hex(8)
+        with self._told():
+            # Each statement by itself: what is added is safe at once.
+            self._file = sqlite3.connect(path, timeout=BUSY, isolation_level=None)
+            self._file.execute("PRAGMA journal_mode=WAL")
+            self._file.execute("PRAGMA synchronous=NORMAL")
+            self._file.executescript(TABLES)
+
+    def begin(self, session: str, epoch: float) -> None:
+        with self._told():
+            self._file.execute("BEGIN IMMEDIATE")
+            try:
+                self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
+                self._file.execute("REPLACE INTO sessions VALUES (?, ?, ?)", (session, self._owner, epoch))
+                self._file.execute("COMMIT")
+            except BaseException:
+                self._file.rollback()
+                raise
+
+    def add(self, session: str, entry: Entry) -> None:
+        with self._told():
+            done = self._file.execute(
+                "INSERT INTO entries (session, line) SELECT id, ? FROM sessions WHERE id = ? AND owner = ?",
+                (entry.line(), session, self._owner),
+            )
+        if not done.rowcount:
+            raise Lost(f"session {session} is another process's now")
+
+    def take(self, session: str) -> tuple[float, list[Entry]] | None:
+        with self._told():
+            mine = self._file.execute(
+                "UPDATE sessions SET owner = ? WHERE id = ? RETURNING epoch", (self._owner, session)
+            ).fetchone()
+            lines = self._file.execute(
+                "SELECT line FROM entries WHERE session = ? ORDER BY n", (session,)
+            ).fetchall()
+        return None if mine is None else (mine[0], [Entry.read(line) for (line,) in lines])
+
+    def end(self, session: str) -> None:
+        with contextlib.suppress(JournalError), self._told():
+            gone = self._file.execute(
+                "DELETE FROM sessions WHERE id = ? AND owner = ?", (session, self._owner)
+            )
+            if gone.rowcount:
+                self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
+
+    def close(self) -> None:
+        with contextlib.suppress(sqlite3.Error):
+            self._file.close()
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except (sqlite3.Error, OSError) as error:
+            raise JournalError(f"the journal {self._path}: {error}") from None

@@ -1,0 +1,102 @@
+"""A journal that many nodes share (Redis): whichever of them a client comes to goes on with its session."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+from collections.abc import Iterator
+from typing import Any
+
+from realizer.server.journal.entry import Entry, JournalError, Lost
+
+__all__ = ["SharedJournal"]
+
+PATIENCE = 1.0  # s for an answer
+# Sessions whose node died and that nobody came back to are forgotten after so long.
+KEPT = 7 * 24 * 3600  # s
+
+# KEYS: of the head (owner, epoch) and of the list of entries. Nobody comes between the look and the write.
+ADD = """
+if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
+redis.call('RPUSH', KEYS[2], ARGV[2])
+redis.call('EXPIRE', KEYS[1], ARGV[3])
+redis.call('EXPIRE', KEYS[2], ARGV[3])
+return 1
+"""
+TAKE = """
+if redis.call('EXISTS', KEYS[1]) == 0 then return false end
+redis.call('HSET', KEYS[1], 'owner', ARGV[1])
+return {redis.call('HGET', KEYS[1], 'epoch'), redis.call('LRANGE', KEYS[2], 0, -1)}
+"""
+END = """
+if redis.call('HGET', KEYS[1], 'owner') == ARGV[1] then redis.call('DEL', KEYS[1], KEYS[2]) end
+"""
+
+
+class SharedJournal:
+    """The store at a URL such as redis://HOST:6379/0. An entry is one round trip.
+
+    Raises:
+        JournalError: it cannot be reached, or its client is not installed.
+    """
+
+    def __init__(self, url: str) -> None:
+        try:
+            import redis
+        except ImportError:
+            raise JournalError("a journal in Redis: pip install 'bml-realizer[cluster]'") from None
+        self._url = url.rpartition("@")[2]  # a password is nobody's business
+        self._owner = secrets.token_hex(8)
+        self._faults: tuple[type[Exception], ...] = (redis.RedisError, OSError)
+        try:
+            self._store: Any = redis.Redis.from_url(
+                url, socket_timeout=PATIENCE, socket_connect_timeout=PATIENCE, decode_responses=True
+            )
+        except ValueError as error:
+            raise JournalError(f"the journal {self._url}: {error}") from None
+        self._add, self._take, self._end = map(self._store.register_script, (ADD, TAKE, END))
+        with self._told():
+            self._store.ping()
+
+    def begin(self, session: str, epoch: float) -> None:
+        head, entries = _keys(session)
+        with self._told():
+            pipe = self._store.pipeline()
+            pipe.delete(entries)
+            pipe.hset(head, mapping={"owner": self._owner, "epoch": repr(epoch)})
+            pipe.expire(head, KEPT)
+            pipe.execute()
+
+    def add(self, session: str, entry: Entry) -> None:
+        with self._told():
+            done = self._add(_keys(session), [self._owner, entry.line(), KEPT])
+        if not done:
+            raise Lost(f"session {session} is another node's now")
+
+    def take(self, session: str) -> tuple[float, list[Entry]] | None:
+        with self._told():
+            there = self._take(_keys(session), [self._owner])
+        if there is None:
+            return None
+        epoch, lines = there
+        return float(epoch), [Entry.read(line) for line in lines]
+
+    def end(self, session: str) -> None:
+        with contextlib.suppress(JournalError), self._told():
+            self._end(_keys(session), [self._owner])
+
+    def close(self) -> None:
+        with contextlib.suppress(*self._faults):
+            self._store.close()
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except self._faults as error:
+            raise JournalError(f"the journal {self._url}: {error}") from None
+
+
+def _keys(session: str) -> list[str]:
+    """The braces keep both in one place of a cluster."""
+    return [f"realizer:{{{session}}}", f"realizer:{{{session}}}:entries"]

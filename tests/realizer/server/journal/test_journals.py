@@ -1,0 +1,86 @@
+"""What every journal holds to, wherever it keeps its entries."""
+
+from __future__ import annotations
+
+import uuid
+from pathlib import Path
+
+import pytest
+
+from realizer.server.journal import Entry, JournalError, Lost, journal_at
+
+ENTRIES = [
+    Entry(0.0, "join", 1),
+    Entry(0.25, "text", 1, '<bml id="b"><speech id="s"><text>Grüße\n\u2028</text></speech></bml>'),
+    Entry(0.5, "sound", 1, bytes(range(256))),
+    Entry(0.75, "spoken", 3, "the voice failed"),
+    Entry(0.875, "tick"),
+]
+
+
+@pytest.fixture
+def session() -> str:
+    return f"s-{uuid.uuid4()}"
+
+
+def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, session: str) -> None:
+    one, other = journal_at(where), journal_at(where)
+    one.begin(session, 1234.5)
+    for entry in ENTRIES:
+        one.add(session, entry)
+    assert other.take(session) == (1234.5, ENTRIES)
+    one.close()
+    other.close()
+
+
+def test_who_has_lost_a_session_is_told_when_it_writes(where: str, session: str) -> None:
+    one, other = journal_at(where), journal_at(where)
+    one.begin(session, 0.0)
+    assert other.take(session) == (0.0, [])
+    with pytest.raises(Lost, match=session):
+        one.add(session, ENTRIES[0])
+    other.add(session, ENTRIES[1])
+    one.end(session)  # which is not its any more
+    assert one.take(session) == (0.0, [ENTRIES[1]])
+
+
+def test_a_session_that_ended_or_never_was_is_not_taken(where: str, session: str) -> None:
+    journal = journal_at(where)
+    assert journal.take(session) is None
+    journal.begin(session, 0.0)
+    journal.add(session, ENTRIES[0])
+    journal.end(session)
+    assert journal.take(session) is None
+
+
+def test_a_session_that_begins_again_has_nothing_of_the_one_before(where: str, session: str) -> None:
+    journal = journal_at(where)
+    journal.begin(session, 1.0)
+    journal.add(session, ENTRIES[0])
+    journal.begin(session, 2.0)
+    assert journal.take(session) == (2.0, [])
+
+
+def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -> None:
+    journal = journal_at(where)
+    for name, entry in ((session, ENTRIES[0]), (session + "~", ENTRIES[1])):
+        journal.begin(name, 0.0)
+        journal.add(name, entry)
+    assert journal.take(session) == (0.0, [ENTRIES[0]])
+
+
+@pytest.mark.parametrize(
+    "where", ["/nowhere/at/all.db", "redis://127.0.0.1:1/0", "redis://:hush@127.0.0.1:1/0"]
+)
+def test_a_journal_that_cannot_be_had_says_so_without_its_password(where: str) -> None:
+    with pytest.raises(JournalError, match=r"^the journal \S+: \w") as fault:
+        journal_at(where)
+    assert "hush" not in str(fault.value)
+
+
+def test_a_file_that_is_no_journal_is_not_written_to(tmp_path: Path) -> None:
+    path = tmp_path / "notes.txt"
+    path.write_text("something of mine, of more than a few bytes\n" * 40)
+    with pytest.raises(JournalError, match="not a database"):
+        journal_at(str(path))
+    assert path.read_text().startswith("something of mine")
