@@ -245,6 +245,32 @@ def realize(
     accepted, refused = play(texts, player, voice)
     # Blocks act on each other while they play: what is seen and heard is known when all of them have ended.
     told = player.due(float("inf"))
+    return seen(
+        player, told, accepted, refused, fps=fps, face=face_name(face), deformer=deformer, mapping=in_force
+    )
+
+
+def seen(
+    player: Player,
+    told: Sequence[Feedback],
+    accepted: Sequence[Schedule],
+    refused: Sequence[Warning] = (),
+    *,
+    fps: float,
+    face: str,
+    deformer: str | None = None,
+    mapping: FapMapping,
+) -> Realization:
+    """What a player has played to its end, of which it has forgotten nothing.
+
+    Args:
+        told: all its feedback.
+        accepted: the schedules that it gave.
+        refused: what it did not take.
+
+    Raises:
+        RealizerError: it lasts too long.
+    """
     schedules = [player.latest(s) for s in accepted]
     end = player.end
     count = frame_count(end, fps)
@@ -259,7 +285,7 @@ def realize(
         step = max(1, int(WINDOW * fps))
         windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
         aus = AUFrames.joined(windows)
-        characters[name] = Performance(aus, to_fap(aus, in_force))
+        characters[name] = Performance(aus, to_fap(aus, mapping))
     speaking = player.speech()
     # Those of planning say more than what is told of them; others arise while blocks play.
     planned = {(w.id, w.type, w.text): w for w in (*refused, *(w for s in schedules for w in s.warnings))}
@@ -268,7 +294,7 @@ def realize(
     return Realization(
         fps=fps,
         duration=end,
-        face_name=face_name(face),
+        face_name=face,
         characters=characters,
         schedules=tuple(schedules),
         told=tuple(told),
@@ -276,7 +302,7 @@ def realize(
         refused=tuple(w.text for w in refused),
         speaking=speaking,
         deformer=deformer,
-        mapping=in_force,
+        mapping=mapping,
     )
 
 
