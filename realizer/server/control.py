@@ -259,10 +259,11 @@ def _set(session: Session, message: SetMessage, t: float) -> None:
         if not names:
             raise Wrong("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
         values |= dict.fromkeys(names, value)
+    movable = {row.name for row in rows[2:]}
     for name, value in message.faps.items():
         if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
             name = rows[int(name) - 1].name
-        if name not in [row.name for row in rows[2:]]:
+        if name not in movable:
             raise Wrong("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
         values[name] = value
     feeling = _feeling(message.emotion) if "emotion" in message.model_fields_set else None
