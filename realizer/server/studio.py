@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -18,8 +20,10 @@ if TYPE_CHECKING:
 
 __all__: list[str] = []
 
-# Pictures of different faces, sizes and cameras each have a process; more than these are not kept.
-RENDERERS = 4
+# Pictures of different faces, sizes, cameras, lights and backgrounds each have a process: so many at a time.
+RENDERERS = 6
+# One that nobody has looked at for so long makes room for another one.
+IDLE = 5.0  # s
 
 
 class Studio:
@@ -27,15 +31,19 @@ class Studio:
 
     Args:
         deformer: what moves faces, in spite of what they say themselves.
+        clock: seconds that only rise.
     """
 
-    def __init__(self, deformer: str | None = None) -> None:
+    def __init__(self, deformer: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._deformer = deformer
+        self._clock = clock
         # Two texts can be spoken at a time: one long text must not hold up the short ones of all others.
         self.speakers = ThreadPoolExecutor(2, "voice")
-        self.drawers = ThreadPoolExecutor(1, "renderer")
+        # And a process that starts must not hold up the pictures of all others.
+        self.drawers = ThreadPoolExecutor(2, "renderer")
         self._voices: dict[str | None, Voice] = {}
-        self._renderers: dict[tuple[str, Look], Renderer] = {}
+        # (face, look) -> its renderer and when it was last asked, the longest ago first.
+        self._renderers: dict[tuple[str, Look], tuple[Renderer, float]] = {}
         self._lock = threading.Lock()
         self._said: set[str] = set()
 
@@ -71,7 +79,7 @@ class Studio:
         self.drawers.shutdown(wait=False, cancel_futures=True)
         for voice in self._voices.values():
             voice.close()
-        for renderer in self._renderers.values():
+        for renderer, _ in self._renderers.values():
             renderer.close()
 
     def _voice(self, name: str | None) -> Voice:
@@ -83,22 +91,38 @@ class Studio:
             return self._voices[name]
 
     def _renderer(self, order: Draw) -> Renderer:
+        """The renderer of a face and a look.
+
+        Raises:
+            RenderError: there are too many that somebody looks at.
+        """
         from realizer.render import Renderer
 
         look = replace(order.look, quality=0, form="jpeg")  # which need no other process
-        key = (order.face, look)
-        if key not in self._renderers:
-            if len(self._renderers) >= RENDERERS:
-                self._renderers.pop(next(iter(self._renderers))).close()
-            self._renderers[key] = Renderer(
-                order.face,
-                look.size,
-                look.camera,
-                light=look.light,
-                background=look.background,
-                deformer=self._deformer,
-            )
-        return self._renderers[key]
+        key, now, left = (order.face, look), self._clock(), None
+        with self._lock:
+            renderer, _ = self._renderers.pop(key, (None, now))
+            if renderer is None:
+                if len(self._renderers) >= RENDERERS:
+                    oldest, (_, used) = next(iter(self._renderers.items()))
+                    if now - used < IDLE:
+                        raise RenderError(
+                            f"{RENDERERS} different pictures (face, size, camera, light, background) are "
+                            "drawn already: wanted one of them, or fewer"
+                        )
+                    left, _ = self._renderers.pop(oldest)
+                renderer = Renderer(
+                    order.face,
+                    look.size,
+                    look.camera,
+                    light=look.light,
+                    background=look.background,
+                    deformer=self._deformer,
+                )
+            self._renderers[key] = (renderer, now)
+        if left is not None:
+            left.close()
+        return renderer
 
     def _tell(self, fault: str) -> None:
         if fault not in self._said:
