@@ -20,6 +20,7 @@ from realizer.server.connection import (
     Subscription,
 )
 from realizer.server.effects import Look
+from realizer.server.limits import MAX_CHARACTERS, too_many_pixels
 from realizer.server.messages import (
     PICTURES,
     PROTOCOL,
@@ -47,15 +48,13 @@ from realizer.server.messages import (
 )
 from realizer.server.speeches import SpeechError
 from realizer.server.streams import arkit_names
+from realizer.settings import raises
 from realizer.tables import faps
 
 if TYPE_CHECKING:
     from realizer.server.session import Session
 
 __all__: list[str] = []
-
-# The index of a character is one byte on the wire; sixteen faces in one session are a crowd.
-MAX_CHARACTERS = 16
 
 
 def follow(session: Session, connection: Connection, message: Control, t: float) -> None:
@@ -201,7 +200,10 @@ def _look(session: Session, message: Subscribe, index: int) -> Look:
     settings = session.settings
     largest = settings.max_size
     if not all(16 <= side <= largest for side in message.size):
-        raise Wrong("size", f"wanted sides of 16..{largest} pixels, got {list(message.size)}")
+        words = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {raises('max_size')}"
+        raise Wrong("size", words)
+    if (beyond := too_many_pixels(message.size, message.fps or settings.fps, settings)) is not None:
+        raise Wrong("fps", beyond)
     if message.light is not None and message.light not in presets():
         raise Wrong("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
     face = session.face(index)

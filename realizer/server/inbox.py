@@ -11,6 +11,7 @@ from bml_schema import Block, BMLError, read
 from realizer.behaviours import VOCABULARY
 from realizer.pipeline import warning_of
 from realizer.scheduling.timing import Warning
+from realizer.settings import raises
 
 __all__: list[str] = []
 
@@ -43,6 +44,7 @@ class Inbox:
             words = f"{MOST} messages wait to be read: wanted fewer at a time"
         elif size > self._longest:
             words = f"wanted at most {self._longest} bytes of BML in a message, got {size}"
+            words = f"{words} {raises('max_document')}"
         else:
             self._unread.append(read(text, VOCABULARY))
             return None

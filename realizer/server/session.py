@@ -19,10 +19,11 @@ from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
 from realizer.server.clips import ClipError, Clips
 from realizer.server.connection import STUCK, Connection
-from realizer.server.control import MAX_CHARACTERS, follow
+from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send, Speak
 from realizer.server.feedback_log import FeedbackLog
 from realizer.server.inbox import Inbox
+from realizer.server.limits import MAX_CHARACTERS, beyond
 from realizer.server.messages import (
     MAX_CONTROL,
     MAX_FPS,
@@ -342,19 +343,10 @@ class Session:
         self.preparation.remove(gone)
 
     def _beyond_limits(self, block: Block) -> str | None:
-        limits = self.settings
         if self.ending:
             return "the service is ending and takes no more documents"
-        if len(block.behaviours) > limits.max_behaviours:
-            return (
-                f"wanted at most {limits.max_behaviours} behaviours in a block, got {len(block.behaviours)}"
-            )
-        if len(self.preparation) + self.player.alive >= limits.max_blocks:
-            return f"{limits.max_blocks} blocks play or wait: wanted fewer at a time"
-        known = self.player.characters
-        if block.character_id not in (None, *known) and len(known) >= MAX_CHARACTERS:
-            return f"wanted at most {MAX_CHARACTERS} characters in a session"
-        return None
+        busy = len(self.preparation) + self.player.alive
+        return beyond(block, self.settings, busy, self.player.characters)
 
     def _internal(self, block: Block, t: float) -> None:
         """A bug: the traceback is ours, the client gets the block's id."""
