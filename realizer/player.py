@@ -37,6 +37,8 @@ __all__ = ["Player", "Speaking"]
 
 # Frames up to this long before `now` can still be asked for.
 HISTORY = 1.0  # s
+# What goes with speech comes no farther from it.
+NEAR = 5.0  # s
 
 
 class Player:
@@ -252,9 +254,16 @@ class Player:
         if self.idle:
             seed = self.world.seed + 7919 * character
             said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
-            talks = [Talk(s.start, s.until, s.utterance) for s in said]
+            talks = [
+                Talk(s.start + at, s.until, part)
+                for s in said
+                for at, part in s.utterance.parts or [(0.0, s.utterance)]
+            ]
+            near = [
+                t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
+            ]
             channels += idle_channels(first, last, seed, phrase_ends(talks))
-            channels += prosody_channels(talks, first, last, seed, asked)
+            channels += prosody_channels(near, first, last, seed, asked)
         return channels
 
     @property

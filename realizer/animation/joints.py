@@ -14,6 +14,8 @@ __all__ = ["joined"]
 
 # s; a face is back on its new course after that: about the attack of an expression.
 HEALS = 0.3
+# s; keys that differ by less are the same, solved again.
+SAME = 1e-9
 # s; over which a slope is measured.
 STEP = 1e-4
 
@@ -25,22 +27,34 @@ def joined(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[
         old: of one behaviour; those that others took the place of before stay as they are.
         new: of the same behaviour at other times; they take over the gains of the old ones.
     """
-    kept = tuple(c for c in old if c.until < float("inf"))
+    kept = [c for c in old if c.until < float("inf")]
     playing = [c for c in old if c.until == float("inf")]
-    pairs = [(c, _twin(c, n, playing, new)) for n, c in enumerate(playing)]
+    # Of a speech that grows most is as it was.
+    there = {(id(c.values), c.target): c for c in playing if c.joint is None and not c.gains}
+    stays: set[int] = set()
+    news: list[Channel] = []
+    for channel in new:
+        was = there.get((id(channel.values), channel.target))
+        if was is not None and np.abs(was.times - channel.times).max() < SAME:
+            stays.add(id(was))
+        else:
+            news.append(channel)
+    kept += [c for c in playing if id(c) in stays]
+    playing = [c for c in playing if id(c) not in stays]
+    pairs = [(c, _twin(c, n, playing, news)) for n, c in enumerate(playing)]
     follow = [(c, replace(twin, gains=c.gains)) for c, twin in pairs if twin is not None]
     lonely = [c.faded(now, now + HEALS) for c, twin in pairs if twin is None]
     taken = {id(twin) for _, twin in pairs}
-    fresh = [c for c in new if id(c) not in taken]
+    fresh = [c for c in news if id(c) not in taken]
     if not follow:
         return (*kept, *lonely, *fresh)
     before, after = (list(side) for side in zip(*follow, strict=True))
     shown = sample([*before, *after], np.array([now, now + STEP])).reshape(2, len(follow), 2)
     value, ahead = (shown[0] - shown[1]).T
-    there = weights([*before, *after], np.array([now])).reshape(2, len(follow))
+    present = weights([*before, *after], np.array([now])).reshape(2, len(follow))
     joints = [
         replace(c, joint=Joint(now, float(v), float((a - v) / STEP), HEALS, float(share)))
-        for c, v, a, share in zip(after, value, ahead, there[0] - there[1], strict=True)
+        for c, v, a, share in zip(after, value, ahead, present[0] - present[1], strict=True)
     ]
     return (*kept, *(replace(c, until=now) for c in before), *joints, *lonely, *fresh)
 

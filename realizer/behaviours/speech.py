@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
@@ -89,11 +90,26 @@ def bend(node: Speech, world: World) -> Timing | None:
 
 def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
     """Lips, jaw and tongue, from the phonemes."""
+    utterance, start = world.utterances[node.id], float(times[0])
+    parts = utterance.parts or ((0.0, utterance),)
+    return tuple(channel.named(node.id) for at, part in parts for channel in _lips(part, start + at))
+
+
+# Utterance -> its lips, and when it starts. A long text grows part by part: what was there is not made again.
+_made: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = WeakKeyDictionary()
+
+
+def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
     # Imported here: it reads its tables, which a block without speech does not need.
     from realizer.animation.lips import lip_channels
 
-    channels = lip_channels(world.utterances[node.id].phonemes, float(times[0]))
-    return tuple(channel.named(node.id) for channel in channels)
+    if utterance not in _made:
+        _made[utterance] = start, lip_channels(utterance.phonemes, start)
+    before, channels = _made[utterance]
+    if start != before:
+        channels = tuple(channel.shifted(start - before) for channel in channels)
+        _made[utterance] = start, channels
+    return channels
 
 
 def check(node: Speech, world: World) -> tuple[Fault, ...]:

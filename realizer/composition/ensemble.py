@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 from bml_schema import Block, Feedback
 from realizer.behaviours.kind import Act, Kind, World
@@ -238,8 +239,12 @@ class Ensemble:
         """
         self.advance(now)
         playing = self.cast.find(id)
-        if playing is None or behaviour not in playing.plan.timings or playing.start == FOREVER:
+        if playing is None or behaviour not in playing.plan.timings:
             return False
+        if playing.start == FOREVER:  # it is planned when that is known
+            utterances = {**playing.world.utterances, behaviour: utterance}
+            playing.world = replace(playing.world, utterances=utterances)
+            return True
         playing.respeak(behaviour, utterance, now)
         self.course.changed()
         self.course.solve_again([playing, *self.course.tied(playing, now)], playing.start, now)

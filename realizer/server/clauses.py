@@ -8,11 +8,12 @@ from typing import Any
 
 from realizer import tables
 
-__all__ = ["TAG", "Clauses"]
+__all__ = ["TAG", "Clauses", "whole"]
 
 # A tag; groups: "/" of an end, name, attributes, "/" of one without an inside.
 TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
 BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # a tag of which more is to come
+ENTITY = re.compile(r"&#?\w{1,10}$")  # of which the semicolon is to come
 LONGEST_TAG = 2000  # characters; what is longer is no tag
 MOST = 20_000  # characters; what waits no longer for its end tag
 
@@ -47,6 +48,12 @@ class Clauses:
         return [piece for piece in pieces if piece.strip()]
 
 
+def whole(piece: str) -> bool:
+    """Whether a piece ends as a sentence does."""
+    said = TAG.sub("", piece).rstrip()
+    return bool(_ending().search(said)) and not _abbreviated(said)
+
+
 def _end(text: str, *, first: bool, closed: bool) -> int | None:
     """How long the first piece of a text is; None while it is not whole."""
     facts = _facts()
@@ -74,6 +81,8 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
                 kind, stop = sign.lastgroup, sign.end()
                 follows = run[stop : stop + 1]
                 if kind == "sentence" and _abbreviated(text[:at] + run[:stop]):
+                    continue
+                if sign[0][0] == ";" and ENTITY.search(run[: sign.start()]):
                     continue
                 if not follows and kind == "sentence" and end < len(text):
                     break  # a tag follows at once: it is seen when that is past

@@ -305,7 +305,7 @@ def _state(session: Session, connection: Connection, t: float) -> StateMessage:
         time=t,
         blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
         characters=faces,
-        voice=VoiceState(name=session.settings.voice, fault=session.voice_fault),
+        voice=VoiceState(name=session.settings.voice, fault=session.orders.fault),
         connections=len(session.connections),
         dropped=connection.dropped,
     )

@@ -11,7 +11,7 @@ from bml_schema import Block
 from realizer.animation.mapping import FapMapping
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
-from realizer.errors import RealizerError, VoiceError
+from realizer.errors import RealizerError
 from realizer.mapping import mapping_of
 from realizer.pipeline import as_it_is, warped
 from realizer.player import Player
@@ -20,7 +20,7 @@ from realizer.server.broadcast import Broadcast
 from realizer.server.clips import ClipError, Clips
 from realizer.server.connection import STUCK, Connection
 from realizer.server.control import follow
-from realizer.server.effects import Close, Effect, Move, Send, Speak
+from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.feedback_log import FeedbackLog
 from realizer.server.inbox import Inbox
 from realizer.server.limits import MAX_CHARACTERS, beyond
@@ -36,12 +36,12 @@ from realizer.server.messages import (
     Welcome,
     parse_control,
 )
+from realizer.server.orders import Orders
 from realizer.server.preparation import Preparation, Waiting
 from realizer.server.speeches import Speeches
 from realizer.server.streams import EPSILON
 from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
-from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Say, Utterance
 
 if TYPE_CHECKING:
@@ -53,8 +53,6 @@ log = logging.getLogger(__name__)
 
 # Feedback that is kept for clients that come back: about an hour of talk.
 LOG = 10_000
-# A voice that has not answered by then is taken for silent.
-SPEAK_DEADLINE = 20.0  # s
 
 
 class Session:
@@ -111,11 +109,10 @@ class Session:
         self.capabilities = dict(capabilities or {})
         self.faces: dict[int, str] = {}
         self.voices: dict[int, str] = {}
-        self.voice_fault: str | None = None
         self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
         self.preparation = Preparation()
         self.speeches = Speeches(self.player)
-        self._speaks = 0
+        self.orders = Orders(self.player, self.preparation)
         self._connections: dict[int, Connection] = {}
         self._inbox = Inbox(settings.max_document)
         self.log = FeedbackLog(LOG, epoch)
@@ -198,10 +195,7 @@ class Session:
         """The voice's answer to a Speak. Where it failed, the silent voice takes over."""
         if self.closed:
             return
-        if isinstance(result, Utterance):
-            self.preparation.spoken(speak, result)
-        else:
-            self._silently(speak, str(result))
+        self._effects += self.orders.answer(speak, result, now - self.opened)
         self.tick(now)
 
     def drawn(self, draw: int, result: bytes | RealizerError, now: float) -> None:
@@ -228,8 +222,8 @@ class Session:
         self._publish(t)
         self._effects += self.broadcast.due(self._connections.values(), t)
         if self.preparation.waiting:
-            for speak in self.preparation.overdue(t + EPSILON - SPEAK_DEADLINE):
-                self._silently(speak, f"the voice has not answered for {SPEAK_DEADLINE:g} s")
+            overdue = self.orders.overdue(t + EPSILON)
+            self._effects += overdue
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
         done = self._submit_ready(t) or self._read_one(t)
@@ -245,7 +239,7 @@ class Session:
         deadlines = [
             self.player.next_deadline(),
             self.broadcast.next_deadline(self._connections.values()),
-            self.preparation.deadline(SPEAK_DEADLINE),
+            self.orders.deadline(),
         ]
         known = [d for d in deadlines if d is not None]
         return min(known) + self.opened if known else None
@@ -286,7 +280,7 @@ class Session:
         except Exception:
             self._internal(block, t)
             return
-        self._speak(waiting.says, character, wants)
+        self._speak(waiting, wants)
 
     def _submit_ready(self, t: float) -> bool:
         """Plan the first block that waits for nothing; False where all wait."""
@@ -311,8 +305,7 @@ class Session:
         if schedule.failed:
             self.speeches.refused(waiting.block.id)
         else:
-            words = (word.text for utterance in waiting.utterances.values() for word in utterance.words)
-            self.speeches.planned(waiting.block.id, " ".join(words))
+            self.speeches.planned(waiting.block.id)
         if waiting.block.composition == "REPLACE" and not schedule.failed:
             self.withdraw(self.preparation.replaced_by(waiting), t)
         return True
@@ -320,21 +313,17 @@ class Session:
     def _speak_again(self, waiting: Waiting, lengths: Mapping[str, Mapping[str, float]], t: float) -> None:
         """More of the block fits if its speech lasts so long; what comes back is taken as it is."""
         wants = self.player.wants(waiting.block)
+        again = {b: wants[b] for b in self.orders.unfinished(waiting)}
+        again |= {b: replace(wants[b], seconds=times["end"]) for b, times in lengths.items()}
         waiting.utterances = {b: as_it_is(u) for b, u in waiting.utterances.items()}
         waiting.since, waiting.final = t, True
-        self._speak(
-            waiting.says,
-            waiting.character,
-            {b: replace(wants[b], seconds=times["end"]) for b, times in lengths.items()},
-        )
+        self._speak(waiting, again)
 
-    def _speak(self, says: dict[int, tuple[str, Say]], character: int, wants: Mapping[str, Say]) -> None:
-        """Order what a voice has to say; `says` remembers it."""
-        for behaviour, say in wants.items():
-            self._speaks += 1
-            voice = say.voice or self.voices.get(character) or self.settings.voice
-            says[self._speaks] = (behaviour, replace(say, voice=voice))
-            self._effects.append(Speak(self._speaks, says[self._speaks][1]))
+    def _speak(self, waiting: Waiting, wants: Mapping[str, Say]) -> None:
+        """Order what a voice has to say."""
+        voice = self.voices.get(waiting.character) or self.settings.voice
+        chosen = {b: replace(say, voice=say.voice or voice) for b, say in wants.items()}
+        self._effects += self.orders.place(waiting, chosen)
 
     def withdraw(self, gone: list[Waiting], t: float) -> None:
         for waiting in gone:
@@ -357,18 +346,6 @@ class Session:
     def _refuse(self, warning: Warning, t: float, character: str | None = None) -> None:
         self.player.refuse(warning, t, character)
         self.speeches.refused(warning.id)
-
-    def _silently(self, speak: int, fault: str) -> None:
-        """Let the silent voice answer for one that failed; a client sees it in `state` alone."""
-        from realizer.speech import SilentVoice
-
-        say = self.preparation.said(speak)
-        if say is not None:
-            self.voice_fault = fault
-            try:
-                self.preparation.spoken(speak, fitted(SilentVoice(), say))
-            except VoiceError:
-                self.preparation.unspoken(speak)
 
     # feedback -----------------------------------------------------------------------------------
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef, read
 from realizer.behaviours import VOCABULARY
-from realizer.composition.playing import Playing
 from realizer.composition.references import redirected, references
 from realizer.player import Player
 from realizer.server.clauses import Clauses
@@ -55,7 +53,7 @@ class _Speech:
         marks: sync -> the piece it stands in.
         owed: pieces that were made and are not planned yet, in order.
         ahead: pieces that are planned and have not ended, in order.
-        said: piece -> its words, as they are planned or were heard, in order.
+        said: the words that were heard of the pieces that have ended.
         asked: its own block was given out.
         closed: nothing follows.
         over: it was cut off.
@@ -72,7 +70,7 @@ class _Speech:
     marks: dict[str, str] = field(default_factory=dict)
     owed: list[str] = field(default_factory=list)
     ahead: list[str] = field(default_factory=list)
-    said: dict[str, str] = field(default_factory=dict)
+    said: list[str] = field(default_factory=list)
     asked: bool = False
     closed: bool = False
     over: bool = False
@@ -192,13 +190,12 @@ class Speeches:
 
     # what became of them ------------------------------------------------------------------------
 
-    def planned(self, block: str, words: str) -> None:
-        """A block was taken in, and says this."""
+    def planned(self, block: str) -> None:
+        """A block was taken in."""
         speech = self._of(block)
         if speech is not None and block in speech.owed:
             speech.done(block)
             speech.ahead.append(block)
-            speech.said[block] = words
 
     def refused(self, block: str) -> None:
         """A block will not play; without the one that holds it together a speech is over."""
@@ -216,10 +213,9 @@ class Speeches:
         if speech is None:
             return feedback, frozenset()
         if block != speech.id:
+            speech.said += self._words(block, feedback.global_time)
             speech.done(block)
             speech.spoken = max(speech.spoken, feedback.global_time)
-            if feedback.said is not None:
-                speech.said[block] = feedback.said
             return feedback, frozenset()
         left = frozenset({*speech.ahead, *speech.owed})
         if feedback.status not in CUT_OFF:
@@ -228,7 +224,8 @@ class Speeches:
         speech.over = True
         if speech.closed:
             del self._speeches[speech.id]
-        return replace(feedback, said=" ".join(self._heard(speech, feedback.global_time))), left
+        words = [word for piece in speech.ahead for word in self._words(piece, feedback.global_time)]
+        return replace(feedback, said=" ".join([*speech.said, *words])), left
 
     def settle(self, t: float) -> bool:
         """Let the block of each speech end with its last piece; True where one ends at another time."""
@@ -277,17 +274,16 @@ class Speeches:
         speech.end = end
         self._player.anticipate(ENDS + speech.id, {"end": end}, t)
 
-    def _heard(self, speech: _Speech, t: float) -> Iterator[str]:
-        """What was heard of each piece; those that end just now are not told of yet."""
-        ending = {playing.block.id: playing for playing in self._player.cast.all()}
-        for piece, words in speech.said.items():
-            heard = _said(ending.get(piece), t) if piece in speech.ahead else None
-            if heard or (heard is None and words):
-                yield words if heard is None else heard
-
-
-def _said(playing: Playing | None, t: float) -> str | None:
-    return None if playing is None else playing.said(t)
+    def _words(self, piece: str, t: float) -> list[str]:
+        """The words of a piece that have sounded."""
+        playing = next((p for p in reversed(self._player.cast.all()) if p.block.id == piece), None)
+        if playing is None:
+            return []
+        heard = playing.said(t)
+        if heard is not None:
+            return heard.split()
+        order = sorted(playing.speech.values(), key=lambda s: s.start)
+        return [word.text for speaking in order for word in speaking.utterance.words]
 
 
 def _holder(speech: _Speech) -> Block:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -32,6 +33,8 @@ MESHES = 8
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
 AHEAD = 0.1  # s
+# Sound is made in blocks of so many seconds, of which so many are kept.
+BLOCK, BLOCKS = 4, 16
 # What follows the 52 weights of a frame of the stream arkit, in radians.
 TURNS = (
     *("headYaw", "headPitch", "headRoll"),
@@ -225,7 +228,7 @@ class Sound:
         self.rate = rate
         self.character = character
         self._samples = round(PACKET * rate)
-        self._cache: dict[int, tuple[Speaking, Float32]] = {}
+        self._cache: dict[tuple[int, int], tuple[Speaking, Float32]] = {}  # the latest at the end
 
     def speaking(self) -> list[Speaking]:
         """What sounds or will sound, in order of its start."""
@@ -249,10 +252,8 @@ class Sound:
         for speaking in self.speaking():
             if _end(speaking) * self.rate <= first or speaking.start * self.rate >= first + self._samples:
                 continue
-            pcm = self._pcm(speaking)
             offset = round(speaking.start * self.rate)
-            here = slice(max(0, first - offset), max(0, first + self._samples - offset))
-            piece = pcm[here]
+            piece = self._pcm(speaking, max(0, first - offset), max(0, first + self._samples - offset))
             if not len(piece):
                 continue
             if mix is None:
@@ -263,16 +264,34 @@ class Sound:
             return None
         return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
 
-    def _pcm(self, speaking: Speaking) -> Float32:
-        """(n,) float32 at the stream's rate, as a film has it; made once."""
-        known = self._cache.get(id(speaking))
-        if known is not None and known[0] is speaking:
-            return known[1]
-        pcm = heard(speaking, self.rate)
-        alive = {id(s) for s in self.player.speech()}
-        self._cache = {key: value for key, value in self._cache.items() if key in alive}
-        self._cache[id(speaking)] = (speaking, pcm)
-        return pcm
+    def _pcm(self, speaking: Speaking, first: int, last: int) -> Float32:
+        """Samples first .. last of a speech at the stream's rate, as a film has it; fewer at its end."""
+        size = BLOCK * self.rate
+        blocks = [self._block(speaking, n) for n in range(first // size, -(-last // size))]
+        whole = blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, np.float32), *blocks])
+        begin = first // size * size
+        return whole[first - begin : last - begin]
+
+    def _block(self, speaking: Speaking, number: int) -> Float32:
+        """`BLOCK` seconds of a speech: of one that lasts for minutes no more is made than is heard."""
+        key = (id(speaking), number)
+        known = self._cache.pop(key, None)
+        if known is None or known[0] is not speaking:
+            known = (speaking, self._made(speaking, number * BLOCK))
+        self._cache[key] = known
+        while len(self._cache) > BLOCKS:
+            del self._cache[next(iter(self._cache))]
+        return known[1]
+
+    def _made(self, speaking: Speaking, second: int) -> Float32:
+        utterance = speaking.utterance
+        assert utterance.pcm is not None
+        # A second more on either side, so that filters and fades are those of the whole.
+        first, rate = max(0, second - 1), utterance.sample_rate
+        pcm = utterance.pcm[first * rate : (second + BLOCK + 1) * rate]
+        part = replace(utterance, pcm=pcm, duration=len(pcm) / rate)
+        sound = heard(replace(speaking, start=speaking.start + first, utterance=part), self.rate)
+        return sound[(second - first) * self.rate : (second - first + BLOCK) * self.rate]
 
 
 def _end(speaking: Speaking) -> float:

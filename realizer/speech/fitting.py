@@ -89,6 +89,7 @@ def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
         marks={name: times[name] if name in times else moved(at) for name, at in utterance.marks.items()},
         pcm=pcm,
         stretch=(1.0, 1.0),
+        parts=(),
     )
 
 

@@ -96,6 +96,8 @@ class Utterance:
         warnings: sentences for the client, such as "the text is empty".
         stretch: the shortest and the longest it could be made, as parts of its duration, by asking the voice
             again; (1, 1) where it is as it is.
+        parts: (start, utterance) of what it was joined of; () where it is one. While a long text is being
+            made the duration is a guess, and the sound ends with the last part.
     """
 
     duration: float
@@ -106,6 +108,7 @@ class Utterance:
     pcm: Int16 | None = None
     warnings: tuple[str, ...] = field(default=())
     stretch: tuple[float, float] = (1.0, 1.0)
+    parts: tuple[tuple[float, Utterance], ...] = ()
 
 
 class Voice(Protocol):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -65,3 +67,12 @@ def test_each_target_goes_on_in_its_own_and_one_that_is_gone_fades() -> None:
     for channel, value in zip(both, sample(both, np.array([1.0 + HEALS]))[:, 0], strict=True):
         rows[channel.target.name] += value
     assert rows == {"12L": pytest.approx(0.8), "4L": pytest.approx(0.0)}
+
+
+def test_a_channel_that_is_as_it_was_stays_and_one_of_the_same_values_at_other_times_does_not() -> None:
+    stays, goes = hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 2.0, 3.0)
+    later = replace(goes, times=goes.times * 1.5)
+    both = joined([stays, goes], [replace(stays), later], 1.0)
+    assert stays in both
+    assert [c.until for c in both if c.joint is None] == [float("inf"), 1.0]
+    assert shown(both[1:], np.array([4.0])) == pytest.approx(shown((later,), np.array([4.0])))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -111,3 +113,9 @@ def test_a_voice_at_its_limit_is_not_asked_for_ever() -> None:
 
     assert fitted(Rigid(), Say("x", seconds=3.0)).duration == 3.0
     assert len(asked) == 2
+
+
+def test_what_was_joined_of_parts_is_one_when_it_is_stretched() -> None:
+    made = SilentVoice().say(SAY)
+    whole = replace(made, parts=((0.0, made),))
+    assert stretched(whole, {"end": 1.1 * made.duration}).parts == ()
