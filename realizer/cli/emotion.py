@@ -81,9 +81,9 @@ def emotion(
         options.check_camera(face, camera)
     profile = _asked(word, profiles, angle, activation, valence, arousal, bool(chart))
     if profile is not None:
-        _tell(profile, _mixed(profiles, angle, valence, arousal), seed, as_json)
-        if output is not None:
+        if output is not None:  # before it is told: who reads only the first lines gets the file too
             _write(profile, seed, output, face, camera)
+        _tell(profile, _mixed(profiles, angle, valence, arousal), seed, as_json)
     elif output is not None or as_json or seed is not None:
         raise click.UsageError("wanted a WORD, or a place, for what was asked; got only --wheel")
     if chart is not None:
@@ -132,10 +132,13 @@ def _mixed(
 
 
 def _tell(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_json: bool) -> None:
+    from realizer.emotion import Profile
     from realizer.tables import faps
 
     values = profile.frame() if seed is None else profile.draw(seed)
     names = {row.fap: row.name for row in faps()}
+    if profile.ranges and not any(map(any, profile.ranges.values())):  # the middle of the wheel is no emotion
+        profile, mixed = Profile("neutral", profile.source, {}), {}
     if as_json:
         ranges = {names[fap]: list(ends) for fap, ends in profile.ranges.items()}
         said = {"emotion": " and ".join(mixed) or profile.name, "profiles": profile.source, "ranges": ranges}

@@ -62,7 +62,8 @@ words = click.option(
     "--words",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE.csv",
-    help="Emotional words of your own: word, category, origin. For texts in --language, or for all.",
+    help="Emotional words of your own, for texts in --language or for all: lines # source:, # units:,"
+    " # licence: and word,category,origin, as in realizer/tables/emotional_words_en.csv.",
 )
 
 
@@ -152,14 +153,28 @@ def enrich(
         languages = [lists.language]
     if not context.obj["quiet"]:
         tell_unknown(lists, languages, set())
+        if language is None and words is None and _elsewhere(said, lists.language):
+            click.echo(
+                f"none of this is in the letters of {lists.language!r}, so that none of its words counts; see"
+                " --language and --words",
+                err=True,
+            )
     result = "".join(write(block) for block in blocks)
     if output is None:
         sys.stdout.write(result)
     else:
         output.write_text(result, "utf-8")
         placed = sum(map(_placed, blocks)) - before
-        click.echo(f"{output}: {placed} expressions placed", err=True)
+        click.echo(f"{output}: {placed} expression{'s' * (placed != 1)} placed", err=True)
     return 1 if faults else 0
+
+
+def _elsewhere(said: str | bytes, language: str) -> bool:
+    """Whether a text that is taken for English has letters, and none of them are English ones."""
+    if isinstance(said, bytes) or language.partition("-")[0].lower() != "en":
+        return False
+    letters = [letter for letter in said if letter.isalpha()]
+    return bool(letters) and not any(letter.isascii() for letter in letters)
 
 
 def _placed(block: Block) -> int:

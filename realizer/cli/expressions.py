@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__: list[str] = []
 
-SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
+LEAST_LIKE = 0.4  # the best cosine of a picture that shows anything: a head that idles makes 0.3
 as_json = click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
 picture = click.option(
     "-o", "--output", metavar="SHEET.png", type=click.Path(path_type=Path), help="Draw what is told."
@@ -44,7 +44,7 @@ class Units(click.ParamType):  # type: ignore[type-arg]
             try:
                 found |= read_aus({match[1].upper(): float(match[2] or 1)}, "--au")
             except TableError as error:
-                self.fail(str(error).removeprefix("--au: "), parameter, context)
+                self.fail(re.sub(r"^--au[:,] ", "", str(error)), parameter, context)
         return found
 
 
@@ -114,6 +114,8 @@ def find(
         assert like is not None
         seen = _looked_up(like, known, face)
         face, found = seen.face, [pair for pair in seen.found if pair[1] > 0]
+        if found and found[0][1] < LEAST_LIKE:
+            found = []
         click.echo(f"{like}: {seen.face}, {seen.light}{', neutral' if seen.neutral else ''}", err=True)
     found = found[:most]
     scores = [f"{score:.2f}" for _, score in found]

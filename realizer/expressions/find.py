@@ -19,8 +19,10 @@ LITTLE = frozenset(
     [
         "a",
         "about",
+        "am",
         "an",
         "and",
+        "are",
         "at",
         "be",
         "do",
@@ -35,19 +37,25 @@ LITTLE = frozenset(
         "of",
         "on",
         "or",
+        "s",
+        "so",
         "t",
         "that",
         "the",
         "this",
         "to",
+        "very",
+        "was",
         "with",
         "you",
     ]
 )
 # Endings, the longest first, that a word may lose without meaning another thing.
 ENDINGS = (
+    "liness",
     "fully",
     "ingly",
+    "iness",
     "ness",
     "ment",
     "ings",

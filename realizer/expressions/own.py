@@ -123,7 +123,11 @@ class _Reading:
     def _aus(self) -> dict[tuple[int, str], float]:
         cells = self.row.get("aus")
         if not isinstance(cells, dict) or not cells:
-            self._fault("aus", "action units by intensity, such as { 12 = 0.6, 2L = 0.3 }", repr(cells))
+            self._fault(
+                "aus",
+                "action units by intensity, such as { 12 = 0.6, 2L = 0.3 }",
+                "nothing" if cells is None else repr(cells),
+            )
             return {}
         aus: dict[tuple[int, str], float] = {}
         for cell, amount in cells.items():

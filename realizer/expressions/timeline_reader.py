@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
@@ -21,7 +22,7 @@ ENTRY = ("expression", "intensity", "duration")
 
 
 def read_timeline(content: bytes) -> Timeline:
-    """A timeline of TOML or, where it begins with "{", of JSON.
+    """A timeline of TOML or, where it begins as an object or a list of it does, of JSON.
 
         mixer = "successive"    # or "additive", which is usual
         order = [4, 1, 2]       # with "successive": these action units first
@@ -42,14 +43,21 @@ def read_timeline(content: bytes) -> Timeline:
     """
     try:
         text = content.decode("utf-8-sig")
-        told = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+        told = json.loads(text) if _is_json(text) else tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number of thousands of digits is no error of syntax
         raise TableError(f"wanted a timeline in TOML or JSON, got: {error}") from None
+    if not isinstance(told, dict):
+        raise TableError(f'timeline: wanted {{"channel": [...]}}, got a {type(told).__name__}')
     reading = _Reading()
     timeline = reading.timeline(told)
     if reading.faults:
         raise TableError("\n".join(reading.faults))
     return timeline
+
+
+def _is_json(text: str) -> bool:
+    """Tables of TOML begin with a bracket too, but none of them with what follows one in a list of JSON."""
+    return re.match(r"\s*(\{|\[\s*[{\]])", text) is not None
 
 
 class _Reading:
@@ -60,7 +68,7 @@ class _Reading:
 
     def _fault(self, place: str, wanted: str, got: object) -> None:
         try:
-            words = repr(got)
+            words = "nothing" if got is None else repr(got)
         except ValueError:
             words = "a number of thousands of digits"
         self.faults.append(

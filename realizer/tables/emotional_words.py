@@ -82,7 +82,7 @@ def words_of(path: Path) -> WordList:
         TableError: an unreadable file, or as `read_words`.
     """
     try:
-        return read_words(path.read_text("utf-8"), str(path))
+        return read_words(path.read_text("utf-8-sig"), str(path))
     except (OSError, UnicodeError) as error:
         raise TableError(f"{path}: wanted a list of words, {error}") from None
 

@@ -56,10 +56,23 @@ def test_a_place_says_how_much_of_which_emotion_is_there_and_no_minus_before_a_z
     assert run("--angle", "-700").stdout.splitlines()[0] == "trust 56% and fear 44% (own)"
     assert run("--angle", "45").stdout.splitlines()[0] == "fear 100% (own)"
     assert json.loads(run("--angle", "20", "--json").stdout)["shares"] == {"trust": 0.5556, "fear": 0.4444}
-    middle = run("--valence", "0", "--arousal", "0").stdout
-    assert "joy" in middle
-    assert "-0.0" not in middle
+    assert "-0.0" not in run("--valence", "0", "--arousal", "1").stdout
     assert run("--angle", "1e308").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "place", [["--valence", "0", "--arousal", "0"], ["--angle", "45", "--activation", "0"], ["neutral"]]
+)
+def test_the_middle_of_the_wheel_is_neutral(place: list[str]) -> None:
+    assert run(*place).stdout == "neutral (own)\n"
+    said = json.loads(run(*place, "--json").stdout)
+    assert (said["emotion"], said["ranges"], "shares" in said) == ("neutral", {}, False)
+
+
+def test_nothing_is_told_where_the_file_cannot_be_written(tmp_path: Path) -> None:
+    done = run("joy", "-o", str(tmp_path / "no" / "joy.txt"))
+    assert done.exit_code != 0
+    assert done.stdout == ""
 
 
 def test_a_profile_is_written_as_a_file_of_pauls(tmp_path: Path) -> None:

@@ -71,6 +71,19 @@ def test_words_of_another_language_come_from_a_file(tmp_path: Path) -> None:
     assert starts(done.stdout) == {"bml1:anger1": "speech1:w1"}
 
 
+def test_a_text_in_other_letters_than_english_ones_is_asked_for_its_language() -> None:
+    told = "none of this is in the letters of 'en-US'"
+    done = enrich("Ты уверен?")
+    assert told in done.stderr
+    assert starts(done.stdout) == {"bml1:surprise1": "speech1:w1"}
+    for text, more in (("Really?", []), ("!!! 😀", []), ("Ты уверен?", ["--language", "ru"])):
+        assert told not in enrich(text, *more).stderr
+
+
+def test_one_expression_is_one(tmp_path: Path) -> None:
+    assert "1 expression placed" in enrich("Really?", "-o", str(tmp_path / "o.bml")).stderr
+
+
 @pytest.mark.parametrize("text", ["", "  \n "])
 def test_an_empty_text_is_refused_in_words(text: str) -> None:
     done = enrich("-", stdin=text)

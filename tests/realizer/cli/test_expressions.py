@@ -57,7 +57,7 @@ def test_ones_own_are_found_too(tmp_path: Path) -> None:
         (["find"], "wanted one of TEXT, --au and --like"),
         (["find", "smile", "--au", "1"], "wanted one of TEXT, --au and --like"),
         (["find", "--au", "99"], "wanted an action unit such as 12 or 12L, got '99'"),
-        (["find", "--au", "1=7"], "wanted an intensity above 0 and to 1, got 7"),
+        (["find", "--au", "1=7"], "'--au': 1: wanted an intensity above 0 and to 1, got 7"),
         (["list", "-o", "sheet.txt"], "sheet.txt: wanted a name that ends in .png"),
     ],
 )
@@ -71,3 +71,22 @@ def test_nothing_found_is_said_and_counts() -> None:
     done = CliRunner().invoke(cli, ["expressions", "find", "qqqq"], standalone_mode=False)
     assert done.return_value == 1
     assert "nothing in the library goes with 'qqqq'" in done.stderr
+
+
+def test_a_neutral_face_with_its_head_turned_a_little_is_like_no_expression(tmp_path: Path) -> None:
+    import numpy as np
+    from PIL import Image
+
+    from realizer.render import Renderer
+
+    pose = np.zeros((1, 68), np.float32)
+    pose[0, 47:50] = 442, -442, -343  # a head that idles
+    with Renderer("ida", (256, 256), "front") as renderer:
+        Image.fromarray(renderer.draw(pose)[0]).save(tmp_path / "ida.png")
+    done = CliRunner().invoke(
+        cli,
+        ["expressions", "find", "--like", str(tmp_path / "ida.png"), "--face", "ida"],
+        standalone_mode=False,
+    )
+    assert done.stdout == ""
+    assert (done.return_value, "nothing in the library" in done.stderr) == (1, True)

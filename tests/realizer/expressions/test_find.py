@@ -21,6 +21,8 @@ def names(found) -> list[str]:
         ("I don't know", "template:sadness"),
         ("furious", "ANGER"),
         ("angry", "ANGER"),
+        ("happy", "HAPPINESS"),
+        ("I am so happy", "template:happiness"),
         ("scared", "FEAR"),
         ("sarcasm", "template:ironic smile"),
         ("a friendly greeting", "SMILE"),
@@ -66,4 +68,6 @@ def test_sides_count_and_so_does_how_much() -> None:
 def test_endings_do_not_count() -> None:
     assert len({stem(word) for word in ("surprise", "surprised", "surprising", "surprises")}) == 1
     assert stem("worried") == stem("worry") == stem("worries")
+    assert stem("happiness") == stem("happy") == stem("happily")
+    assert stem("friendliness") == stem("friendly")
     assert stem("nod") == "nod"

@@ -34,6 +34,12 @@ def test_the_mixer_and_the_order_stand_before_the_channels() -> None:
     assert read_timeline(b'{"order": [], ' + JSON[1:]) == read_timeline(JSON)
 
 
+@pytest.mark.parametrize("content", [JSON[JSON.index(b"[") : -1], b"[]", b' [{"channel": []}]'])
+def test_a_bare_list_of_json_is_said_to_be_one(content: bytes) -> None:
+    with pytest.raises(TableError, match=r'^timeline: wanted \{"channel": \[\.\.\.\]\}, got a list$'):
+        read_timeline(content)
+
+
 ONE = b"[[channel]]\nentries = [{ expression = 'a' }]"
 BAD = {
     b"mixer = 'sum'\n" + ONE: "timeline, mixer: wanted additive or successive, got 'sum'",
@@ -51,7 +57,7 @@ BAD = {
     ONE + b"\nstart = 1" + b"0" * 9000: "wanted a timeline in TOML or JSON",
     b"\xff": "wanted a timeline in TOML or JSON",
     b"{": "wanted a timeline in TOML or JSON",
-    b"": "timeline: wanted channels, [[channel]] each, got None",
+    b"": "timeline: wanted channels, [[channel]] each, got nothing",
     b"channel = 3": "timeline: wanted channels",
     b"channel = [3]": "channel 1: wanted a table with entries, got 3",
     b"x = 1\n[[channel]]\nentries = [{ expression = 'a' }]": "wanted mixer, order, channel, got 'x'",

@@ -58,3 +58,8 @@ def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
     (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\xff")
     with pytest.raises(TableError, match=r"bytes\.csv: wanted a list of words"):
         words_of(tmp_path / "bytes.csv")
+
+
+def test_a_file_may_begin_with_the_mark_that_spreadsheets_write(tmp_path: Path) -> None:
+    (tmp_path / "marked.csv").write_text("\ufeff" + HEAD + "gut,praise,own\n", "utf-8")
+    assert words_of(tmp_path / "marked.csv").categories(["gut"]) == ["praise"]
