@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 import socket as sockets
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus
 
@@ -222,3 +225,35 @@ def test_one_who_connects_again_and_again_disturbs_nobody() -> None:
             await plays(late, "c")
 
     serving(test, max_sessions=100)
+
+
+HELD = (
+    '<bml id="h"><faceFacs id="a" au="12" amount="1" start="0" attackPeak="0.1" relax="60" end="61"/>'
+    '<faceFacs id="b" au="1" amount="1" start="0" attackPeak="0.1" relax="60" end="61"/></bml>'
+)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("form", ["png", "webp"])
+def test_the_stream_shows_what_is_drawn_without_a_clock(form) -> None:
+    import realizer
+    from realizer.render import Renderer
+
+    size, pictures = (96, 80), []
+
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send(HELD)
+            video = {"stream": "video", "format": form, "quality": 100, "size": size, "fps": 5}
+            told = await ask(socket, type="subscribe", **video)
+            assert told["media_type"] == f"image/{form}"
+            while not pictures or pictures[-1].time < 1.0:
+                message = await socket.recv()
+                if isinstance(message, bytes):
+                    pictures.append(unpack(message))
+
+    serving(test, idle=False)
+    with Renderer("default", size) as renderer:
+        (still,) = renderer.draw(realizer.realize(HELD, fps=1, idle=False).poses[1:2])
+    shown = np.asarray(Image.open(io.BytesIO(pictures[-1].payload)).convert("RGB")).astype(int)
+    assert np.abs(shown - still).max() <= 2 if form == "png" else np.abs(shown - still).mean() < 2
