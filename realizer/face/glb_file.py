@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,20 @@ class GlbFile:
                 "values": {"bufferView": self._view(raw[rows], None)},
             }
         return self._accessor(accessor, raw, bounds)
+
+    def animation(self, name: str, clock: int, keys: Iterable[tuple[int, str, Any]]) -> dict[str, Any]:
+        """An animation of nodes, linear between its keys.
+
+        Args:
+            clock: the accessor with the keys' times.
+            keys: (node, "translation", "rotation" or "weights", a value for each time); as float32.
+        """
+        channels: list[dict[str, Any]] = []
+        samplers: list[dict[str, Any]] = []
+        for node, path, values in keys:
+            channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+            samplers.append({"input": clock, "output": self.add(values.astype(np.float32))})
+        return {"name": name, "channels": channels, "samplers": samplers}
 
     def bytes_of(self, document: dict[str, Any]) -> bytes:
         """The file: the document with these accessors, and their data."""

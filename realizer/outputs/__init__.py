@@ -21,6 +21,7 @@ MODULES = (
     "film",
     "webp",
     "glb",
+    "vrma",
     "arkit_csv",
     "talkinghead",
 )

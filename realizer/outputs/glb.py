@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.pipeline import Realization
 
-__all__ = ["OUTPUTS", "encode_glb", "write_glb"]
+__all__ = ["OUTPUTS", "encode_glb", "quaternions", "write_glb"]
 
 # Nodes by their numbers in the file; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2
@@ -43,7 +43,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
         {"name": "neck", "children": [HEAD]},
         {"name": "head", "translation": pivot.tolist()},
     ]
-    keys = [(HEAD, "rotation", _quaternions(made.head))]
+    keys = [(HEAD, "rotation", quaternions(made.head))]
     if made.names:
         keys.append((FACE, "weights", made.weights.ravel()))
     balls = []
@@ -58,7 +58,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
         node = len(nodes)
         nodes[HEAD].setdefault("children", []).append(node)
         nodes.append({"name": EYES[eye], "mesh": len(balls), "translation": (centre - pivot).tolist()})
-        keys.append((node, "rotation", _quaternions(np.pad(made.eyes[:, eye], ((0, 0), (0, 1))))))
+        keys.append((node, "rotation", quaternions(np.pad(made.eyes[:, eye], ((0, 0), (0, 1))))))
         if made.thrust[:, eye].any():
             keys.append((node, "translation", centre - pivot + np.outer(made.thrust[:, eye], (0, 0, 1))))
     meshes = [morphing_mesh(file, face, rest, 0, made)]
@@ -77,19 +77,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
             "materials": [_material(*material) for material in MATERIALS],
             "meshes": meshes,
             "skins": [{"joints": [NECK, HEAD], "inverseBindMatrices": _unbound(file, pivot)}],
-            "animations": [
-                {
-                    "name": "performance",
-                    "channels": [
-                        {"sampler": k, "target": {"node": node, "path": path}}
-                        for k, (node, path, _) in enumerate(keys)
-                    ],
-                    "samplers": [
-                        {"input": clock, "output": file.add(values.astype(np.float32))}
-                        for _, _, values in keys
-                    ],
-                }
-            ],
+            "animations": [file.animation("performance", clock, keys)],
         }
     )
 
@@ -99,7 +87,7 @@ def write_glb(realization: Realization, path: Path, drawing: Drawing) -> None:
     write_bytes(path, encode_glb(realization.face, realization.poses, realization.fps))
 
 
-def _quaternions(turns: Float32) -> Float32:
+def quaternions(turns: Float32) -> Float32:
     """(n, 4) x, y, z, w of (n, 3) pitch, yaw, roll, applied as `face.deform` does: roll first, yaw last."""
     from scipy.spatial.transform import Rotation
 

@@ -1,0 +1,152 @@
+"""A realization as a VRM animation (.vrma): preset expressions, the head and the gaze, for any VRM avatar."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realizer.animation.targets import AU_NAMES, au
+from realizer.arrays import Float32, Float64
+from realizer.face.glb_file import GlbFile
+from realizer.outputs.arkit import ARKIT_NAMES, arkit
+from realizer.outputs.files import write_bytes
+from realizer.outputs.glb import quaternions
+from realizer.outputs.output import Drawing, Output
+from realizer.tables import read_toml, text_of
+from realizer.tables.lexemes import face_lexemes
+
+if TYPE_CHECKING:
+    from realizer.pipeline import Realization
+
+__all__ = ["OUTPUTS", "encode_vrma", "expressions", "write_vrma"]
+
+FILE = "vrm.toml"
+EXTENSION, VERSION = "VRMC_vrm_animation", "1.0"
+BLINKS = {"blinkLeft": "eyeBlinkLeft", "blinkRight": "eyeBlinkRight"}
+# Of these units the lips are made when somebody speaks: they tell of no face.
+LIPS = {25, 26, 27}
+
+
+def encode_vrma(realization: Realization) -> bytes:
+    """The file: a glTF 2.0 of a skeleton at rest and an animation, frame k at k / fps.
+
+    The weight of an expression is the first coordinate of a node's place; the head turns in its bone, the
+    gaze in a node of its own. VRM's axes are ours.
+    """
+    frames = arkit(realization.aus, realization.mapping)
+    file = GlbFile()
+    clock = file.add(frames.times.astype(np.float32), bounds=True)
+    nodes, bones = _skeleton()
+    keys: list[tuple[int, str, Float32]] = [
+        (bones["head"], "rotation", quaternions(frames.head[:, [1, 0, 2]]))
+    ]
+    presets = {}
+    for name, weights in expressions(realization).items():
+        presets[name] = {"node": len(nodes)}
+        keys.append((len(nodes), "translation", np.pad(weights[:, None], ((0, 0), (0, 2)))))
+        nodes.append({"name": name})
+    gaze = np.pad(frames.eyes.mean(axis=1)[:, ::-1], ((0, 0), (0, 1)))
+    keys.append((len(nodes), "rotation", quaternions(gaze)))
+    look = {"node": len(nodes), "offsetFromHeadBone": [0.0, 0.06, 0.0]}
+    nodes.append({"name": "lookAt"})
+    return file.bytes_of(
+        {
+            "asset": {"version": "2.0", "generator": "bml-realizer"},
+            "extensionsUsed": [EXTENSION],
+            "scene": 0,
+            "scenes": [{"nodes": [bones["hips"], *range(len(bones), len(nodes))]}],
+            "nodes": nodes,
+            "animations": [file.animation("performance", clock, keys)],
+            "extensions": {
+                EXTENSION: {
+                    "specVersion": VERSION,
+                    "humanoid": {"humanBones": {name: {"node": node} for name, node in bones.items()}},
+                    "expressions": {"preset": presets},
+                    "lookAt": look,
+                }
+            },
+        }
+    )
+
+
+def expressions(realization: Realization) -> dict[str, Float32]:
+    """Name of a preset expression of VRM -> (n,) float32 weights 0..1, of the first character.
+
+    Vowels are what the mouth says; blinks what ARKit's shapes say of the lids; emotions the mixture of their
+    faces that comes nearest to the action units shown, by non-negative least squares.
+    """
+    visemes = realization.visemes()
+    blinks = arkit(realization.aus, realization.mapping).weights
+    found: dict[str, Any] = {
+        name: visemes[:, list(parts)] @ list(parts.values()) for name, parts in _mouth().items()
+    }
+    found |= {name: blinks[:, ARKIT_NAMES().index(shape)] for name, shape in BLINKS.items()}
+    found |= dict(zip(_faces()[0], _mixture(realization.aus.aus).T, strict=True))
+    return {name: np.clip(weights, 0, 1).astype(np.float32) for name, weights in found.items()}
+
+
+def write_vrma(realization: Realization, path: Path, drawing: Drawing) -> None:
+    """The first character."""
+    write_bytes(path, encode_vrma(realization))
+
+
+def _mixture(shown: Float32) -> Float64:
+    """(n, k) parts of the faces. Of so few, all choices of those that take part are tried."""
+    _, faces = _faces()
+    best = np.zeros((len(shown), len(faces)))
+    least = np.square(shown * faces.any(axis=0)).sum(axis=1).astype(np.float64)
+    for count in range(1, len(faces) + 1):
+        for chosen in combinations(range(len(faces)), count):
+            mine = faces[list(chosen)]
+            parts = shown @ np.linalg.pinv(mine)
+            left = np.square((shown - parts @ mine) * faces.any(axis=0)).sum(axis=1)
+            better = (parts >= 0).all(axis=1) & (left < least - 1e-9)
+            least[better] = left[better]
+            best[better] = 0
+            best[np.ix_(better, chosen)] = parts[better]
+    return best
+
+
+@cache
+def _faces() -> tuple[tuple[str, ...], Float64]:
+    """Names, and (k, n_aus) what each shows at 1."""
+    names = _table()["face"]
+    faces = np.zeros((len(names), len(AU_NAMES())))
+    for row, lexeme in zip(faces, names.values(), strict=True):
+        for (unit, side), amount in face_lexemes()[lexeme].aus.items():
+            if unit not in LIPS:
+                row[[target.column for target in au(unit, side)]] = amount
+    return tuple(names), faces
+
+
+@cache
+def _mouth() -> dict[str, dict[int, float]]:
+    return {
+        name: {int(viseme): weight for viseme, weight in parts.items()}
+        for name, parts in _table()["mouth"].items()
+    }
+
+
+def _skeleton() -> tuple[list[dict[str, Any]], dict[str, int]]:
+    """Nodes, and the number of each bone's."""
+    bones = _table()["bones"]
+    numbers = {name: k for k, name in enumerate(bones)}
+    nodes: list[dict[str, Any]] = [{"name": name, "translation": bone["at"]} for name, bone in bones.items()]
+    for name, bone in bones.items():
+        if "parent" in bone:
+            nodes[numbers[bone["parent"]]].setdefault("children", []).append(numbers[name])
+    return nodes, numbers
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return read_toml(text_of(FILE), FILE)
+
+
+OUTPUTS = (
+    Output(".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", write_vrma),
+)  # fmt: skip
