@@ -128,6 +128,11 @@ def _origins(value: Any) -> tuple[str, ...]:
     return tuple(str(origin) for origin in origins)
 
 
+def _token(value: Any) -> str | None:
+    """An empty one is no word: a variable that was left empty by mistake must open no door."""
+    return None if value is None else _text(value)
+
+
 def _word_of(*words: str) -> Callable[[Any], str]:
     def read(value: Any) -> str:
         if value not in words:
@@ -159,7 +164,7 @@ class Settings:
     port: int = _setting(8765, _number(int, 0, 65535), "0 takes a free port")
     workers: int = _setting(1, _number(int, 1, 64), "processes that serve the port, each its sessions")
     token: str | None = _setting(
-        None, _optional(_text), "what clients of the WebSocket must bring; none: all may come", secret=True
+        None, _token, "what clients of the WebSocket must bring; none: all may come", secret=True
     )
     origins: tuple[str, ...] = _setting(
         (), _origins, "addresses of pages elsewhere that may open a WebSocket; * is any"
@@ -169,6 +174,14 @@ class Settings:
     )
     tls_key: Path | None = _setting(None, _optional(_file), "its key in PEM; none: it is in the same file")
     log: str = _setting("text", _word_of("text", "json"), "how logs are written to standard error")
+    journal: str | None = _setting(
+        None,
+        _optional(_text),
+        "a file, or redis://HOST:PORT/N: sessions with a name outlive the service; none: they do not",
+    )
+    record: Path | None = _setting(
+        None, _optional(Path), "a folder to record all sessions in, for `realizer replay`; none: not recorded"
+    )
     asap_ports: tuple[int, int] | None = _setting(
         None, _optional(_ports), "of Asap's TCP: BML in, feedback to this port of the client; none: no door"
     )

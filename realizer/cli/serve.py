@@ -59,6 +59,17 @@ __all__: list[str] = []
     help="Show the session xface-player on this Xface player, four frames a second.",
 )
 @click.option("--stomp", metavar="HOST:PORT", help="Serve clients of this STOMP broker: ASAP JSON, VHMSG.")
+@click.option(
+    "--journal",
+    metavar="FILE|URL",
+    help="Keep sessions that have a name, so that a service that died, or another one, goes on with them.",
+)
+@click.option(
+    "--record",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Record every session, for `realizer replay`.",
+)
 @click.option("--face", metavar="NAME", help="Face of characters that name none.  [default: default]")
 @options.deformer
 @click.option("--camera", metavar="NAME", help=f"Of pictures that name none: {options.CAMERAS}")

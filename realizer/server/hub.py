@@ -67,7 +67,7 @@ class Hub:
         self.check(name)
         id = secrets.token_urlsafe(9) if name is None else name
         session = self.sessions.get(id)
-        if session is None:
+        if session is None or session.closed:
             if self._full:
                 self._end(self._left()[0])
             session = self.sessions[id] = self._make(id, now, name is not None)
@@ -85,7 +85,9 @@ class Hub:
         if session is not None:
             session.disconnect(connection, now)
             if session.closed:
-                self.sessions.pop(session.id, None)
+                session.notes.end()
+                if self.sessions.get(session.id) is session:
+                    del self.sessions[session.id]
 
     def effects(self, session: Session, now: float) -> list[Effect]:
         """What is to be done for a session; connections that move to another one are moved here."""
@@ -132,4 +134,5 @@ class Hub:
 
     def _end(self, session: Session) -> None:
         session.close()
+        session.notes.end()
         del self.sessions[session.id]

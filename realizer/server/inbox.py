@@ -48,7 +48,7 @@ class Inbox:
         else:
             self._unread.append(read(text, VOCABULARY))
             return None
-        return Warning(_name_of(text), "PARSING_FAILURE", words)
+        return Warning(name_of(text), "PARSING_FAILURE", words)
 
     def next(self) -> Block | Warning | None:
         """The next block, or why there is none; None where all is read."""
@@ -69,7 +69,7 @@ class Inbox:
         self._unread.clear()
 
 
-def _name_of(message: str) -> str:
+def name_of(message: str) -> str:
     """The block id of a document that is not parsed, where it can be read near its start."""
     found = _BLOCK_ID.search(message, 0, 4096)
     return found.group(1) if found else "<no id>"

@@ -14,7 +14,7 @@ from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError
 from realizer.mapping import mapping_of
 from realizer.pipeline import as_it_is, warped
-from realizer.player import Player
+from realizer.player import HISTORY, Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
 from realizer.server.clips import ClipError, Clips
@@ -22,7 +22,10 @@ from realizer.server.connection import STUCK, Connection
 from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.feedback_log import FeedbackLog
-from realizer.server.inbox import Inbox
+from realizer.server.inbox import Inbox, name_of
+from realizer.server.journal import JournalError, Lost
+from realizer.server.journal.entry import Kind
+from realizer.server.journal.notes import Notes
 from realizer.server.limits import MAX_CHARACTERS, beyond
 from realizer.server.messages import (
     MAX_CONTROL,
@@ -32,7 +35,12 @@ from realizer.server.messages import (
     Capabilities,
     ErrorMessage,
     Gap,
+    Hello,
     Limits,
+    Ping,
+    StateQuery,
+    Subscribe,
+    Unsubscribe,
     Welcome,
     parse_control,
 )
@@ -51,6 +59,8 @@ __all__ = ["Session"]
 
 log = logging.getLogger(__name__)
 
+# Messages that change nothing for others, nor for who comes later.
+PASSING = (Hello, Ping, StateQuery, Subscribe, Unsubscribe)
 # Feedback that is kept for clients that come back: about an hour of talk.
 LOG = 10_000
 
@@ -67,6 +77,7 @@ class Session:
         load_face: name -> Face, raising FaceError.
         capabilities: what `welcome` tells.
         epoch: POSIX seconds at `now`, told with every time; None leaves them out.
+        history: seconds that have passed of which frames can still be asked for.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
     of them, and `next_deadline` says when `tick` is wanted.
@@ -83,6 +94,7 @@ class Session:
         load_face: Callable[[str], Face] | None = None,
         capabilities: Mapping[str, Any] | None = None,
         epoch: float | None = None,
+        history: float = HISTORY,
     ) -> None:
         self.id = id
         self.settings = settings
@@ -91,6 +103,7 @@ class Session:
         self.closed = False
         self.ending = False  # the service ends: no new documents
         self.empty_since: float | None = now
+        self.notes = Notes(id)
         self.clips = Clips()
         self.player = Player(
             kinds=KINDS,
@@ -101,6 +114,7 @@ class Session:
             media=settings.media,
             clips=self.clips.recordings,
             expressions=settings.expressions,
+            history=history,
             cooccurrence=settings.cooccurrence,
             prosody=settings.prosody,
             takes=lambda index: self.face(index).takes,
@@ -127,6 +141,8 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
+        if not self._tell(now - self.opened, "join", connection):
+            return
         self._connections[connection] = Connection(connection, self.log.newest + 1)
         self.empty_since = None
         if seen is not None:
@@ -134,7 +150,8 @@ class Session:
 
     def disconnect(self, connection: int, now: float) -> None:
         """A client is gone. A session nobody named ends with it."""
-        self._connections.pop(connection, None)
+        if self._connections.pop(connection, None) is not None:
+            self._tell(now - self.opened, "leave", connection)
         self.speeches.leave(connection)
         if not self._connections:
             self.empty_since = now
@@ -171,17 +188,53 @@ class Session:
         """A WebSocket message: bytes are a sound clip; text is control if it starts with `{`, or else BML."""
         if self.closed or connection not in self._connections:
             return
+        t = now - self.opened
         if isinstance(message, bytes):
-            self._take_clip(connection, message)
+            if self._keep(t, "sound", connection, message):
+                self._take_clip(connection, message)
         elif message.lstrip("\ufeff \t\r\n").startswith("{"):
             control = parse_control(message.lstrip("\ufeff \t\r\n"))
             if isinstance(control, ErrorMessage):
                 self.reply(connection, control)
+            elif isinstance(control, PASSING) or self._keep(t, "text", connection, message):
+                follow(self, self._connections[connection], control, t)
+        elif self._keep(t, "text", connection, message) and (refused := self._inbox.put(message)) is not None:
+            self._refuse(refused, t)
+        if not self.closed:
+            self._work(t)
+
+    def _keep(self, t: float, kind: Kind, connection: int, message: str | bytes) -> bool:
+        """Write a message into the journal; where that cannot be it is not taken, and its client is told."""
+        try:
+            self.notes.keep(t, kind, connection, message)
+        except Lost as error:
+            self._lose(error)
+            return False
+        except JournalError as error:
+            log.error("session %s: %s", self.id, error)
+            words = f"this could not be kept, so it is not taken: {error}"
+            if isinstance(message, str) and message.lstrip("\ufeff \t\r\n").startswith("<"):
+                self._refuse(Warning(name_of(message), "CANNOT_CREATE_BEHAVIOR", words), t)
             else:
-                follow(self, self._connections[connection], control, now - self.opened)
-        elif (refused := self._inbox.put(message)) is not None:
-            self._refuse(refused, now - self.opened)
-        self.tick(now)
+                self.reply(connection, ErrorMessage(code="journal", message=words))
+            return False
+        return True
+
+    def _tell(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
+        """Write into the journal what has happened; False where the session is another process's now."""
+        try:
+            self.notes.tell(t, kind, number, body)
+        except Lost as error:
+            self._lose(error)
+            return False
+        return True
+
+    def _lose(self, error: Lost) -> None:
+        """Another process has the session: let everybody go, to come back there."""
+        log.warning("%s", error)
+        closing: list[Effect] = [Close(connection, 1012, str(error)) for connection in self._connections]
+        self.close()
+        self._effects = closing
 
     def _take_clip(self, connection: int, message: bytes) -> None:
         try:
@@ -195,8 +248,10 @@ class Session:
         """The voice's answer to a Speak. Where it failed, the silent voice takes over."""
         if self.closed:
             return
-        self._effects += self.orders.answer(speak, result, now - self.opened)
-        self.tick(now)
+        t = now - self.opened
+        if self._tell(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
+            self._effects += self.orders.answer(speak, result, t)
+            self._work(t)
 
     def drawn(self, draw: int, result: bytes | RealizerError, now: float) -> None:
         """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
@@ -216,19 +271,22 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Do what is due: feedback, sound and frames first, then read or plan one document at most."""
-        if self.closed:
-            return
-        t = now - self.opened
+        if not self.closed and self._work(now - self.opened):
+            self._tell(now - self.opened, "tick")
+
+    def _work(self, t: float) -> bool:
+        """What `tick` does; False where nothing came of it but what plays."""
         self._publish(t)
         self._effects += self.broadcast.due(self._connections.values(), t)
         if self.preparation.waiting:
-            overdue = self.orders.overdue(t + EPSILON)
-            self._effects += overdue
+            self._effects += self.orders.overdue(t + EPSILON)
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
         done = self._submit_ready(t) or self._read_one(t)
         if self.speeches.settle(t) or done:
             self._publish(t)
+            return True
+        return False
 
     def next_deadline(self) -> float | None:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""

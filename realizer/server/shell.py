@@ -15,7 +15,11 @@ from realizer.expressions import library_of
 from realizer.mapping import mapping_of
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
-from realizer.server.hub import Hub
+from realizer.server.hub import Hub, HubError
+from realizer.server.journal import Journal, JournalError, journal_at
+from realizer.server.journal.folder import FolderJournal, head
+from realizer.server.journal.notes import Notes
+from realizer.server.journal.replay import replay
 from realizer.server.metrics import Metrics
 from realizer.server.session import Session
 from realizer.server.studio import Studio
@@ -64,6 +68,9 @@ class Shell:
         self._capabilities: dict[str, Any] = {}
         self._ending = False
         self._closed = False
+        self._journal: Journal | None = None
+        self._record: Journal | None = None
+        self._restoring: dict[str, asyncio.Task[None]] = {}
 
     async def start(self) -> None:
         """Load what every session shares.
@@ -72,12 +79,17 @@ class Shell:
             ValueError: the scene file is not a scene.
             FaceError: no such face.
             TableError: a mapping, or an expression of one's own, that cannot be used.
+            JournalError: a journal that cannot be had.
         """
         self._loop = asyncio.get_running_loop()
+        if self.settings.journal is not None:
+            self._journal = journal_at(self.settings.journal)
         if self.settings.scene is not None:
             from realizer.pipeline import parse_scene
 
             self._scene = parse_scene(self.settings.scene.read_text("utf-8"))
+        if self.settings.record is not None:
+            self._record = FolderJournal(self.settings.record, head(self.settings, self._scene))
         # A face that is not there is said before a door opens.
         from realizer.face import load_face
 
@@ -109,6 +121,9 @@ class Shell:
         self._timers.clear()
         for session in self._hub.sessions.values():
             session.close()
+        for journal in (self._journal, self._record):
+            if journal is not None:
+                journal.close()
         await self._loop.run_in_executor(None, self._studio.close)
 
     def health(self) -> dict[str, object]:
@@ -139,6 +154,38 @@ class Shell:
             HubError: a bad name, or too many sessions.
         """
         self._hub.check(name)
+
+    async def restore(self, name: str | None) -> None:
+        """Go on with a session that another process has had, before somebody joins it.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
+        if self._journal is None or name is None or name in self._hub.sessions:
+            return
+        if name not in self._restoring:
+            self._restoring[name] = self._loop.create_task(self._restore(self._journal, name))
+        await asyncio.shield(self._restoring[name])
+
+    async def _restore(self, journal: Journal, name: str) -> None:
+        try:
+            if (kept := journal.take(name)) is None:
+                return
+            epoch, entries = kept
+            session = self._new(name, 0.0, named=True, epoch=epoch)
+            owed = await self._loop.run_in_executor(None, replay, session, entries, self._studio.speak)
+            now = self._loop.time()
+            session.opened = now - (time.time() - epoch)
+            session.notes = Notes(name, [journal])
+            for connection in session.connections:  # which went with the other process
+                session.disconnect(connection, now)
+            self._hub.sessions[name] = session
+            log.info("session %s is gone on with, %d entries long", name, len(entries))
+            for effect in owed:
+                self._do(session, effect)
+            self._pump(session)
+        finally:
+            del self._restoring[name]
 
     def join(self, client: Client, name: str | None = None, seen: int | None = None) -> int:
         """Let a client into the session of that name, or into one of its own; its number from now on.
@@ -180,6 +227,17 @@ class Shell:
     # sessions -----------------------------------------------------------------------------------
 
     def _make(self, id: str, now: float, named: bool) -> Session:
+        epoch = time.time()
+        session = self._new(id, now, named=named, epoch=epoch)
+        journals = [self._journal if named else None, self._record]
+        session.notes = Notes(id, [journal for journal in journals if journal is not None])
+        try:
+            session.notes.begin(epoch)
+        except JournalError as error:
+            raise HubError(503, str(error)) from None
+        return session
+
+    def _new(self, id: str, now: float, *, named: bool, epoch: float) -> Session:
         session = Session(
             id,
             self.settings,
@@ -187,7 +245,7 @@ class Shell:
             named=named,
             scene=self._scene,
             capabilities=self._capabilities,
-            epoch=time.time(),
+            epoch=epoch,
         )
         session.ending = self._ending
         return session

@@ -24,6 +24,7 @@ from websockets.server import ServerProtocol
 from realizer.server import guard
 from realizer.server.guard import Guard, Pace
 from realizer.server.hub import HubError
+from realizer.server.journal import JournalError
 from realizer.server.messages import ErrorMessage
 from realizer.server.metrics import MEDIA_TYPE
 from realizer.server.shell import Shell
@@ -197,8 +198,9 @@ class WebSocketDoor:
             if greeting is None:
                 return
         try:
+            await self._shell.restore(_query(request)[0])
             number = self._shell.join(client, *_query(request))
-        except HubError as error:
+        except (HubError, JournalError) as error:
             await socket.close(1013, str(error)[:120])
             return
         told = {"connection": number, "address": _address(socket)}

@@ -1,0 +1,47 @@
+"""Entries of a session in, the session as it was out: everything is done again, each at its own time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from realizer.errors import RealizerError, VoiceError
+from realizer.server.effects import Effect, Speak
+from realizer.server.journal.entry import Entry
+from realizer.server.session import Session
+from realizer.speech.utterance import Utterance
+
+__all__ = ["replay"]
+
+
+def replay(
+    session: Session, entries: Iterable[Entry], speak: Callable[[Speak], Utterance | RealizerError]
+) -> list[Effect]:
+    """Do to a new session what was done to one before.
+
+    Args:
+        session: its clock is its caller's: it was opened at 0, and is written for by nobody.
+        speak: says it again; a voice says the same twice.
+
+    Returns:
+        What its shell still owes it: what was to be spoken and had not been.
+    """
+    owed: dict[int, Speak] = {}
+    for entry in entries:
+        match entry.kind:
+            case "join":
+                session.connect(entry.number, entry.at)
+            case "leave":
+                session.disconnect(entry.number, entry.at)
+            case "text" | "sound":
+                session.receive(entry.number, entry.body, entry.at)
+            case "spoken":
+                order = owed.pop(entry.number, None)
+                if order is not None:
+                    fault = VoiceError(str(entry.body)) if entry.body else None
+                    session.spoken(entry.number, fault or speak(order), entry.at)
+            case "tick":
+                session.tick(entry.at)
+        for effect in session.outgoing():
+            if isinstance(effect, Speak):
+                owed[effect.id] = effect
+    return list(owed.values())

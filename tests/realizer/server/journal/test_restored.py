@@ -1,0 +1,140 @@
+"""A service that is killed while it plays, and another one that goes on with its sessions."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from bml_schema.feedback import parse_feedback
+
+LIMIT = 60  # s; a hung test ends
+SEQ = re.compile(r'seq="(\d+)"')
+FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
+<head id="n" lexeme="NOD" start="0.6"/><speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
+NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
+SCENE = json.dumps({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}})
+
+
+@contextmanager
+def serving(where: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """A service of its own with that journal, and its address."""
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
+    with subprocess.Popen([*command, "--journal", where], stdout=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        try:
+            yield service.stdout.readline().split()[2], service
+        finally:
+            service.kill()
+
+
+async def feedback(client: ClientConnection, last: str) -> list[str]:
+    """Feedback up to the block progress `last`, or to the end of the connection."""
+    told = []
+    try:
+        async for message in client:
+            if isinstance(message, str) and message.startswith("<"):
+                told.append(message)
+                if f'id="{last}"' in message:
+                    break
+    except ConnectionClosed:
+        pass
+    return told
+
+
+async def drained(client: ClientConnection) -> None:
+    """Read until the connection ends."""
+    while True:
+        await client.recv()
+
+
+def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(where: str) -> None:
+    async def before(url: str, service: subprocess.Popen[str]) -> list[str]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed") as client:
+            await client.send(SCENE)
+            await client.send(FIRST)
+            await client.send(NEXT)
+            told = []
+            async for message in client:
+                if isinstance(message, str) and message.startswith("<"):
+                    told.append(message)
+                    if 'id="a:s:m"' in message:  # the second block waits, the first one is in the middle
+                        service.kill()
+                        break
+            return told + await feedback(client, "never")
+
+    async def after(url: str, seen: int) -> list[str]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed&seen={seen}") as client:
+            return await feedback(client, "b:end")
+
+    with serving(where) as (url, service):
+        first = asyncio.run(before(url, service))
+    seen = int(SEQ.search(first[-1])[1])  # type: ignore[index]
+    with serving(where) as (url, _):
+        rest = asyncio.run(after(url, seen))
+    numbers = [int(SEQ.search(text)[1]) for text in first + rest]  # type: ignore[index]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert any('id="a:end"' in text for text in rest)
+    for text in first + rest:
+        parse_feedback(text)
+
+    async def whole(url: str) -> list[str]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=whole") as client:
+            await client.send(SCENE)
+            await client.send(FIRST)
+            await client.send(NEXT)
+            return await feedback(client, "b:end")
+
+    with serving(where) as (url, _):
+        undisturbed = asyncio.run(whole(url))
+    kinds = [[re.match(r"<(\w+)", text)[1] for text in told] for told in (first + rest, undisturbed)]  # type: ignore[index]
+    assert kinds[0] == kinds[1]
+
+
+def test_what_is_held_is_held_afterwards(where: str) -> None:
+    async def hold(url: str) -> None:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=held") as client:
+            await client.send(json.dumps({"type": "set", "aus": {"12L": 0.5}}))
+            await client.send('<bml id="m"><faceLexeme id="f" lexeme="SMILE" end="0.2"/></bml>')
+            await feedback(client, "m:end")
+
+    async def state(url: str) -> dict[str, float]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=held") as client:
+            await client.send(json.dumps({"type": "state"}))
+            async for message in client:
+                if isinstance(message, str) and '"state"' in message:
+                    aus: dict[str, float] = json.loads(message)["characters"][0]["aus"]
+                    return aus
+        raise AssertionError("no state")
+
+    with serving(where) as (url, _):
+        asyncio.run(hold(url))
+    for _again in range(2):  # the one that went on with it is killed too
+        with serving(where) as (url, _):
+            assert asyncio.run(state(url))["12L"] == 0.5
+
+
+def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
+    async def test(one: str, other: str) -> None:
+        async with asyncio.timeout(LIMIT), connect(f"{one}?session=torn") as first:
+            await first.send(NEXT)
+            await feedback(first, "b:start")
+            async with connect(f"{other}?session=torn&seen=0") as second:
+                await feedback(second, "b:end")
+                await first.send('<bml id="c"><head id="n" lexeme="NOD"/></bml>')
+                with pytest.raises(ConnectionClosed) as closed:
+                    await drained(first)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1012
+        assert "torn" in closed.value.rcvd.reason
+
+    with serving(where) as (one, _), serving(where) as (other, _):
+        asyncio.run(test(one, other))
