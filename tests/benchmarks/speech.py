@@ -4,23 +4,32 @@
     sentence   text -> utterance (sound, words, phonemes), and with the lips; the sound can start then
     paragraph  the same of eight sentences
     longest    a text as long as a behaviour may say; real-time factors are of the whole path to the lips
+    first      what a session takes from a message to the first packet with sound in it: a sentence of a
+               speech that comes piece by piece, and a document with a text as long as it may be
     same       how many of 200 repetitions, each spoken anew, give the same samples and times
 
-Measures only; nothing asserts a time. Wanted: a sentence to its lips in 15 ms, a sound after 30 ms and a
-real-time factor below 0.01 with espeak; below 0.05 with hibari.
+Measures only; nothing asserts a time. Wanted: a sentence to its lips in 15 ms, a first sound after 30 ms and
+a real-time factor below 0.01 with espeak; below 0.05 with hibari.
 """
 
 from __future__ import annotations
 
+import json
 import statistics
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from realizer.animation.lips import lip_channels
+from realizer.server.effects import Send, Speak
+from realizer.server.session import Session
+from realizer.server.wire import FrameKind, unpack
+from realizer.settings import Settings
 from realizer.speech import Say, find_voice, voices
+from realizer.speech.fitting import fitted
 from realizer.speech.kept import Kept
 from realizer.speech.utterance import MOST_TEXT, Utterance, Voice
 
@@ -48,6 +57,27 @@ def lips(voice: Voice, text: str) -> Utterance:
     return said
 
 
+def first_sound(voice: Voice, message: str) -> float:
+    """Milliseconds from a message to the first packet that is not silent."""
+    session = Session("benchmark", Settings(), time.perf_counter())
+    session.connect(1, time.perf_counter())
+    session.receive(1, json.dumps({"type": "subscribe", "stream": "audio"}), time.perf_counter())
+    session.outgoing()
+    begin = time.perf_counter()
+    session.receive(1, message, begin)
+    while True:
+        for effect in session.outgoing():
+            match effect:
+                case Speak(id, say):
+                    session.spoken(id, fitted(voice, replace(say, voice=None)), time.perf_counter())
+                case Send(_, bytes() as data):
+                    frame = unpack(data)
+                    if frame.kind is FrameKind.SOUND and np.any(frame.values):
+                        session.close()
+                        return 1000 * (time.perf_counter() - begin)
+        session.tick(time.perf_counter())
+
+
 def measure(voice: Voice) -> None:
     begin = time.perf_counter()
     lips(voice, "first")
@@ -69,6 +99,21 @@ def measure(voice: Voice) -> None:
         f"  longest of {said.duration:.0f} s: {1000 * spent:.0f} ms, "
         f"real-time factor {spent / said.duration:.5f}"
     )
+    if said.pcm is not None:
+        for name, message in (
+            (
+                "sentence",
+                lambda k: json.dumps({"type": "speech", "id": "s", "append": f"{SENTENCE.format(k)} "}),
+            ),
+            (
+                "document",
+                lambda k: f'<bml id="b"><speech id="s"><text>{k}. {text[:-100]}</text></speech></bml>',
+            ),
+        ):
+            spent = sorted(first_sound(voice, message(200 + k)) for k in range(ROUNDS))
+            print(
+                f"  first sound of a {name} after {statistics.median(spent):.1f} ms, at most {spent[-1]:.1f}"
+            )
     again, _ = milliseconds(lambda k: voice.say(Say("first")))
     print(f"  the same text again {again:.4f} ms")
     repeats = REPEATS.get(voice.name, 0)
