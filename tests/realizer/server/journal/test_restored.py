@@ -19,7 +19,8 @@ from bml_schema.feedback import parse_feedback
 LIMIT = 60  # s; a hung test ends
 SEQ = re.compile(r'seq="(\d+)"')
 FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
-<head id="n" lexeme="NOD" start="0.6"/><speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
+<head id="n" lexeme="NOD" start="0.6"/>
+<speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
 SCENE = json.dumps({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}})
 
