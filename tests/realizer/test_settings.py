@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,6 +59,12 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
         ("prosody", "loud"),
         ("face", ""),
         ("media", "no/such/folder"),
+        ("origins", "example.org"),
+        ("origins", "https://example.org/page"),
+        ("log", "xml"),
+        ("tls_cert", "no/such/file.pem"),
+        ("max_memory", "1"),
+        ("max_rate", "0"),
         ("max_blocks", "-1"),
     ],
 )
@@ -73,3 +80,29 @@ def test_words_of_the_environment_become_what_they_mean() -> None:
     assert (settings.asap_ports, settings.stomp, settings.stomp_vhmsg) == ((7500, 7501), "[::1]:61613", None)
     assert (settings.idle, settings.seed, settings.scene, settings.voice) == (False, 7, Path("a/b"), None)
     assert not settings.prosody
+
+
+def test_a_token_that_was_left_empty_is_refused_and_no_token_is_ever_shown() -> None:
+    with pytest.raises(SettingsError, match="setting token: wanted a word, got something else"):
+        Settings.read(environment={"REALIZER_TOKEN": " "})
+    assert "opensesame" not in repr(Settings(token="opensesame", stomp_password="opensesame"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"tls_key": Path(__file__)}, "setting tls_key: wanted tls_cert too"),
+        ({"tls_cert": Path(__file__), "workers": 2}, "setting tls_cert: wanted workers = 1, got 2"),
+        ({"token": "x", "host": "0.0.0.0", "xface_port": 0}, "its clients cannot bring the token"),
+        ({"token": "x", "host": "::", "asap_ports": (0, 1)}, "setting asap_ports: wanted none, or host 127"),
+    ],
+)
+def test_what_cannot_be_together_is_refused(settings: dict[str, Any], says: str) -> None:
+    with pytest.raises(SettingsError, match=says):
+        Settings(**settings)
+
+
+def test_pages_elsewhere_are_named_in_one_word_or_several() -> None:
+    settings = Settings.read(environment={"REALIZER_ORIGINS": "https://a.example, http://b.example:8000"})
+    assert settings.origins == ("https://a.example", "http://b.example:8000")
+    assert Settings(origins=["*"]).origins == ("*",)  # type: ignore[arg-type]

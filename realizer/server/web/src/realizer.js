@@ -78,11 +78,13 @@ export class Realizer {
   /**
    * @param {object} [options]
    * @param {string} [options.url] of the service's WebSocket; that which serves this file
+   * @param {string} [options.token] what the service asks for, where it does
    * @param {string} [options.session] which to join or make; one of its own that outlives a lost connection
    */
-  constructor({ url, session } = {}) {
+  constructor({ url, session, token } = {}) {
     this.url = new URL(url ?? new URL("ws", import.meta.url));
     if (this.url.protocol.startsWith("http")) this.url.protocol = this.url.protocol.replace("http", "ws");
+    if (token) this.url.searchParams.set("token", token);
     this.session = session ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
   }
 
