@@ -63,7 +63,8 @@ class Desk:
     """The player as one client sees it: what it has loaded, what plays of it, and what waits.
 
     A FAP file plays as a BML block with an id of our own; a pose is held by a `set` message, which lets go of
-    every other FAP: each frame of the player stands alone.
+    every other FAP: each frame of the player stands alone. What the frame before moved goes to 0 first, as
+    quickly as the rest moves; what is let go of takes its time.
 
     Args:
         owner: the client's number.
@@ -73,6 +74,7 @@ class Desk:
         self.owner = owner
         self._clip: FAPClip | None = None
         self._first = 0  # the frame that playing begins with
+        self._moved: dict[str, float] = {}  # names of the FAPs of the pose that is held, all 0
         self._playing: _Running | None = None
         self._waiting: deque[Task] = deque()
         self._scripts: list[_Running] = []
@@ -191,6 +193,7 @@ class Desk:
             block = f"xface-{self.owner}-{self._count}"
             document = document_of(self._clip.since(self._first), block)
             self._playing = _Running(task, {block}, self._clip)
+            self._moved = {}
             yield _held({})
             yield ToSession(document)
 
@@ -217,7 +220,9 @@ class Desk:
         for row, value in zip(faps(), self._clip.values[frame].tolist(), strict=True):
             if value:
                 values[row.name] = max(row.least, min(row.most, float(value)))
-        return _held(values)
+        held = _held(self._moved | values)
+        self._moved = dict.fromkeys(values, 0.0)
+        return held
 
 
 def _held(values: dict[str, float]) -> ToSession:

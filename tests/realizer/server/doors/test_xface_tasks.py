@@ -83,6 +83,12 @@ def test_a_file_of_one_frame_is_shown_at_once() -> None:
     assert answers == [*notes("UPLOAD_FAP", 1, 1, 2), {"open_jaw": 7}, ("UPLOAD_FAP", 1, 3)]
 
 
+def test_a_fap_that_the_next_frame_does_not_have_goes_to_0_and_is_let_go_of_then() -> None:
+    talk = Talk()
+    poses = [talk.ask("UPLOAD_FAP", clip(value))[2] for value in (7, 0, 0, 9)]
+    assert poses == [{"open_jaw": 7}, {"open_jaw": 0}, {}, {"open_jaw": 9}]
+
+
 def test_a_value_beyond_the_range_is_limited_to_it() -> None:
     assert {"open_jaw": 4320} in Talk().ask("UPLOAD_FAP", clip(9999))
 
