@@ -319,31 +319,80 @@ def test_in_any_order_every_block_that_starts_ends_and_nothing_is_left(acts) -> 
     assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []
 
 
-def test_a_speech_streams_over_a_websocket() -> None:
+async def spoken_over(socket, last: str) -> list[str | bytes]:
+    """Messages up to the block progress `last`."""
+    got: list[str | bytes] = []
+    async for message in socket:
+        got.append(message)
+        if isinstance(message, str) and f'id="{last}"' in message:
+            break
+    return got
+
+
+def streamed(test) -> list[str | bytes]:
+    """What a client got of a service that speaks."""
+
     async def run() -> list[str | bytes]:
-        got: list[str | bytes] = []
         async with (
-            asyncio.timeout(30),
+            asyncio.timeout(60),
             Server(Settings(port=0, voice="espeak")) as server,
             connect(server.url) as socket,
         ):
             await socket.send(json.dumps({"type": "subscribe", "stream": "audio"}))
-            for token in ("One ", 'and <sync id="m"/>', "two. ", "And ", "three."):
-                await socket.send(json.dumps({"type": "speech", "id": "turn", "append": token}))
-            await socket.send('<bml id="b"><head id="n" lexeme="NOD" start="turn:turn:m"/></bml>')
-            await socket.send(json.dumps({"type": "speech", "id": "turn", "close": True}))
-            async for message in socket:
-                got.append(message)
-                if isinstance(message, str) and 'id="turn:end"' in message:
-                    break
-        return got
+            return await test(socket)
 
-    messages = asyncio.run(run())
+    return asyncio.run(run())
+
+
+def told_at(messages: list[str | bytes]) -> dict[str, float]:
     told = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
-    at = {f.id: f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)}
+    return {f.id: f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)}
+
+
+def packets(messages: list[str | bytes]):
+    return [f for f in (unpack(m) for m in messages if isinstance(m, bytes)) if f.kind is FrameKind.SOUND]
+
+
+@pytest.mark.espeak
+def test_a_speech_streams_over_a_websocket() -> None:
+    async def talk(socket) -> list[str | bytes]:
+        for token in ("One ", 'and <sync id="m"/>', "two. ", "And ", "three."):
+            await socket.send(json.dumps({"type": "speech", "id": "turn", "append": token}))
+        await socket.send('<bml id="b"><head id="n" lexeme="NOD" start="turn:turn:m"/></bml>')
+        await socket.send(json.dumps({"type": "speech", "id": "turn", "close": True}))
+        return await spoken_over(socket, "turn:end")
+
+    messages = streamed(talk)
+    at = told_at(messages)
     assert at["b:n:start"] == pytest.approx(at["turn.1:turn:m"])
     assert at["turn.2:start"] == pytest.approx(at["turn.1:end"])
-    sound = [f for f in (unpack(m) for m in messages if isinstance(m, bytes)) if f.kind is FrameKind.SOUND]
-    loud = [f.time for f in sound if len(f.values) and np.abs(f.values).max() > 1000]
+    loud = [f.time for f in packets(messages) if len(f.values) and np.abs(f.values).max() > 1000]
     assert at["turn.1:start"] - 0.02 < loud[0] < at["turn.1:start"] + 0.15
     assert loud[-1] < at["turn.2:end"]
+
+
+@pytest.mark.espeak
+def test_a_barge_in_over_a_websocket_leaves_no_sound_50_ms_later() -> None:
+    async def barge_in(socket) -> list[str | bytes]:
+        text = 'Well, <sync id="m"/>this is a rather long sentence, which nobody wants to hear to its end. '
+        await socket.send(json.dumps({"type": "speech", "id": "turn", "append": text * 3}))
+        before = await spoken_over(socket, "turn.1:turn:m")
+        await socket.send(json.dumps({"type": "stop", "blocks": ["turn"]}))
+        before += await spoken_over(socket, "turn:end")
+        await socket.send('<bml id="later"><wait id="w" duration="0.5"/></bml>')
+        return before + await spoken_over(socket, "later:end")
+
+    messages = streamed(barge_in)
+    end = told_at(messages)["turn:end"]
+    played: dict[int, float] = {}  # packet -> when its sound ends, as a client keeps it
+    for packet in packets(messages):
+        if packet.forget:
+            played = {frame: until for frame, until in played.items() if frame < packet.frame}
+        if len(packet.values):
+            last = np.flatnonzero(np.append(1, packet.values))[-1]
+            played[packet.frame] = packet.time + last / RATE
+    assert played, "it was heard"
+    assert max(played.values()) < end + 0.05
+    feedback = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
+    (told,) = (f for f in feedback if getattr(f, "id", "") == "turn:end")
+    assert (told.status, (told.said or "").split()[:1]) == ("INTERRUPTED", ["Well"])
