@@ -159,3 +159,20 @@ def test_a_rate_that_is_no_whole_number_has_timecodes_that_go_up(tmp_path):
 def test_other_csv_files_are_what_they_were():
     assert output_for("x.csv") is OUTPUTS[".csv"]
     assert output_for("my.take.csv") is OUTPUTS[".csv"]
+
+
+def test_a_reader_of_live_link_face_finds_the_weights_at_their_times(spoken, tmp_path):
+    read_csv = pytest.importorskip("openfacefx.importers_csv", reason="pip install openfacefx").read_csv
+    OUTPUTS[".arkit.csv"].write(spoken, tmp_path / "x.arkit.csv", Drawing())
+    track, notes = read_csv(str(tmp_path / "x.arkit.csv"), fps=25, epsilon=0)
+    # It takes every column for a weight, and says of turns that they are none.
+    assert all("Head" in note or "Eye" in note for note in notes)
+    found = arkit(spoken.aus, spoken.mapping)
+    for channel in track.channels:
+        name = channel.name[0].lower() + channel.name[1:]
+        if name in ARKIT_NAMES():
+            keys = [(key.time, key.value) for key in channel.keys]
+            got = np.interp(found.times, *zip(*keys, strict=True))
+            wanted = found.weights[:, ARKIT_NAMES().index(name)]
+            np.testing.assert_allclose(got, wanted, atol=1e-3, err_msg=name)
+    assert {"JawOpen", "MouthFunnel", "MouthClose"} <= {channel.name for channel in track.channels}
