@@ -199,15 +199,20 @@ class Desk:
 
     def _stop(self, *, rewind: bool) -> Iterator[Answer]:
         """End what plays and what waits to, and show the frame where playing would begin."""
+        ended = [] if self._playing is None else [self._playing]
+        self._playing = None
         if rewind:
             self._first = 0
-        one, self._playing = self._playing, None
-        waiting, self._waiting = self._waiting, deque()
-        if one is not None:
-            yield ToSession(json.dumps({"type": "stop", "blocks": sorted(one.left)}))
+            ended += self._scripts
+            self._scripts = []
+        if ended:
+            blocks = {block for one in ended for block in one.left}
+            yield ToSession(json.dumps({"type": "stop", "blocks": sorted(blocks)}))
+        for one in ended:
             if not one.started:
                 yield from _told(one.task, Status.STARTED)
             yield from _told(one.task, Status.FINISHED)
+        waiting, self._waiting = self._waiting, deque()
         for task in waiting:
             yield from _told(task, Status.FINISHED)
         if self._clip is not None:

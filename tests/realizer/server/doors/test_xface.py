@@ -299,6 +299,30 @@ def test_a_script_of_bml_is_started_and_finished_with_its_blocks() -> None:
     serving(test)
 
 
+def test_a_script_that_talks_on_is_ended_by_a_stop() -> None:
+    async def test(server: Server, door: XfaceDoor) -> None:
+        async with Client(door.port) as client:
+            client.send(
+                task("UPLOAD_SCRIPT", 1, 9, '<bml id="a"><wait id="w" duration="1000"/></bml>', "BML")
+            )
+            assert await client.statuses(9, last=2) == [1, 2]
+            client.send(task("STOP_PLAYBACK", 1, 10))
+            assert await client.statuses(10) == [1, 3]
+            assert await client.statuses(9) == [1, 2, 3]
+            client.send(
+                task(
+                    "UPLOAD_SCRIPT",
+                    1,
+                    11,
+                    SCRIPT.format("b").replace(" id=", ' composition="APPEND" id=', 1),
+                    "BML",
+                )
+            )
+            assert await client.statuses(11) == [1, 2, 3], "nothing is left to wait for"
+
+    serving(test)
+
+
 @pytest.mark.parametrize(
     ("params", "statuses"),
     [

@@ -208,6 +208,23 @@ def test_a_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch
     playing(test)
 
 
+@pytest.mark.parametrize("lost", ["a session that fails", "a player that reads nothing"])
+def test_the_connection_is_made_anew_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
+
+    async def test(server: Server, player: Player) -> None:
+        await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
+        await player.until(lambda: {3: 500} in player.shown)
+        if lost == "a session that fails":
+            next(d for d in server.doors if isinstance(d, XfacePlayerDoor)).end(1011, "internal error")
+        else:
+            monkeypatch.setattr(xface_player, "STUCK", -1)  # so much always waits
+            await hold(server, '{"type":"set","faps":{"open_jaw":600}}')
+        await player.until(lambda: player.clients > 1)
+
+    playing(test)
+
+
 def test_who_does_not_greet_is_no_player(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

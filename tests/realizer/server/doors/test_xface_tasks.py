@@ -183,6 +183,23 @@ def test_a_script_is_started_with_its_first_block_and_finished_with_its_last() -
     assert talk.tell("a:end") == notes("UPLOAD_SCRIPT", 1, 3)
 
 
+def test_a_stop_ends_scripts_too_and_a_pause_does_not() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b")))
+    talk.tell("a:start")
+    talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("c",)))
+    assert talk.ask("PAUSE_PLAYBACK") == notes("PAUSE_PLAYBACK", 3, 1, 3)
+    assert talk.ask("STOP_PLAYBACK") == [
+        ("STOP_PLAYBACK", 4, 1),
+        {"stop": ["a", "b", "c"]},
+        ("UPLOAD_SCRIPT", 1, 3),
+        ("UPLOAD_SCRIPT", 2, 2),
+        ("UPLOAD_SCRIPT", 2, 3),
+        ("STOP_PLAYBACK", 4, 3),
+    ]
+    assert talk.tell("b:end") == []
+
+
 def test_a_script_whose_blocks_are_all_refused_is_an_error() -> None:
     talk = Talk()
     talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b")))
