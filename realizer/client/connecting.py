@@ -12,23 +12,27 @@ from realizer.server.messages import PROTOCOL
 __all__ = ["Connecting", "connect"]
 
 
-def connect(url: str) -> Connecting:
+def connect(url: str, *, token: str | None = None) -> Connecting:
     """`async with connect("ws://127.0.0.1:8765/ws?session=show") as client`, or `with` and no event loop.
 
     Without a session's name it is one of the client's own.
 
+    Args:
+        token: what a service that asks for one wants to hear.
+
     Raises:
         OSError: nobody listens there.
-        ClientError: the service speaks another version of the protocol.
+        ClientError: the service speaks another version of the protocol, or wants another token.
     """
-    return Connecting(url)
+    return Connecting(url, token)
 
 
 class Connecting:
     """What `connect` gives: a Client inside `async with`, a SyncClient inside `with`."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, token: str | None = None) -> None:
         self._url = url
+        self._token = token
         self._dial: Any = None
         self._client: Client | None = None
         self._plain: SyncClient | None = None
@@ -37,9 +41,10 @@ class Connecting:
         from websockets.asyncio.client import connect as dial
 
         self._dial = dial(self._url, compression=None, max_size=None, max_queue=None)
-        self._client = Client(await self._dial.__aenter__(), self._url)
+        self._client = Client(await self._dial.__aenter__(), self._url, self._token)
+        said = {"version": PROTOCOL} if self._token is None else {"version": PROTOCOL, "token": self._token}
         try:
-            self._client.welcome = await self._client.ask("hello", version=PROTOCOL)
+            self._client.welcome = await self._client.ask("hello", **said)
         except BaseException:
             await self._client.close()
             raise
@@ -52,7 +57,7 @@ class Connecting:
         await self._client.close()
 
     def __enter__(self) -> SyncClient:
-        self._plain = SyncClient(Connecting(self._url))
+        self._plain = SyncClient(Connecting(self._url, self._token))
         return self._plain
 
     def __exit__(

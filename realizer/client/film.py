@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import numpy as np
 
@@ -33,7 +34,7 @@ async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping
 
     if path.suffix.lower() not in FORMATS:
         raise ClientError(f"wanted a film ({' or '.join(FORMATS)}), got {path.name}", "film")
-    async with connect(_joining(client.url, client.session)) as camera:
+    async with connect(_joining(client.url, client.session), token=client._token) as camera:
         await camera.subscribe("video", fps=fps, **{**LOOK, **look})
         await camera.subscribe("audio", rate=RATE, **{k: v for k, v in look.items() if k == "character"})
         pictures: list[WireFrame] = []
@@ -101,6 +102,6 @@ def _sound(packets: Sequence[WireFrame], start: float, seconds: float) -> Int16:
 
 def _joining(url: str, session: str) -> str:
     """The address of another connection to the same session."""
-    from urllib.parse import urlencode, urlsplit
-
-    return urlsplit(url)._replace(query=urlencode({"session": session})).geturl()
+    parts = urlsplit(url)
+    others = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]
+    return parts._replace(query=urlencode([*others, ("session", session)])).geturl()

@@ -24,13 +24,15 @@ class Client:
         welcome: what the service said first: session, version, capabilities, limits.
     """
 
-    def __init__(self, socket: Any, url: str) -> None:
+    def __init__(self, socket: Any, url: str, token: str | None = None) -> None:
         self.url = url
+        self._token = token
         self.welcome: Mapping[str, Any] = {}
         self._socket = socket
         self._mail = Mail()
         self._news = asyncio.Condition()
         self._ended = False
+        self._why = ""
         self._reader = asyncio.create_task(self._read())
         self._asking = asyncio.Lock()
 
@@ -174,8 +176,8 @@ class Client:
                 self._mail.put(message)
                 async with self._news:
                     self._news.notify_all()
-        except ConnectionClosed:
-            pass
+        except ConnectionClosed as closed:
+            self._why = closed.rcvd.reason if closed.rcvd is not None else ""
         finally:
             self._ended = True
             async with self._news:
@@ -185,4 +187,4 @@ class Client:
         async with self._news:
             await self._news.wait_for(lambda: there() or self._ended)
         if not there():
-            raise ClientError("the connection has ended")
+            raise ClientError("the connection has ended" + (f": {self._why}" if self._why else ""))

@@ -149,6 +149,22 @@ def test_a_service_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch
     serving(test)
 
 
+def test_a_service_that_asks_for_a_token_gets_it() -> None:
+    secret = "a-token-of-many-letters-and-0123456789"
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", token=secret)
+        async with asyncio.timeout(LIMIT), Server(settings) as server:
+            async with connect(server.url, token=secret) as client:
+                assert (await client.play(WAIT.format("b"))).id == "b:end"
+            for token in (None, "another"):
+                with pytest.raises(ClientError, match="token"):
+                    async with connect(server.url, token=token):
+                        pass
+
+    asyncio.run(run())
+
+
 def test_feedback_ends_with_the_connection() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
