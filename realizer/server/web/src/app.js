@@ -1,38 +1,60 @@
-// The page: wires the face, the sound, the editor and the feedback log to one WebSocket.
+// The page: wires the face, the sound, the editor, the tools and the feedback log to one connection.
+import { Checker } from "./checker.js";
+import { at, choose, make, tabs } from "./dom.js";
+import { Editor } from "./editor.js";
 import { Log } from "./log.js";
+import { download, Pose } from "./pose.js";
 import { Clock, Realizer, Sound } from "./realizer.js";
-import { Score } from "./score.js";
+import { Recorder } from "./record.js";
+import { ActionUnits, Faps } from "./sliders.js";
 import { Stage } from "./stage.js";
+import { Timeline } from "./timeline.js";
+import { Tracks } from "./tracks.js";
+import { Wheel } from "./wheel.js";
 
 const MESH_RATE = 30; // frames a second; the page draws between them
+const CURVE_RATE = 25; // frames a second
 const BLOCK = /(<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*)(["'])(.*?)\2/;
-const at = (id) => document.getElementById(id);
+const THEMES = { "": "as the system", light: "light", dark: "dark" };
 
 const stage = new Stage(at("face"));
 const clock = new Clock();
 const sound = new Sound(clock);
-const log = new Log(at("log"));
-const score = new Score(at("score"));
-const name = new URLSearchParams(location.search).get("session") ?? `page-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
-const link = new Realizer({ session: name });
+const recorder = new Recorder(stage, sound);
+const log = new Log(at("log"), at("filter"), at("log-head").querySelectorAll("[type=checkbox]"));
+const query = new URLSearchParams(location.search);
+const link = new Realizer({ session: query.get("session") ?? undefined, token: query.get("token") });
+const pose = new Pose((message) => link.ask(message));
+const editor = new Editor(at("editor"), new Checker(), showFaults);
+const timeline = new Timeline(at("score"), scrub, () => stage.oldest);
+const units = new ActionUnits(at("au-sliders"), at("find-aus"), pose);
+const params = new Faps(at("fap-sliders"), at("find-faps"), pose);
+const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
 let plays = 0;
 let face = null;
 let faces = []; // names of those that the service has
+let faults = [];
+
+// the connection ------------------------------------------------------------------------------
 
 link.onopen = () => {
   clock.reset();
   sound.reset();
   stage.reset();
+  timeline.reset();
+  for (const tracks of Object.values(timeline.kinds)) tracks.reset();
   status("live", "Connected");
   link.ask({ type: "hello" });
+  link.ask({ type: "state" });
+  if (!pose.empty) link.ask(pose.message);
   subscribe();
 };
 link.onlost = () => status("lost", "Reconnecting");
 link.onfeedback = (element, seq) => {
   log.feedback(element, seq);
-  score.feedback(element);
+  timeline.feedback(element);
   const id = element.getAttribute("id") ?? "";
   if (element.localName === "predictionFeedback") for (const block of element.children) block.localName === "bml" && alive.add(block.id);
   else if (element.localName === "warningFeedback") alive.delete(id);
@@ -40,33 +62,57 @@ link.onfeedback = (element, seq) => {
 };
 link.onreply = (message) => {
   if (message.type === "welcome") faces = message.capabilities.faces ?? [];
+  if (message.type === "state") showVoice(message.characters[0]?.voice ?? message.voice.name);
   if (message.type === "subscribed" && message.stream === "mesh") showFace(message);
   if (message.type === "subscribed" && message.stream === "audio") sound.rate = message.rate;
+  if (message.type === "subscribed" && message.stream in timeline.kinds) timeline.kinds[message.stream].begin(message.names);
   if (message.type === "error") {
-    log.error(message);
+    log.error(message.message);
     if (message.where?.startsWith("subscribe") || message.code === "face") at("stage-note").textContent = message.message;
   }
 };
 link.onframe = (frame) => {
-  if (frame.kind === 5) {
+  if (frame.stream === "mesh") {
     clock.heard(frame.time, performance.now() / 1000);
     stage.add(frame.time, frame.values());
-  } else if (frame.kind === 4) {
+  } else if (frame.stream === "audio") {
+    if (timeline.scrub !== null) return;
     sound.packet(frame.time, frame.values(), frame.forget);
-  }
+    if (recorder.on) recorder.packet(frame.time, frame.values());
+  } else if (frame.stream === "schedule") timeline.plan(frame);
+  else timeline.kinds[frame.stream]?.add(frame.time, frame.values());
 };
 
 function subscribe() {
   if (document.hidden) return;
-  link.ask({ type: "subscribe", stream: "mesh", fps: MESH_RATE });
-  link.ask({ type: "subscribe", stream: "audio", rate: sound.rate });
+  link.subscribe("mesh", { fps: MESH_RATE });
+  link.subscribe("audio", { rate: sound.rate });
+  link.subscribe("schedule");
+  for (const stream of Object.keys(timeline.kinds)) link.subscribe(stream, { fps: CURVE_RATE });
 }
+
+function status(state, text) {
+  at("status").dataset.state = state;
+  at("status-text").textContent = text;
+  for (const id of ["play", "replace", "stop"]) at(id).disabled = state !== "live";
+}
+
+document.addEventListener("visibilitychange", () => {
+  if (!link.open) return;
+  if (document.hidden) link.unsubscribe("mesh");
+  else {
+    stage.reset();
+    link.subscribe("mesh", { fps: MESH_RATE });
+  }
+});
+
+// the face ------------------------------------------------------------------------------------
 
 async function showFace(message) {
   showFaces(message);
   const key = `${message.face}/${message.vertices}`;
-  if (face === key) return;
-  face = key;
+  if (face?.key === key) return;
+  face = { key, name: message.face };
   try {
     await stage.load(message.face, message.scale, message.offset);
     at("stage-note").textContent = "";
@@ -79,11 +125,11 @@ async function showFace(message) {
 
 // A button for each face there is: the character gets it, and the mesh begins anew.
 function showFaces({ face }) {
-  choose("faces", faces, face, (name) => {
+  choose(at("faces"), faces, face, (name) => {
     link.ask({ type: "character", face: name });
-    link.ask({ type: "unsubscribe", stream: "mesh" });
+    link.unsubscribe("mesh");
     stage.reset();
-    link.ask({ type: "subscribe", stream: "mesh", fps: MESH_RATE });
+    link.subscribe("mesh", { fps: MESH_RATE });
   });
 }
 
@@ -91,36 +137,35 @@ function showFaces({ face }) {
 function showLights() {
   const { lights, light } = stage.look;
   const own = Object.keys(lights).find((name) => JSON.stringify(lights[name]) === JSON.stringify(light));
-  choose("lights", Object.keys(lights), stage.light ?? own, (name) => stage.shine(name));
+  choose(at("lights"), Object.keys(lights), stage.light ?? own, (name) => stage.shine(name));
 }
 
-// Buttons of which one is pressed.
-function choose(place, names, pressed, take) {
-  const buttons = names.map((name) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = name[0].toUpperCase() + name.slice(1);
-    button.setAttribute("aria-pressed", String(name === pressed));
-    button.onclick = () => {
-      take(name);
-      for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
-    };
-    return button;
-  });
-  at(place).replaceChildren(...buttons);
-  at(place).hidden = buttons.length < 2;
+function scrub(time) {
+  at("live").hidden = time === null;
+  at("stage").classList.toggle("past", time !== null);
+  if (time !== null) sound.forget(-Infinity);
+}
+at("live").onclick = () => timeline.look(null);
+
+function draw() {
+  const now = sound.playhead() ?? clock.playhead(performance.now() / 1000);
+  stage.draw(timeline.scrub ?? now);
+  if (recorder.on) {
+    recorder.draw();
+    at("record").lastElementChild.textContent = `Stop ${recorder.seconds.toFixed(0)} s`;
+  }
+  timeline.draw(now);
+  requestAnimationFrame(draw);
 }
 
-function status(state, text) {
-  at("status").dataset.state = state;
-  at("status-text").textContent = text;
-  for (const id of ["play", "replace", "stop"]) at(id).disabled = state !== "live";
-}
+// the script ----------------------------------------------------------------------------------
 
 function play(replace) {
+  if (at("play").disabled) return;
   sound.start();
   showSound();
-  const text = at("document").value;
+  timeline.look(null);
+  const text = editor.text;
   const id = text.match(BLOCK)?.[3];
   // An id is free again when its block has ended; until then the same document plays under a new one.
   const own = alive.has(id) ? text.replace(BLOCK, `$1$2$3-${++plays}$2`) : text;
@@ -135,63 +180,148 @@ function replacing(text) {
   });
 }
 
-function showSound() {
-  at("sound").setAttribute("aria-pressed", String(sound.on));
-  at("sound").textContent = sound.on ? "Sound on" : "Sound off";
+function showFaults(found) {
+  faults = (found ?? []).filter((fault) => fault.spots.length || fault.type !== "ADVICE");
+  const count = (some, one) => (some.length ? `${some.length} ${one}${some.length > 1 && one === "fault" ? "s" : ""}` : "");
+  const bad = faults.filter(({ type }) => type !== "ADVICE");
+  const advice = faults.filter(({ type }) => type === "ADVICE");
+  const line = faults[0]?.spots[0]?.line;
+  const first = faults[0] ? `${line ? `line ${line}: ` : ""}${faults[0].text}` : "";
+  const empty = !editor.text.trim();
+  at("problems").dataset.state = found === null || empty ? "none" : bad.length ? "bad" : advice.length ? "advice" : "good";
+  at("problems").title = first;
+  at("problems-text").textContent = found === null ? "Not checked" : empty ? "Nothing to play yet" : faults.length ? `${[count(bad, "fault"), count(advice, "advice")].filter(Boolean).join(", ")}: ${first}` : "No faults";
 }
 
+at("problems").onclick = () => {
+  if (faults[0]) editor.show(faults[0]);
+};
 at("play").onclick = () => play(false);
 at("replace").onclick = () => play(true);
 at("stop").onclick = () => link.ask({ type: "stop" });
 at("clear").onclick = () => log.clear();
-at("points").onchange = (event) => at("log").classList.toggle("no-points", !event.target.checked);
+
+// In front of the editor, which has keys of its own.
+addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey)) return;
+  if (event.key === "Enter") play(event.shiftKey);
+  else if (event.key === ".") link.ask({ type: "stop" });
+  else return;
+  event.preventDefault();
+  event.stopPropagation();
+}, true);
+
+async function examples() {
+  const rows = await (await fetch("examples.json")).json();
+  const cards = rows.map((row) => {
+    const about = row.bml.match(/<!--\s*([\s\S]*?)\s*-->/)?.[1].replace(/\s+/g, " ") ?? "";
+    const card = make("button.card", { type: "button", title: about }, make("b", {}, row.title), make("span", {}, about));
+    card.onclick = () => {
+      editor.text = row.bml;
+      for (const other of cards) other.ariaPressed = String(other === card);
+    };
+    return card;
+  });
+  at("gallery").append(...cards);
+  if (!editor.text) cards[0]?.click();
+}
+
+// voice, sound, film --------------------------------------------------------------------------
+
+function showVoices(voices) {
+  at("voice").replaceChildren(...voices.filter(({ available }) => available).map(({ name }) => make("option", { value: name }, name)));
+  at("voice-pick").hidden = at("voice").length < 2;
+}
+
+function showVoice(name) {
+  const known = [...at("voice").options].find(({ value }) => value === name) ?? [...at("voice").options].find(({ value }) => name?.startsWith(value));
+  if (known) at("voice").value = known.value;
+}
+at("voice").onchange = () => link.ask({ type: "character", voice: at("voice").value });
+
+function showSound() {
+  at("sound").ariaPressed = String(sound.on);
+  at("sound").lastElementChild.textContent = sound.on ? "Sound on" : "Sound off";
+}
 at("sound").onclick = () => {
   sound.on ? sound.mute() : sound.start();
   showSound();
 };
-addEventListener("keydown", (event) => {
-  if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) {
-    event.preventDefault();
-    if (!at("play").disabled) play(event.shiftKey);
-  }
-});
-document.addEventListener("visibilitychange", () => {
-  if (!link.open) return;
-  if (document.hidden) link.ask({ type: "unsubscribe", stream: "mesh" });
-  else {
-    stage.reset();
-    link.ask({ type: "subscribe", stream: "mesh", fps: MESH_RATE });
-  }
-});
 
-function draw() {
-  const playhead = sound.playhead() ?? clock.playhead(performance.now() / 1000);
-  stage.draw(playhead);
-  score.draw(playhead);
-  requestAnimationFrame(draw);
+at("record").hidden = typeof MediaRecorder === "undefined";
+at("record").onclick = async () => {
+  if (!recorder.on) {
+    sound.start();
+    showSound();
+    recorder.start();
+  } else {
+    const { blob, suffix } = await recorder.stop();
+    download(blob, `face.${suffix}`);
+    at("record").lastElementChild.textContent = "Record";
+  }
+  at("record").ariaPressed = String(recorder.on);
+};
+
+// the pose ------------------------------------------------------------------------------------
+
+tabs(at("tabs"), (tab) => {
+  at("pose").hidden = tab === "tab-script";
+});
+pose.addEventListener("change", () => {
+  const parts = [pose.emotion && "an emotion", pose.aus.size && `${pose.aus.size} AU${pose.aus.size > 1 ? "s" : ""}`, pose.faps.size && `${pose.faps.size} FAP${pose.faps.size > 1 ? "s" : ""}`];
+  at("held").textContent = pose.empty ? "" : `held: ${parts.filter(Boolean).join(", ")}`;
+});
+at("neutral").onclick = () => pose.clear();
+at("save").onclick = async () => {
+  try {
+    download(await pose.file(face?.name), "pose.fap");
+  } catch (error) {
+    log.error(error.message);
+  }
+};
+
+// the page ------------------------------------------------------------------------------------
+
+function dress(theme) {
+  document.documentElement.dataset.theme = theme;
+  at("theme").ariaLabel = at("theme").title = `Theme: ${THEMES[theme]}`;
 }
+at("theme").onclick = () => {
+  const all = Object.keys(THEMES);
+  const next = all[(all.indexOf(document.documentElement.dataset.theme) + 1) % all.length];
+  localStorage.setItem("theme", next);
+  dress(next);
+};
+dress(localStorage.getItem("theme") in THEMES ? localStorage.getItem("theme") : "");
+at("help").onclick = () => at("keys").showModal();
 
-async function examples() {
-  const rows = await (await fetch("examples.json")).json();
-  const buttons = rows.map((row) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = row.title;
-    button.onclick = () => {
-      at("document").value = row.bml;
-      at("document").scrollTop = 0;
-      for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
-    };
-    return button;
-  });
-  at("gallery").append(...buttons);
-  if (!at("document").value) buttons[0]?.click();
+async function vocabulary() {
+  const known = await (await fetch("vocabulary.json")).json();
+  editor.know(known);
+  units.know(known);
+  params.know(known);
+  wheel.know(known);
+  showVoices(known.voices);
+  const unit = new Map(known.aus.map(({ au, name }) => [String(au), name]));
+  const param = new Map(known.faps.map((row) => [row.name, row]));
+  // A track is full where a FAP moves by half of its unit; eyes and head by half of what they can.
+  const reach = (name) => (param.get(name)?.unit === "angle_unit" ? 50_000 : 512);
+  timeline.kinds = {
+    au: new Tracks(() => 1, (number) => `${number} ${unit.get(number) ?? ""}`, (name) => name.replace(/[LR]$/, "")),
+    fap: new Tracks(reach, (name) => `${param.get(name)?.fap} ${name.replaceAll("_", " ")}`, (name) => name),
+  };
+  choose(at("curves"), ["au", "fap"], "au", (kind) => timeline.show(kind), (kind) => kind.toUpperCase() + "s");
+  timeline.show("au");
+  if (link.open) {
+    for (const stream of Object.keys(timeline.kinds)) link.subscribe(stream, { fps: CURVE_RATE });
+    link.ask({ type: "state" });
+  }
 }
 
 status("connecting", "Connecting");
-examples().catch((error) => log.error({ message: `examples: ${error.message}` }));
+for (const [what, load] of Object.entries({ examples, vocabulary })) load().catch((error) => log.error(`${what}: ${error.message}`));
 link.connect();
 requestAnimationFrame(draw);
 
 // For whoever tests the page: what has been shown.
-globalThis.realizerPage = { stage, sound, link, clock };
+globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder };

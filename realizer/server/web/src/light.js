@@ -13,13 +13,22 @@ export function lightUniforms(look, shade) {
 }
 
 // The backdrop of the stills, as realizer/render/backdrop.py draws it: its smooth step in five stops.
-export function backdrop({ backdrop_middle: middle, backdrop_edge: edge }) {
-  const stops = [0, 0.25, 0.5, 0.75, 1].map((t) => {
+export const REACH = [0.675, 0.75]; // of width and height, from the middle to the edge's colour
+export const MIDDLE = [0.5, 0.444];
+
+// [0..1 from the middle, colour]
+export function stops({ backdrop_middle: middle, backdrop_edge: edge }) {
+  return [0, 0.25, 0.5, 0.75, 1].map((t) => {
     const mix = t * t * (3 - 2 * t);
     const [r, g, b] = middle.map((m, k) => Math.round(255 * (m + (edge[k] - m) * mix)));
-    return `rgb(${r} ${g} ${b}) ${100 * t}%`;
+    return [t, `rgb(${r} ${g} ${b})`];
   });
-  return `radial-gradient(67.5% 75% at 50% 44.4%, ${stops.join(", ")})`;
+}
+
+export function backdrop(look) {
+  const percent = (part) => `${100 * part}%`;
+  const list = stops(look).map(([t, colour]) => `${colour} ${percent(t)}`);
+  return `radial-gradient(${REACH.map(percent).join(" ")} at ${MIDDLE.map(percent).join(" ")}, ${list.join(", ")})`;
 }
 
 export const vertex = `

@@ -1,11 +1,15 @@
-// The feedback log: one line a message, newest at the bottom, each once.
+// The feedback log: one line a message, newest at the bottom, each once; what is not wanted is hidden.
+import { make } from "./dom.js";
 
-const MOST = 400; // lines
+const MOST = 600; // lines
 
 export class Log {
-  constructor(list) {
+  constructor(list, filter, kinds) {
     this.list = list;
     this.last = 0;
+    this.filter = filter;
+    filter.oninput = () => this.sift();
+    for (const box of kinds) box.onchange = () => this.list.classList.toggle(`no-${box.value}`, !box.checked);
   }
 
   feedback(element, seq) {
@@ -26,13 +30,13 @@ export class Log {
         for (const block of element.children) {
           if (block.localName !== "bml" || !block.hasAttribute("globalEnd")) continue;
           const length = block.getAttribute("globalEnd") - block.getAttribute("globalStart");
-          this.line("point", block.getAttribute("globalStart"), `${block.getAttribute("id")} is planned, ${length.toFixed(2)} s`, element);
+          this.line("plan", block.getAttribute("globalStart"), `${block.getAttribute("id")} is planned, ${length.toFixed(2)} s`, element);
         }
     }
   }
 
   error(message) {
-    this.line("error", null, message.message);
+    this.line("error", null, message);
   }
 
   clear() {
@@ -41,16 +45,16 @@ export class Log {
 
   line(kind, time, text, element) {
     const stays = this.list.scrollTop + this.list.clientHeight < this.list.scrollHeight - 20;
-    const item = document.createElement("li");
-    item.className = kind;
+    const item = make(`li.${kind}`, {}, make("time", {}, time === null ? "" : Number(time).toFixed(2)), make("span", {}, text));
     if (element) item.title = element.outerHTML;
-    const stamp = document.createElement("time");
-    stamp.textContent = time === null ? "" : Number(time).toFixed(2);
-    const words = document.createElement("span");
-    words.textContent = text;
-    item.append(stamp, words);
+    this.sift([item]);
     this.list.append(item);
     while (this.list.childElementCount > MOST) this.list.firstElementChild.remove();
     if (!stays) this.list.scrollTop = this.list.scrollHeight;
+  }
+
+  sift(items = this.list.children) {
+    const words = this.filter.value.trim().toLowerCase();
+    for (const item of items) item.hidden = !`${item.className} ${item.textContent}`.toLowerCase().includes(words);
   }
 }

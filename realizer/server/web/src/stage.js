@@ -2,9 +2,9 @@
 import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, PerspectiveCamera, Scene, ShaderMaterial, Spherical, Vector3, WebGLRenderer } from "three";
 import { readGlb } from "./glb.js";
 import { Furrows, Glints } from "./figure.js";
-import { backdrop, fragment, lightUniforms, vertex } from "./light.js";
+import { backdrop, fragment, lightUniforms, MIDDLE, REACH, stops, vertex } from "./light.js";
 
-const KEPT = 60; // frames
+const KEPT = 20; // s of frames, to look back at
 // The width of the head over the height of the front camera's picture: narrower pictures step back.
 const HEAD = 0.66;
 const RANGE = { yaw: 1.6, pitch: 0.7 }; // rad
@@ -65,6 +65,19 @@ export class Stage {
     this.canvas.parentElement.style.background = this.look.background ?? backdrop(this.lit);
   }
 
+  // The same on a canvas of its own, for a film.
+  paintBackdrop(pen, width, height) {
+    pen.fillStyle = this.look?.background ?? "#000";
+    if (this.lit && !this.look.background) {
+      const gradient = pen.createRadialGradient(0, 0, 0, 0, 0, 1);
+      for (const [part, colour] of stops(this.lit)) gradient.addColorStop(part, colour);
+      pen.setTransform(REACH[0] * width, 0, 0, REACH[1] * height, MIDDLE[0] * width, MIDDLE[1] * height);
+      pen.fillStyle = gradient;
+      pen.fillRect(-2, -2, 4, 4);
+      pen.setTransform(1, 0, 0, 1, 0, 0);
+    } else pen.fillRect(0, 0, width, height);
+  }
+
   reset() {
     this.frames = [];
   }
@@ -73,7 +86,12 @@ export class Stage {
     const late = this.frames.at(-1);
     if (late && time <= late.time) return;
     this.frames.push({ time, values });
-    if (this.frames.length > KEPT) this.frames.shift();
+    while (this.frames[0].time < time - KEPT) this.frames.shift();
+  }
+
+  // The session time of the first frame that is remembered.
+  get oldest() {
+    return this.frames[0]?.time ?? Infinity;
   }
 
   draw(playhead) {
@@ -89,9 +107,10 @@ export class Stage {
 
   // Vertices at `playhead`, between the two frames around it.
   pose(playhead) {
-    while (this.frames.length > 2 && this.frames[1].time <= playhead) this.frames.shift();
     if (!this.frames.length) return;
-    const [a, b = a] = this.frames;
+    const first = Math.max(0, this.frames.findLastIndex(({ time }) => time <= playhead));
+    const a = this.frames[first];
+    const b = this.frames[first + 1] ?? a;
     const position = this.mesh.geometry.attributes.position;
     if (a.values.length !== position.array.length) return;
     const t = b.time > a.time ? Math.min(1, Math.max(0, (playhead - a.time) / (b.time - a.time))) : 0;

@@ -1,0 +1,40 @@
+// Texts in, their faults out, as `realizer check` finds them: one question at a time, over a WebSocket of its own.
+
+export class Checker {
+  constructor() {
+    this.socket = null;
+    this.waiting = []; // {resolve, reject}, in the order they were asked
+  }
+
+  // The faults of a text; rejects where the service cannot be asked.
+  async ask(text) {
+    const socket = await this.open();
+    return new Promise((resolve, reject) => {
+      this.waiting.push({ resolve, reject });
+      socket.send(text);
+    });
+  }
+
+  open() {
+    if (this.socket?.readyState === WebSocket.OPEN) return this.socket;
+    return (this.opening ??= new Promise((resolve, reject) => {
+      const url = new URL("check", location.href);
+      url.protocol = url.protocol.replace("http", "ws");
+      const token = new URLSearchParams(location.search).get("token");
+      if (token) url.searchParams.set("token", token);
+      const socket = new WebSocket(url);
+      socket.onopen = () => {
+        this.socket = socket;
+        this.opening = null;
+        resolve(socket);
+      };
+      socket.onmessage = (event) => this.waiting.shift()?.resolve(JSON.parse(event.data).faults);
+      socket.onclose = () => {
+        this.opening = null;
+        const lost = new Error("the service cannot be asked");
+        for (const { reject: refuse } of this.waiting.splice(0)) refuse(lost);
+        reject(lost);
+      };
+    }));
+  }
+}

@@ -1,0 +1,54 @@
+// Elements of the page: found by id, or made.
+
+export const at = (id) => document.getElementById(id);
+
+// make("li.point", { title: "..." }, "text", child): attributes as properties where there is one.
+export function make(what, properties = {}, ...children) {
+  const [tag, ...classes] = what.split(".");
+  const element = document.createElement(tag);
+  element.className = classes.join(" ");
+  for (const [name, value] of Object.entries(properties)) {
+    if (name in element) element[name] = value;
+    else element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+// Buttons of which one is pressed.
+export function choose(place, names, pressed, take, title = (name) => name[0].toUpperCase() + name.slice(1)) {
+  const buttons = names.map((name) => {
+    const button = make("button", { type: "button", textContent: title(name), ariaPressed: String(name === pressed) });
+    button.onclick = () => {
+      for (const other of buttons) other.ariaPressed = String(other === button);
+      take(name);
+    };
+    return button;
+  });
+  place.replaceChildren(...buttons);
+  place.hidden = buttons.length < 2;
+}
+
+// A tab strip as WAI-ARIA has it: one tab stop, arrow keys between tabs.
+export function tabs(strip, shown) {
+  const all = [...strip.querySelectorAll('[role="tab"]')];
+  const show = (tab) => {
+    for (const one of all) {
+      const here = one === tab;
+      one.ariaSelected = String(here);
+      one.tabIndex = here ? 0 : -1;
+      at(one.getAttribute("aria-controls")).hidden = !here;
+    }
+    shown(tab.id);
+  };
+  for (const tab of all) tab.onclick = () => show(tab);
+  strip.onkeydown = (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    const next = event.key === "Home" ? 0 : event.key === "End" ? all.length - 1 : step && (all.indexOf(document.activeElement) + step + all.length) % all.length;
+    if (next === undefined) return;
+    event.preventDefault();
+    all[next].focus();
+    show(all[next]);
+  };
+  show(all[0]);
+}

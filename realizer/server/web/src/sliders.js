@@ -1,0 +1,119 @@
+// Sliders for every action unit, a side each, and for every FAP; they show what the pose holds.
+import { make } from "./dom.js";
+
+const NEAR = 1024; // FAPU: what a slider reaches; the number beside it takes all that the table allows
+const ANGLES = 100_000; // 1e-5 rad: as far as eyes and head turn
+
+// Rows under headings, and a field that finds them.
+class Sliders {
+  constructor(panel, search, pose) {
+    Object.assign(this, { panel, pose, rows: [] });
+    search.oninput = () => this.find(search.value.trim().toLowerCase());
+    pose.addEventListener("change", () => this.refresh());
+  }
+
+  fill(groups, rowOf) {
+    this.rows = [];
+    this.panel.replaceChildren(
+      ...groups.map(({ name, members }) => {
+        const rows = members.map(rowOf).filter(Boolean);
+        this.rows.push(...rows);
+        return make("fieldset.group", {}, this.heading(name), ...rows.map((row) => row.element));
+      }),
+    );
+    this.refresh();
+  }
+
+  heading(name) {
+    return make("legend", {}, name);
+  }
+
+  find(words) {
+    for (const row of this.rows) row.element.hidden = !row.words.includes(words);
+    for (const group of this.panel.children) group.hidden = [...group.querySelectorAll(".row")].every((row) => row.hidden);
+  }
+
+  refresh() {
+    for (const row of this.rows) row.refresh();
+  }
+}
+
+function slider(label, low, high, step, changed) {
+  const input = make("input", { type: "range", min: low, max: high, step, value: 0, ariaLabel: label });
+  input.oninput = () => changed(Number(input.value));
+  return input;
+}
+
+// A slider shows how far it is from its neutral place.
+function show(input, value) {
+  if (Number(input.value) !== value) input.value = value;
+  const [low, high] = [Number(input.min), Number(input.max)];
+  const place = (x) => (100 * (Math.min(high, Math.max(low, x)) - low)) / (high - low);
+  const ends = [place(0), place(value)];
+  input.style.setProperty("--from", `${Math.min(...ends)}%`);
+  input.style.setProperty("--to", `${Math.max(...ends)}%`);
+}
+
+export class ActionUnits extends Sliders {
+  know({ aus, groups }) {
+    const known = new Map(aus.map((row) => [row.au, row]));
+    this.fill(groups.aus, (number) => known.has(number) && this.row(known.get(number)));
+  }
+
+  heading(name) {
+    return make("legend.sides", {}, make("span", {}, name), make("span.side", {}, "right"), make("span.side", {}, "left"));
+  }
+
+  // Both sides move together until they are parted.
+  row({ au, name, sides }) {
+    const { pose } = this;
+    const names = sides ? [`${au}R`, `${au}L`] : [String(au)];
+    let together = true;
+    const set = (name, value) => {
+      const touched = together ? names : [name];
+      pose.set({ aus: Object.fromEntries(touched.map((one) => [one, value || null])) });
+    };
+    const inputs = names.map((one) => slider(`AU ${au} ${name}${sides ? (one.endsWith("R") ? ", right" : ", left") : ""}`, 0, 1, 0.01, (value) => set(one, value)));
+    const link = make("button.link", { type: "button", title: "Both sides together", ariaLabel: `AU ${au}: both sides together`, ariaPressed: "true" });
+    link.onclick = () => {
+      together = !together;
+      link.ariaPressed = String(together);
+    };
+    const value = make("output");
+    const element = make("div.row.au", {}, make("b", {}, String(au)), make("span", { title: name }, name), ...(sides ? [inputs[0], link, inputs[1]] : inputs), value);
+    if (!sides) element.classList.add("middle");
+    const refresh = () => {
+      const held = names.map((one) => pose.aus.get(one) ?? 0);
+      inputs.forEach((input, k) => show(input, held[k]));
+      element.classList.toggle("held", held.some(Boolean));
+      const words = held.map((x) => Math.round(100 * x));
+      value.textContent = held.some(Boolean) ? (words[0] === words.at(-1) ? `${words[0]}` : words.join(" | ")) : "";
+    };
+    return { element, refresh, words: `au${au} ${au} ${name}`.toLowerCase() };
+  }
+}
+
+export class Faps extends Sliders {
+  know({ faps, groups }) {
+    const known = new Map(faps.map((row) => [row.fap, row]));
+    this.fill(groups.faps, (number) => this.row(known.get(number)));
+  }
+
+  row({ fap, name, unit, least, most }) {
+    const { pose } = this;
+    const reach = unit === "angle_unit" ? ANGLES : NEAR;
+    const set = (value) => pose.set({ faps: { [name]: value || null } });
+    const words = name.replaceAll("_", " ");
+    const input = slider(`FAP ${fap} ${words}`, Math.max(least, -reach), Math.min(most, reach), unit === "angle_unit" ? 500 : 5, set);
+    const number = make("input", { type: "number", min: least, max: most, step: "any", ariaLabel: `FAP ${fap} ${words}, value` });
+    number.onchange = () => set(Math.min(most, Math.max(least, Number(number.value) || 0)));
+    const element = make("div.row.fap", {}, make("b", {}, String(fap)), make("span", { title: `${name}, in ${unit}` }, words), input, number);
+    const refresh = () => {
+      const held = pose.faps.get(name) ?? 0;
+      show(input, held);
+      if (document.activeElement !== number || Number(number.value) !== held) number.value = Math.round(held);
+      element.classList.toggle("held", pose.faps.has(name));
+    };
+    return { element, refresh, words: `f${fap} ${fap} ${words}` };
+  }
+}

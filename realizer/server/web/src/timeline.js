@@ -1,0 +1,215 @@
+// What plays over time: each behaviour as it was scheduled and as it happened, curves of AUs or FAPs, the playhead.
+import { at, make } from "./dom.js";
+
+const IDLE = 8; // s shown where no block is
+const AFTER = 0.6; // s shown after a block's end
+const LEAST = 2; // s
+const CURVES = 0.25; // s between looks at which curves move most
+const BLOCKS = 12; // that are remembered
+const OVER = /DONE|INTERRUPTED|FAILED|REVOKED/;
+const STEP = 0.1; // s of an arrow key
+const POINTS = 10; // px between lines of the ruler, at least times its words
+
+export class Timeline {
+  // scrubbed(time): where the past is looked at; null is now. oldest(): how far back that goes.
+  constructor(panel, scrubbed, oldest) {
+    Object.assign(this, { panel, scrubbed, oldest, blocks: new Map(), current: null, kinds: {}, shownKind: null, scrub: null, now: null });
+    this.ruler = make("div.ruler", { ariaHidden: "true" });
+    this.lines = make("div.lines");
+    this.curves = make("div.lines");
+    this.head = make("div.head", {}, make("output"));
+    this.slider = make("div.scrub", { role: "slider", tabIndex: 0, ariaLabel: "Time; arrow keys look at the past, End comes back to now" });
+    panel.replaceChildren(make("div.sheet", {}, this.ruler, this.lines, this.curves, this.slider, this.head));
+    this.slider.onpointerdown = (event) => {
+      this.slider.setPointerCapture(event.pointerId);
+      this.touch(event);
+    };
+    this.slider.onpointermove = (event) => event.buttons && this.touch(event);
+    this.slider.onkeydown = (event) => this.key(event);
+  }
+
+  reset() {
+    this.blocks.clear();
+    this.current = null;
+    this.look(null);
+  }
+
+  // What is known of a block; its id may be used again when it has ended.
+  block(id, again) {
+    const known = this.blocks.get(id);
+    if (known && !(again && known.over)) return known;
+    const block = { id, start: null, end: null, ended: null, over: false, lines: [], first: new Map(), happened: new Map() };
+    this.blocks.delete(id);
+    this.blocks.set(id, block);
+    while (this.blocks.size > BLOCKS) this.blocks.delete(this.blocks.keys().next().value);
+    return block;
+  }
+
+  // A message of the stream `schedule`: blocks whole, or only their state.
+  plan({ blocks }) {
+    for (const one of blocks) {
+      const block = this.block(one.block, Boolean(one.behaviours) && !OVER.test(one.state));
+      Object.assign(block, { start: one.start ?? block.start, end: one.end ?? block.end, over: block.over || OVER.test(one.state) });
+      for (const line of one.behaviours ?? []) {
+        if (!block.first.has(line.id)) block.first.set(line.id, line.syncs);
+      }
+      if (one.behaviours) block.lines = one.behaviours;
+      if (block === this.current) this.stale = true;
+    }
+  }
+
+  // Feedback: what happened, and when.
+  feedback(element) {
+    const time = Number(element.getAttribute("globalTime"));
+    const [id, behaviour, ...sync] = (element.getAttribute("id") ?? "").split(":");
+    if (element.localName === "syncPointProgress") {
+      const block = this.block(id);
+      block.happened.set(behaviour, [...(block.happened.get(behaviour) ?? []), { name: sync.join(":"), time }]);
+      this.stale ||= block === this.current;
+    } else if (element.localName === "blockProgress") {
+      const block = this.block(id, behaviour === "start");
+      if (behaviour === "end") Object.assign(block, { ended: time, over: true });
+      else block.start ??= time;
+    }
+  }
+
+  // Which curves are shown: "au" or "fap".
+  show(kind) {
+    this.shownKind = kind;
+    this.looked = -Infinity;
+  }
+
+  get range() {
+    const { current, now } = this;
+    if (!current) return [now - IDLE, now + 0.02 * IDLE];
+    const end = Math.max(current.start + LEAST, current.ended ?? current.end ?? now, ...[...current.first.values()].flat().map(({ at }) => at ?? 0));
+    const length = Math.min(end, current.start + 3600) - current.start;
+    return [current.start - 0.03 * length, current.start + length + AFTER];
+  }
+
+  draw(now) {
+    if (now === null) return;
+    this.now = now;
+    let current = null;
+    for (const block of this.blocks.values()) if (block.lines.length && block.start !== null && block.start <= now && (!current || block.start >= current.start)) current = block;
+    // A block that is over stays to be looked at, for as long as its face is remembered.
+    if (current && (current.ended ?? current.end ?? Infinity) < this.oldest()) current = null;
+    if (current !== this.current) {
+      this.current = current;
+      this.stale = true;
+    }
+    const [from, to] = this.range;
+    if (this.stale) this.build(from, to);
+    this.stale = false;
+    this.mark(from, to);
+    if (!this.looked || now - this.looked > CURVES || now < this.looked) {
+      this.looked = now;
+      const kind = this.kinds[this.shownKind];
+      const rows = kind?.rows(from, to) ?? [];
+      if (rows.some(({ element }, k) => this.curves.children[k] !== element) || rows.length !== this.curves.childElementCount) this.curves.replaceChildren(...rows.map(({ element }) => element));
+      const style = getComputedStyle(this.panel);
+      const colours = [style.getPropertyValue("--curve"), style.getPropertyValue("--curve-2")];
+      for (const row of rows) kind.draw(row, from, to, colours);
+    }
+    if (!current) this.rule(from, to);
+    const time = this.scrub ?? now;
+    const part = (time - from) / (to - from);
+    const inside = part >= 0 && part <= 1;
+    this.head.hidden = !inside;
+    if (inside) this.head.style.setProperty("--at", part);
+    this.head.firstChild.textContent = `${(time - (current?.start ?? now)).toFixed(2)} s`;
+    for (const [name, value] of Object.entries({ valuemin: from, valuemax: to, valuenow: time })) this.slider.setAttribute(`aria-${name}`, value.toFixed(2));
+  }
+
+  build(from, to) {
+    const { current } = this;
+    at("playing").textContent = current ? current.id : "";
+    const place = (time) => `${(100 * (time - from)) / (to - from)}%`;
+    this.lines.replaceChildren(
+      ...(current?.lines ?? []).map((line) => {
+        const planned = (current.first.get(line.id) ?? line.syncs).filter(({ at }) => at !== null);
+        const happened = current.happened.get(line.id) ?? [];
+        const lane = make("div.lane");
+        if (planned.length) {
+          const times = planned.map(({ at }) => at);
+          lane.append(bar("planned", place, Math.min(...times), Math.max(...times)));
+          lane.append(...planned.map(({ name, at }) => tick("tick", place(at), `${name}: scheduled ${(at - current.start).toFixed(2)} s`)));
+        }
+        for (const { start, end, text } of line.words ?? []) {
+          const word = make("span.word", { title: text }, text);
+          word.style.left = place(current.start + start);
+          word.style.width = `${(100 * (end - start)) / (to - from)}%`;
+          lane.append(word);
+        }
+        if (happened.length) {
+          const done = happened.at(-1).name === "end";
+          const fill = bar("happened", place, happened[0].time, happened.at(-1).time);
+          if (!done) fill.dataset.from = happened[0].time;
+          lane.append(fill, ...happened.map(({ name, time }) => tick("dot", place(time), `${name}: happened at ${(time - current.start).toFixed(2)} s`)));
+        }
+        const label = make("span", { title: `${line.element} ${line.id}` }, line.id);
+        return make("div.track", {}, label, lane);
+      }),
+    );
+    this.rule(from, to);
+  }
+
+  // What is not over yet grows.
+  mark(from, to) {
+    for (const fill of this.lines.querySelectorAll("[data-from]")) {
+      const start = Number(fill.dataset.from);
+      const end = Math.min(this.now, this.current.ended ?? this.now);
+      fill.style.width = `${(100 * Math.max(0, end - start)) / (to - from)}%`;
+    }
+  }
+
+  // Lines of the ruler: seconds from the block's start, or from now.
+  rule(from, to) {
+    const zero = this.current?.start ?? this.now;
+    const room = this.ruler.clientWidth / (POINTS * 6);
+    const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 300, 1200].find((s) => (to - from) / s <= room) ?? 3600;
+    const marks = [];
+    for (let k = Math.ceil((from - zero) / step); k * step <= to - zero; k++) {
+      if (!k && !this.current) continue; // the playhead says so itself
+      const mark = make("span", {}, `${Number((k * step).toFixed(1))} s`);
+      mark.style.left = `${(100 * (k * step + zero - from)) / (to - from)}%`;
+      marks.push(mark);
+    }
+    this.ruler.replaceChildren(...marks);
+  }
+
+  touch(event) {
+    const { left, width } = this.slider.getBoundingClientRect();
+    const [from, to] = this.range;
+    const time = from + Math.min(1, Math.max(0, (event.clientX - left) / width)) * (to - from);
+    this.look(time >= this.now ? null : time);
+  }
+
+  key(event) {
+    const step = { ArrowLeft: -STEP, ArrowRight: STEP, PageUp: -10 * STEP, PageDown: 10 * STEP }[event.key];
+    if (event.key === "End" || event.key === "Escape") this.look(null);
+    else if (event.key === "Home") this.look(Math.max(this.oldest(), this.range[0]));
+    else if (step) this.look((this.scrub ?? this.now) + step);
+    else return;
+    event.preventDefault();
+  }
+
+  // Look at the face as it was at a time; null, or later than now: at now.
+  look(time) {
+    this.scrub = time === null || time >= this.now ? null : Math.max(time, this.oldest());
+    this.scrubbed(this.scrub);
+  }
+}
+
+function bar(name, place, from, to) {
+  const element = make(`div.${name}`);
+  element.style.left = place(from);
+  element.style.width = `calc(${place(to)} - ${place(from)})`;
+  return element;
+}
+
+function tick(name, left, title) {
+  const element = make(`i.${name}`, { title });
+  element.style.left = left;
+  return element;
+}
