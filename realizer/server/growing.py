@@ -14,7 +14,7 @@ from realizer.server.clauses import TAG, Clauses, whole
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 
-__all__ = ["Growing"]
+__all__ = ["Growing", "shortened"]
 
 # Characters up to which a text is said in one: espeak needs 15 ms for so many.
 SHORT = 160
@@ -70,6 +70,11 @@ class Growing:
         names = {name for name, _ in _marks(self._asked)}
         return replace(self._say, ssml=self._asked, marks=tuple(m for m in self._say.marks if m in names))
 
+    @property
+    def whole(self) -> bool:
+        """Whether `next` has given the last part."""
+        return self._coming is None
+
     def take(self, part: Utterance, soonest: float = 0.0) -> Utterance:
         """What a voice made of the last `next`, behind all the others.
 
@@ -81,7 +86,7 @@ class Growing:
         """
         assert self._asked is not None
         if self._coming is not None and not whole(self._asked):
-            part = _shortened(part)
+            part = shortened(part)
         start = max(self.made, soonest) if self._joined else 0.0
         self._sound(part, start)
         if self._rate:
@@ -155,8 +160,8 @@ def _marks(text: str) -> Iterator[tuple[str, int]]:
             yield unescape(named[1] if named[1] is not None else named[2], QUOTES), length
 
 
-def _shortened(part: Utterance) -> Utterance:
-    """With the pause of a comma at its end."""
+def shortened(part: Utterance) -> Utterance:
+    """With the pause of a comma at its end, where the voice has made that of a full stop."""
     last = part.phonemes[-1] if part.phonemes else None
     if last is None or last.ipa or last.end - last.start <= COMMA:
         return part

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from realizer.errors import RealizerError, VoiceError
 from realizer.player import Player
 from realizer.server.effects import Speak
-from realizer.server.growing import Growing
+from realizer.server.growing import Growing, shortened
 from realizer.server.preparation import Preparation, Waiting
 from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Say, Utterance
@@ -50,6 +50,7 @@ class Orders:
         self._preparation = preparation
         self._count = 0
         self._texts: dict[int, _Text] = {}
+        self._flowing: set[int] = set()  # what is a sentence only with the piece that follows
 
     def place(self, waiting: Waiting, wants: Mapping[str, Say]) -> list[Speak]:
         """Ask for what a block wants said, of a long text for its first clause.
@@ -63,6 +64,8 @@ class Orders:
             part = growing.next() if growing is not None else say
             speak = self._speak(part or say)
             waiting.says[speak.id] = (behaviour, speak.say)
+            if waiting.flows:
+                self._flowing.add(speak.id)
             if growing is not None:
                 self._texts[speak.id] = _Text(waiting, behaviour, growing, speak.say)
             speaks.append(speak)
@@ -79,6 +82,8 @@ class Orders:
             What to ask for now.
         """
         text = self._texts.pop(speak, None)
+        flows = speak in self._flowing
+        self._flowing.discard(speak)
         say = self._preparation.said(speak) if text is None else text.part
         if say is None:
             return []
@@ -89,6 +94,8 @@ class Orders:
             except VoiceError:
                 self._preparation.unspoken(speak)
                 return []
+        if flows and (text is None or text.growing.whole):
+            result = shortened(result)
         if text is None:
             self._preparation.spoken(speak, result)
             return []
@@ -97,6 +104,8 @@ class Orders:
         order = self._speak(part)
         text.part = order.say
         self._texts[order.id] = text
+        if flows:
+            self._flowing.add(order.id)
         return [order]
 
     def overdue(self, t: float) -> list[Speak]:

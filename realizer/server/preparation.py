@@ -23,6 +23,7 @@ class Waiting:
         after: blocks in preparation that must be planned first.
         final: what the voice makes now is not asked for again.
         lacks: whether something the block names is still to come.
+        flows: what it says is a part of a sentence: the rest follows in another block.
     """
 
     block: Block
@@ -33,6 +34,7 @@ class Waiting:
     after: set[Waiting] = field(default_factory=set)
     final: bool = False
     lacks: Callable[[Block], bool] = lambda block: False
+    flows: bool = False
 
     @property
     def ready(self) -> bool:

@@ -333,7 +333,7 @@ class Session:
             wants = self.player.wants(block)
             character = self.player.character_index(block.character_id)
             waiting = self.preparation.add(block, character, {}, t)
-            waiting.lacks = self.speeches.lacks
+            waiting.lacks, waiting.flows = self.speeches.lacks, self.speeches.flows(block)
             self.player.announce(block, t)
         except Exception:
             self._internal(block, t)

@@ -9,7 +9,7 @@ from bml_schema import Block, BlockProgress, Feedback, SyncRef, read
 from realizer.behaviours import VOCABULARY
 from realizer.composition.references import redirected, references
 from realizer.player import Player
-from realizer.server.clauses import Clauses
+from realizer.server.clauses import Clauses, whole
 from realizer.server.messages import SpeechMessage
 from realizer.server.pieces import Piece, clip_block, text_block
 
@@ -51,6 +51,7 @@ class _Speech:
         piece: the last one that was made.
         unsaid: what is in no piece yet.
         marks: sync -> the piece it stands in.
+        parts: pieces that are part of a sentence only.
         owed: pieces that were made and are not planned yet, in order.
         ahead: pieces that are planned and have not ended, in order.
         said: the words that were heard of the pieces that have ended.
@@ -68,6 +69,7 @@ class _Speech:
     clauses: Clauses = field(default_factory=Clauses)
     unsaid: deque[str | _Clip] = field(default_factory=deque)
     marks: dict[str, str] = field(default_factory=dict)
+    parts: set[str] = field(default_factory=set)
     owed: list[str] = field(default_factory=list)
     ahead: list[str] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
@@ -161,6 +163,8 @@ class Speeches:
         said = next((node for node in block.behaviours if node.id == speech.id), None)
         speech.marks |= dict.fromkeys(getattr(said, "marked", ()), block.id)
         speech.owed.append(block.id)
+        if isinstance(one, str) and not whole(one) and (speech.unsaid or not speech.closed):
+            speech.parts.add(block.id)
         return block
 
     @property
@@ -178,6 +182,11 @@ class Speeches:
         if holder is not None and holder.waiting:
             before += [wait.block.block.id for wait in holder.waits]
         return replace(block, append_after=tuple(before))
+
+    def flows(self, block: Block) -> bool:
+        """Whether a piece is part of a sentence of which more has come."""
+        speech = self._of(block.id)
+        return speech is not None and block.id in speech.parts
 
     def lacks(self, block: Block) -> bool:
         """Whether it names a sync of a speech that may still come."""

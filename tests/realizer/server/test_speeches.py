@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from realizer.server.wire import ClipPiece, FrameKind, pack_clip, unpack
 from realizer.settings import Settings
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
-from realizer.speech.utterance import Utterance, Word
+from realizer.speech.utterance import Phoneme, Utterance, Word
 
 from .conftest import RATE, Client, Driver
 
@@ -156,6 +157,29 @@ def test_a_long_text_is_made_a_few_pieces_ahead_and_all_of_it_is_said() -> None:
     ends = [at[f"turn.{n}:end"] for n in range(1, 41)]
     assert np.allclose(np.diff(ends), EACH, atol=1e-3), "no gaps"
     assert at["turn:end"] == pytest.approx(20.0, abs=2e-3)
+
+
+def test_between_the_pieces_of_a_sentence_is_the_pause_of_a_comma() -> None:
+    class Slow(Talker):
+        """A voice that ends whatever it says as it ends a sentence."""
+
+        def do(self, effect: Effect) -> None:
+            if isinstance(effect, Speak):
+                self.spoken.append(effect)
+                pause = (Phoneme(0.0, EACH - 0.4, "a"), Phoneme(EACH - 0.4, EACH, ""))
+                answer = replace(said(effect), phonemes=pause)
+                self.session.spoken(effect.id, answer, self.opened + self.now)
+                self.collect()
+            else:
+                super().do(effect)
+
+    driver = Slow()
+    driver.append("When all of them had come to the old house, they sat down. Then, ", close=True)
+    at = times(driver.run(9))
+    assert [t[-3:] for t in texts(driver)] == ["se,", "wn.", "en,"]
+    assert at["turn.1:end"] - at["turn.1:start"] == pytest.approx(EACH - 0.4 + 0.15, abs=1e-3)
+    assert at["turn.2:end"] - at["turn.2:start"] == pytest.approx(EACH)
+    assert at["turn.3:end"] - at["turn.3:start"] == pytest.approx(EACH), "nothing follows the last one"
 
 
 def test_the_end_is_told_as_soon_as_it_is_known() -> None:
