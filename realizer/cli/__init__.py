@@ -20,6 +20,7 @@ from realizer.cli.faces import faces
 from realizer.cli.fap import fap
 from realizer.cli.lists import outputs, voices
 from realizer.cli.play import realize, schedule
+from realizer.cli.replay import replay
 from realizer.cli.serve import serve
 from realizer.cli.timeline import timeline
 from realizer.cli.track import track
@@ -67,6 +68,7 @@ for command in (
     align,
     outputs,
     batch,
+    replay,
     doctor,
     demo,
 ):

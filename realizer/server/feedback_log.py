@@ -14,14 +14,14 @@ class FeedbackLog:
     """The newest messages of a session, each with its `seq` 1, 2, ...
 
     Args:
-        keep: how many are kept.
+        keep: how many are kept; None: all.
         epoch: POSIX seconds at which the session clock was 0; None where nobody need know.
 
     Attributes:
         newest: seq of the last message, 0 while there is none.
     """
 
-    def __init__(self, keep: int, epoch: float | None = None) -> None:
+    def __init__(self, keep: int | None, epoch: float | None = None) -> None:
         self.newest = 0
         self._epoch = epoch
         self._kept: deque[tuple[Feedback, str]] = deque(maxlen=keep)

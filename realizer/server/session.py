@@ -129,7 +129,7 @@ class Session:
         self.orders = Orders(self.player, self.preparation)
         self._connections: dict[int, Connection] = {}
         self._inbox = Inbox(settings.max_document)
-        self.log = FeedbackLog(LOG, epoch)
+        self.log = FeedbackLog(LOG if history < float("inf") else None, epoch)
         self._effects: list[Effect] = []
 
     # connections --------------------------------------------------------------------------------

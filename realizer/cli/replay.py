@@ -1,0 +1,72 @@
+"""`replay`: a session that `serve --record` wrote, played again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from realizer.cli import options
+from realizer.cli.play import PICTURES
+
+__all__: list[str] = []
+
+
+@click.command()
+@click.argument("record", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding.")
+@click.option("--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.")
+@click.option("--face", metavar="NAME", help="Another face than it had.")
+@click.option("--voice", metavar="NAME", help="Another voice than it had.")
+@click.option("--at", type=options.Number(0), metavar="SECONDS", help="With .png: the picture of an instant.")
+@click.option("--size", default="512x512", show_default=True, callback=options.size, help="Of pictures.")
+@click.option("--camera", default="front", show_default=True, help=options.CAMERAS)
+@options.light
+@options.background
+@click.pass_context
+def replay(
+    context: click.Context,
+    record: Path,
+    output: str | None,
+    fps: float | None,
+    face: str | None,
+    voice: str | None,
+    at: float | None,
+    size: tuple[int, int],
+    camera: str,
+    light: str | None,
+    background: str | None,
+) -> int:
+    """Play a session again that `serve --record DIR` wrote.
+
+    Prints its feedback, or writes frames, pictures, sound or a film of it. Everything is done at its own
+    time, without a clock: what went wrong once goes wrong again, so a record is the best report of a fault.
+    """
+    from realizer.outputs import output_for
+    from realizer.outputs.output import Drawing
+    from realizer.server.journal.folder import read_record
+    from realizer.server.journal.playback import played
+
+    writer = None
+    if output is not None:
+        try:
+            writer = output_for(Path(output))
+        except ValueError as error:
+            raise click.BadParameter(str(error), param_hint="-o") from None
+    realization, told = played(read_record(record), fps=fps, face=face, voice=voice)
+    if writer is None or output is None:
+        for text in told:
+            click.echo(text)
+        return 0
+    if writer.suffix in PICTURES:
+        options.check_camera(realization.face_name, camera)
+    drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)
+    drawing = writer.begin(drawing, realization.face_name, realization.deformer)
+    try:
+        writer.write(realization, Path(output), drawing)
+    except OSError as error:
+        raise click.UsageError(f"{output}: {error.strerror or error}") from None
+    if not context.obj["quiet"]:
+        words = f"{output}: {realization.duration:.2f} s, {realization.frames} frames"
+        click.echo(f"{words} at {realization.fps:g} fps", err=True)
+    return 0

@@ -1,0 +1,125 @@
+"""What was recorded of a session is seen, heard and told again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from realizer.cli import cli
+from realizer.player import Player
+from realizer.server.effects import Send, Speak
+from realizer.server.journal import JournalError
+from realizer.server.journal.folder import FolderJournal, head, read_record
+from realizer.server.journal.notes import Notes
+from realizer.server.journal.playback import played
+from realizer.server.session import Session
+from realizer.settings import Settings
+from realizer.speech import SilentVoice
+from realizer.speech.fitting import fitted
+
+SETTINGS = Settings(voice="silent", seed=3)
+SPEECH = """<bml id="a"><speech id="s"><text>Hello, how are <sync id="m"/>you?</text></speech>
+<head id="n" lexeme="NOD" stroke="s:m"/><gaze id="g" target="cup" start="0.4" end="1.4"/></bml>"""
+SMILE = '<bml id="b" composition="APPEND"><faceLexeme id="f" lexeme="SMILE" end="1"/></bml>'
+SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
+
+
+def recorded(folder: Path) -> tuple[Path, list[str], Player]:
+    """A session that was played with a voice that takes its time: its record, what was told, its player."""
+    session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9, history=float("inf"))
+    session.notes = Notes("s", [FolderJournal(folder, head(SETTINGS, None))])
+    session.notes.begin(1e9)
+    session.connect(1, 100.0)
+    coming = [
+        (100.05, SCENE),
+        (100.1, SPEECH),
+        (100.7, SMILE),
+        (100.9, "<bml"),
+        (101.0, '{"type": "set", "aus": {"12L": 0.3}}'),
+    ]
+    told: list[str] = []
+    answers: list[tuple[float, Speak]] = []
+    for step in range(800):
+        now = 100.0 + step * 0.0107
+        while coming and coming[0][0] <= now:
+            session.receive(1, coming.pop(0)[1], now)
+        while answers and answers[0][0] <= now:
+            order = answers.pop(0)[1]
+            session.spoken(order.id, fitted(SilentVoice(), order.say), now)
+        session.tick(now)
+        for effect in session.outgoing():
+            if isinstance(effect, Speak):
+                answers.append((now + 0.2, effect))
+            elif isinstance(effect, Send) and str(effect.data).startswith("<"):
+                told.append(str(effect.data))
+    session.disconnect(1, now)
+    session.notes.end()
+    return next(folder.glob("*.jsonl")), told, session.player
+
+
+def test_feedback_and_frames_are_the_same_to_the_last_digit(tmp_path: Path) -> None:
+    path, told, player = recorded(tmp_path)
+    realization, again = played(read_record(path))
+    assert again == told
+    assert any('"b:end"' in text for text in told)
+    assert np.array_equal(realization.aus.values, player.frames(realization.aus.times).values)
+    assert [w.text for w in realization.speaking[0].utterance.words] == ["Hello", "how", "are", "you"]
+
+
+def test_a_record_that_broke_off_is_played_to_the_end_of_what_was_planned(tmp_path: Path) -> None:
+    path, told, _ = recorded(tmp_path)
+    lines = path.read_text().splitlines()
+    spoken = next(k for k, line in enumerate(lines) if '"spoken"' in line)
+    path.write_text("\n".join(lines[: spoken + 1]) + '\n{"at": 0.9, "kind": "te')
+    _, again = played(read_record(path))
+    assert any('id="a:end"' in text for text in again)
+    assert not any('id="b:' in text for text in again)
+    assert again[:4] == told[:4]
+
+
+@pytest.mark.parametrize(
+    ("first", "fault"),
+    [
+        ("", "1: wanted the head of a record"),
+        ('{"session": "s"}', "1: wanted the head of a record"),
+        ('{"session": "s", "epoch": 0, "settings": {"fps": "quick"}}', "fps"),
+        ('{"session": "s", "epoch": 0, "settings": 7}', "settings: wanted an object"),
+        ('{"session": "s", "epoch": 0, "scene": {"cup": 1}}', "scene: wanted places"),
+    ],
+)
+def test_a_head_that_is_none_is_told_of(first: str, fault: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    path.write_text(first + "\n")
+    with pytest.raises(JournalError, match=fault):
+        played(read_record(path))
+
+
+def test_a_line_that_is_no_entry_is_told_of_with_its_number(tmp_path: Path) -> None:
+    path, _, _ = recorded(tmp_path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:3], "?", *lines[3:], ""]))
+    with pytest.raises(JournalError, match=r"jsonl:4: wanted an entry"):
+        read_record(path)
+
+
+def test_the_command_prints_the_feedback_and_writes_any_output(tmp_path: Path) -> None:
+    path, told, _ = recorded(tmp_path)
+    printed = CliRunner().invoke(cli, ["replay", str(path)])
+    assert printed.output.splitlines() == "\n".join(told).splitlines()
+    out = tmp_path / "x.json"
+    assert CliRunner().invoke(cli, ["replay", str(path), "-o", str(out), "--fps", "10"]).exit_code == 0
+    assert json.loads(out.read_text())["fps"] == 10
+
+
+def test_a_voice_that_is_not_here_is_silent_as_it_would_be_live_or_another_one_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, told, _ = recorded(tmp_path)
+    path.write_text(path.read_text().replace('"voice": "silent"', '"voice": "no-such-voice"'))
+    assert len(played(read_record(path), voice="silent")[1]) == len(told)
+    assert len(played(read_record(path))[1]) == len(told)
+    assert "no-such-voice" in capsys.readouterr().err
