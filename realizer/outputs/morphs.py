@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,9 +31,10 @@ class Morphs:
     """What poses of a face are made of, up to a tenth of a millimetre.
 
     Attributes:
-        names: (k,) of the targets: FAPs and action units as they are called, then "correction 1", ...
+        names: (k,) of the targets: FAPs and action units as they are called, then "correction 1", ...; what
+            goes the other way is a target of its own, "open_jaw reversed".
         moves: (k, n_vertices, 3) float32 metres at weight 1.
-        weights: (n, k) float32.
+        weights: (n, k) float32, 0..1: many programs cut off what is less or more.
         head: (n, 3) float32 radians: pitch, yaw, roll; the vertices turn by `basis["head"]` of it.
         eyes: (n, 2, 2) float32 radians: pitch and yaw of the left and the right eyeball; zeros where the eyes
             are no balls.
@@ -91,13 +92,13 @@ def morphs(face: Face, poses: Float32) -> Morphs:
     shares = np.zeros((len(still), len(found)))
     for frames in whole:
         shares[frames] = (moved(still[frames]) - weights[frames] @ targets) @ found.T
-    most = np.maximum(np.abs(shares).max(axis=0), 1e-12)
-    moves = np.concatenate([targets, found * most[:, None]]).reshape(-1, len(face.vertices), 3)
+    more, ways, shares = _one_way(shares, [f"correction {k + 1}" for k in range(len(found))])
+    moves = np.concatenate([targets, ways @ found]).reshape(-1, len(face.vertices), 3)
     moves[np.abs(moves).max(axis=2) < SEEN] = 0
     return Morphs(
-        (*names, *(f"correction {k + 1}" for k in range(len(found)))),
+        (*names, *more),
         moves.astype(np.float32),
-        np.concatenate([weights, shares / most], axis=1).astype(np.float32),
+        np.concatenate([weights, shares], axis=1).astype(np.float32),
         head,
         eyes,
         thrust,
@@ -108,21 +109,26 @@ def _columns(columns: Mapping[str, int], numbers: tuple[int, ...]) -> list[int]:
     return [columns[fap(number).name] for number in numbers]
 
 
+def _one_way(values: Any, names: Sequence[str]) -> tuple[list[str], Float64, Float64]:
+    """Columns (n, k) that go both ways as (n, m) that go from 0 to 1; (m, k) what each of these is at 1."""
+    both = np.maximum(np.stack([values, -values]), 0.0).astype(np.float64)
+    most = both.max(axis=1)
+    found = [(k, way) for k in range(len(names)) for way in (0, 1) if most[way, k] > 0]
+    ways, weights = np.zeros((len(found), len(names))), np.empty((len(values), len(found)))
+    for row, (k, way) in enumerate(found):
+        ways[row, k] = most[way, k] * (1 - 2 * way)
+        weights[:, row] = both[way, :, k] / most[way, k]
+    return [names[k] + " reversed" * way for k, way in found], ways, weights
+
+
 def _used(
     face: Face, still: Float32, moved: Callable[[Float32], Float64]
 ) -> tuple[list[str], Float64, Float64]:
     """Names, (k, 3 n_vertices) moves and (n, k) weights of the columns that alone move anything."""
-    busy = np.flatnonzero(still.any(axis=0))
-    strongest = still[np.abs(still).argmax(axis=0), np.arange(still.shape[1])]
-    alone = np.diag(strongest)[busy].astype(np.float32)
-    moves = moved(alone) if len(busy) else np.empty((0, 3 * len(face.vertices)))
-    kept = np.abs(moves).max(axis=1, initial=0) > SEEN
-    busy = busy[kept]
-    return (
-        [face.takes[k] for k in busy],
-        moves[kept],
-        still[:, busy].astype(np.float64) / strongest[busy],
-    )
+    names, alone, weights = _one_way(still, face.takes)
+    moves = moved(alone.astype(np.float32)) if names else np.empty((0, 3 * len(face.vertices)))
+    kept = np.flatnonzero(np.abs(moves).max(axis=1, initial=0) > SEEN)
+    return [names[k] for k in kept], moves[kept], weights[:, kept]
 
 
 def _components(left: Float64) -> Float64:

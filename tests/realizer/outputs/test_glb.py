@@ -13,7 +13,7 @@ from realizer.face import deform, load_face
 from realizer.face.arkit.gltf import Gltf
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.glb import encode_glb
-from realizer.outputs.morphs import TRUE
+from realizer.outputs.morphs import TRUE, morphs
 from realizer.pipeline import realize
 
 FPS = 12.5
@@ -90,6 +90,19 @@ def test_its_arrays_make_every_frame_of_the_face(played, path):
         got = shares[:, :1] * shaped + shares[:, 1:2] * turned
         wanted = split(played.face, vertices)[played.face.name]
         assert np.linalg.norm(got - wanted, axis=1).max() < 1.5 * TRUE
+
+
+def test_a_program_that_knows_no_weights_below_none_reads_them_all(played, path):
+    read_gltf = pytest.importorskip("openfacefx.importers_gltf", reason="pip install openfacefx").read_gltf
+    track, notes = read_gltf(str(path), epsilon=0)
+    assert notes == []
+    assert track.fps == pytest.approx(FPS)
+    made = morphs(played.face, played.poses)
+    assert [channel.name for channel in track.channels] == list(made.names)
+    times = np.arange(played.frames) / FPS
+    for channel, wanted in zip(track.channels, made.weights.T, strict=True):
+        got = np.interp(times, [key.time for key in channel.keys], [key.value for key in channel.keys])
+        np.testing.assert_allclose(got, wanted, atol=1e-3)
 
 
 def turned_by(quaternion, vertices):

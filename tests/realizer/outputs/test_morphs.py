@@ -35,10 +35,16 @@ def test_no_vertex_of_any_frame_is_off_by_a_tenth_of_a_millimetre(played):
 def test_targets_are_what_the_face_takes_and_few_more(played):
     names = morphs(played.face, played.poses).names
     own = [name for name in names if not name.startswith("correction ")]
-    assert set(own) <= set(played.face.takes)
+    assert {name.removesuffix(" reversed") for name in own} <= set(played.face.takes)
     assert {"open_jaw", "close_t_l_eyelid"} <= set(own)
-    assert len(names) - len(own) <= 16
+    assert len(names) - len(own) <= 32
     assert len(set(names)) == len(names)
+
+
+def test_weights_are_never_less_than_none_nor_more_than_all(played):
+    weights = morphs(played.face, played.poses).weights
+    assert weights.min() == 0
+    np.testing.assert_allclose(weights.max(axis=0), 1, atol=1e-6)
 
 
 def test_head_and_eyes_are_no_targets(played):
