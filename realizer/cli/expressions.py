@@ -141,7 +141,7 @@ def _check_picture(output: Path | None, face: str) -> None:
     if output is not None and output.suffix.lower() != ".png":
         raise click.UsageError(f"{output}: wanted a name that ends in .png")
     if output is not None:
-        options.check_camera(face, "front")
+        options.check_camera(face, "close")
 
 
 def _tell(found: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
@@ -173,7 +173,7 @@ def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: s
     from realizer.render.sheets import sheet
 
     rows = poses(frames([Series("", of_expressions(found))]), takes(face), mapping_of(face))
-    with Renderer(face, (220, 280), "front") as renderer:
+    with Renderer(face, (220, 220), "close") as renderer:
         pictures = renderer.draw(rows)
     Image.fromarray(sheet(list(pictures), [one.name for one in found], [(note,) for note in notes])).save(
         path

@@ -52,8 +52,7 @@ def faps_from_points(points: Points, neutral: Points, fapu: Fapu) -> tuple[Float
         (n, 68) FAP values, 0 where nothing tells of one, and (68,) which of them were observed all the time.
 
     Raises:
-        ValueError: points that the standard does not know or that have no neutral place, or that are not
-            as many as each other.
+        ValueError: no points, some that have no neutral place, or that are not as many as each other.
     """
     places, rest = _checked(points, neutral)
     count = len(next(iter(places.values())))

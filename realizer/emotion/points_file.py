@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from realizer.arrays import Float64
+from realizer.face.features import NAMES
 
 __all__ = ["bridge", "read_points"]
 
@@ -23,7 +24,8 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
     that begin with # do not count. A point that a frame does not list was lost there, and is NaN.
 
     Raises:
-        ValueError: other columns, a bad cell, a point twice in a frame, or no place at rest; with the line.
+        ValueError: other columns, a bad cell, a point that there is none of, a point twice in a frame, or no
+            place at rest; with the line.
     """
     found: dict[str, dict[int, tuple[float, float, float]]] = {}
     last = 0
@@ -42,6 +44,8 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
             raise ValueError(
                 f"{place}: wanted a frame 0..{MOST_FRAMES - 1} and finite places, got {line[:60]!r}"
             )
+        if name not in NAMES:
+            raise ValueError(f"{place}: wanted a point of MPEG-4, 2.1 to 11.6, got {name[:20]!r}")
         if frame in found.setdefault(name, {}):
             raise ValueError(f"{place}: point {name} is there twice in frame {frame}")
         found[name][frame] = x, y, z

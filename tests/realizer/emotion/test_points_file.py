@@ -46,6 +46,7 @@ def test_a_gap_is_bridged_straight() -> None:
         (TABLE + "3,2.1,0,0,0\n", "t, line 11: point 2.1 is there twice in frame 3"),
         (TABLE + "-1,2.1,0,0,0\n", r"t, line 11: wanted a frame 0\.\."),
         (TABLE + "4,2.1,0,nan,0\n", "finite places"),
+        (TABLE + "0,99.9,0,0,0\n", "t, line 11: wanted a point of MPEG-4, 2.1 to 11.6, got '99.9'"),
         (TABLE + "3,4.2,0,0,0\n", "t: wanted every point at rest in frame 0, got none of 4.2"),
     ],
 )
