@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
+from weakref import WeakValueDictionary
 
 from realizer.animation.mapping import FapMapping
 from realizer.player import Player
@@ -54,20 +55,21 @@ class Broadcast:
         self._face = face
         self._mapping = mapping
         self._face_name = face_name
-        self._timelines: dict[tuple[int, float], Timeline] = {}
-        self._sounds: dict[tuple[int | None, int], Sound] = {}
+        # Subscriptions hold them: what nobody gets any more is gone, however many rates were asked for.
+        self._timelines = WeakValueDictionary[tuple[int, float], Timeline]()
+        self._sounds = WeakValueDictionary[tuple[int | None, int], Sound]()
         self._views: dict[tuple[object, ...], View] = {}
         self._plans = Plans(player.cast)
         self._draws = 0
 
     def timeline(self, index: int, fps: float) -> Timeline:
         """The frames of one character at one rate."""
-        key = (index, fps)
-        if key not in self._timelines:
-            self._timelines[key] = Timeline(
+        known = self._timelines.get((index, fps))
+        if known is None:
+            known = self._timelines[index, fps] = Timeline(
                 self.player, index, fps, lambda: self._face(index), lambda: self._mapping(index)
             )
-        return self._timelines[key]
+        return known
 
     def frames(
         self, stream: str, encoding: str, index: int, name: str | None, fps: float, now: float

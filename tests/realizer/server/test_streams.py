@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
 
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
-from realizer.server.streams import TURNS
+from realizer.server.streams import TURNS, Sound, Timeline
 from realizer.server.wire import FrameKind
 
 TURN = '<bml id="b"><head id="h" lexeme="SHAKE" start="0"/><faceLexeme id="f" lexeme="SMILE" end="2"/></bml>'
@@ -52,6 +54,19 @@ def test_all_streams_run_side_by_side_on_one_connection(driver) -> None:
         counts[frame.kind] += 1
     rates = {FrameKind.FAP: 25, FrameKind.AU: 50, FrameKind.ARKIT: 10, FrameKind.MESH: 5}
     assert {kind: count for kind, count in counts.items() if count} == {k: n + 1 for k, n in rates.items()}
+
+
+def test_rates_that_nobody_gets_any_more_are_forgotten(driver) -> None:
+    def alive() -> int:
+        gc.collect()
+        return sum(isinstance(o, Timeline | Sound) for o in gc.get_objects())
+
+    before = alive()
+    for k in range(20):
+        driver.send(subscribe("fap", fps=10 + k / 7))
+        driver.send(subscribe("audio", rate=8000 + 50 * k))
+        driver.run(driver.now + 0.05)
+    assert alive() == before + 2
 
 
 @pytest.mark.parametrize("form", ["jpeg", "png", "webp"])
