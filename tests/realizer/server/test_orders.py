@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from bml_schema.feedback import PredictionFeedback, SyncPointProgress
+from bml_schema.feedback import PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.errors import VoiceError
 from realizer.server.orders import PATIENCE
 from realizer.server.wire import FrameKind
@@ -208,3 +210,44 @@ def test_each_sync_is_told_once_though_its_time_was_told_again_and_again() -> No
     ids = [f.id for f in driver.run(300).feedback if isinstance(f, SyncPointProgress)]
     assert len(ids) == len(set(ids))
     assert {"b:s:start", "b:s:m", "b:s:end"} <= set(ids)
+
+
+ACTS = st.lists(
+    st.one_of(
+        st.tuples(st.just("say"), st.sampled_from(["", ' composition="APPEND"', ' composition="REPLACE"'])),
+        st.tuples(st.just("answer"), st.sampled_from([0, 1])),
+        st.tuples(st.just("fail"), st.just(0)),
+        st.tuples(st.just("stop"), st.sampled_from(["b", "tie"])),
+        st.tuples(st.just("tie"), st.sampled_from(["b:s:m", "b:s:end", "b:s:start"])),
+        st.tuples(st.just("run"), st.sampled_from([0.1, 3.0, 30.0])),
+    ),
+    max_size=16,
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(ACTS)
+def test_in_any_order_every_text_is_made_to_its_end_or_cut_off(acts) -> None:
+    driver = Driver(mute=True, idle=False)
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 1})
+    for act, what in acts:
+        match act:
+            case "say":
+                driver.send(BLOCK.format("b", what, TEXT, NOD))
+            case "answer":
+                answer(driver)
+            case "fail" if getattr(driver, "answered", 0) < len(driver.spoken):
+                driver.answered = getattr(driver, "answered", 0) + 1
+                driver.say(driver.spoken[driver.answered - 1].id, VoiceError("no"))
+            case "stop":
+                driver.send({"type": "stop", "blocks": [what]})
+            case "tie":
+                driver.send(f'<bml id="tie"><head id="n" lexeme="NOD" start="{what}"/></bml>')
+            case "run":
+                driver.run(driver.now + float(what))
+    while answer(driver):
+        driver.run(driver.now + 0.1)
+    client = driver.run(driver.now + 600)
+    faults = [f.text for f in client.feedback if isinstance(f, WarningFeedback)]
+    assert not [text for text in faults if "internal" in text]
+    assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []
