@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from realizer.animation.targets import fap
-from realizer.face import deform, load_face
+from realizer.face import deform, load_face, to_glb
 from realizer.face.arkit.gltf import Gltf
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.glb import encode_glb
@@ -55,6 +55,14 @@ def test_khronos_finds_no_fault_and_three_js_sees_the_face_that_is_drawn(played,
     assert np.linalg.norm(wanted - played.face.vertices, axis=2).max() > 0.01
     for got, vertices in zip(seen["frames"], wanted, strict=True):
         assert far(got, split(played.face, vertices)) < 1.5 * TRUE
+
+
+def test_the_head_that_the_service_serves_has_no_fault_either(tmp_path, read_by):
+    face = load_face("default")
+    (tmp_path / "x.glb").write_bytes(to_glb(face))
+    seen = read_by("gltf.mjs", tmp_path / "x.glb", "0")
+    assert seen["issues"]["messages"] == []
+    assert far(seen["frames"][0], {face.name: face.vertices}) < 1e-6
 
 
 def test_trimesh_opens_the_head_as_it_rests(played, path):

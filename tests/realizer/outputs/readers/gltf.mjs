@@ -11,8 +11,8 @@ const { issues, info } = await validator.validateBytes(bytes);
 const head = await new GLTFLoader().parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), "");
 const [clip] = head.animations;
 const mixer = new AnimationMixer(head.scene);
-const action = mixer.clipAction(clip).setLoop(LoopOnce);
-action.clampWhenFinished = true;
+const action = clip && mixer.clipAction(clip).setLoop(LoopOnce);
+if (action) action.clampWhenFinished = true;
 
 function seen() {
   head.scene.updateMatrixWorld(true);
@@ -29,16 +29,16 @@ function seen() {
 }
 
 const frames = instants.map((instant) => {
-  action.reset().play();
+  action?.reset().play();
   mixer.setTime(Number(instant));
   return seen();
 });
-const face = head.scene.getObjectByProperty("isSkinnedMesh", true);
+const face = head.scene.getObjectByProperty("isMesh", true);
 console.log(
   JSON.stringify({
     issues,
     info,
-    duration: clip.duration,
+    duration: clip?.duration ?? 0,
     targets: Object.keys(face.morphTargetDictionary ?? {}),
     frames,
   }),
