@@ -257,3 +257,32 @@ def test_the_stream_shows_what_is_drawn_without_a_clock(form) -> None:
         (still,) = renderer.draw(realizer.realize(HELD, fps=1, idle=False).poses[1:2])
     shown = np.asarray(Image.open(io.BytesIO(pictures[-1].payload)).convert("RGB")).astype(int)
     assert np.abs(shown - still).max() <= 2 if form == "png" else np.abs(shown - still).mean() < 2
+
+
+def test_a_message_that_is_too_long_ends_its_own_connection_and_says_why() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as other, connect(server.url) as socket:
+            await socket.send(f"<bml id='b'><!--{'x' * 3000}--></bml>")
+            assert "wanted at most 2000 bytes" in await socket.recv()
+            await plays(socket, "c")
+            await socket.send(b"x" * 20_000)
+            await socket.wait_closed()
+            assert socket.close_code == 1009
+            await plays(other, "d")
+
+    serving(test, max_message=10_000, max_document=2_000)
+
+
+def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
+    async def test(server: Server) -> None:
+        async def one(number: int) -> None:
+            async with connect(f"{server.url}?session=crowd-{number % 2}") as socket:
+                for stream in ("fap", "au", "arkit", "mesh", "audio", "schedule"):
+                    await socket.send(json.dumps({"type": "subscribe", "stream": stream}))
+                await plays(socket, f"b{number}")
+
+        async with asyncio.TaskGroup() as group:
+            for number in range(10):
+                group.create_task(one(number))
+
+    serving(test)
