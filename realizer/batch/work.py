@@ -109,6 +109,7 @@ class Worker:
             "status": "refused" if realization.refused else "done",
             "duration": round(realization.duration, 6),
             "frames": realization.frames,
+            "dropped": [id for schedule in realization.schedules for id in schedule.dropped],
             "warnings": [warning.to_json() for warning in realization.warnings],
             "outputs": {
                 suffix: {"file": name, "bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}

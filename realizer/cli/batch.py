@@ -104,7 +104,7 @@ def batch(
             for row, known in rows:
                 counts[row["status"]] += 1
                 counts["known"] += known
-                dropped += bool(row.get("warnings"))
+                dropped += bool(row.get("dropped"))
                 if row["status"] == "failed":
                     click.echo(f"{row['document']}: {row['error']}", err=True)
     finally:

@@ -187,17 +187,7 @@ def perform(
                 f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {chosen.fps:g} fps"
             )
             click.echo(words, err=True)
-    return 1 if realization.refused or (strict and any(map(dropped, realization.schedules))) else 0
-
-
-def dropped(planned: Schedule) -> bool:
-    """Whether a behaviour is missing; a warning about one that plays, or a constraint, does not count."""
-    prefix = f"{planned.block}:"
-    return any(
-        w.id.startswith(prefix)
-        and (w.type == "PARSING_FAILURE" or w.id.removeprefix(prefix) not in planned.times)
-        for w in planned.warnings
-    )
+    return 1 if realization.refused or (strict and any(s.dropped for s in realization.schedules)) else 0
 
 
 @click.command()
@@ -272,7 +262,7 @@ def schedule(
             Path(output).write_text(words, "utf-8")
         except OSError as error:
             raise click.UsageError(f"{output}: {error.strerror or error}") from None
-    return 1 if refused or (strict and any(map(dropped, schedules))) else 0
+    return 1 if refused or (strict and any(s.dropped for s in schedules)) else 0
 
 
 def _moved(player: Player, planned: Schedule) -> Schedule:

@@ -128,6 +128,17 @@ class Schedule:
             for b, times in self.times.items()
         }
 
+    @property
+    def dropped(self) -> tuple[str, ...]:
+        """Ids, "block:behaviour", of the behaviours that warnings say are missing."""
+        prefix = f"{self.block}:"
+        return tuple(
+            w.id
+            for w in self.warnings
+            if w.id.startswith(prefix)
+            and (w.type == "PARSING_FAILURE" or w.id.removeprefix(prefix) not in self.times)
+        )
+
     def at(self, behaviour: str, sync: str) -> float:
         """Seconds from block start of one sync point.
 

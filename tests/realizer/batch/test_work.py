@@ -47,6 +47,13 @@ def test_the_row_says_how_it_went(worker: Worker, tasks: list[Task]) -> None:
     assert "not well-formed" in rows["broken"]["warnings"][0]["text"]
     assert rows["0"]["frames"] == int(rows["0"]["duration"] * 25) + 1
     assert set(rows["0"]["outputs"]) == {".fap", ".vtt"}
+    assert rows["0"]["dropped"] == []
+
+
+def test_the_row_names_what_was_dropped(worker: Worker, tasks: list[Task]) -> None:
+    text = b'<bml id="b"><head id="n" lexeme="NOD"/><faceLexeme id="f" lexeme="NOPE"/></bml>'
+    row = worker.perform(replace(tasks[0], text=text)).row
+    assert (row["status"], row["dropped"]) == ("done", ["b:f"])
 
 
 def test_what_cannot_be_played_is_a_row_with_the_error(tasks: list[Task], options: Options) -> None:

@@ -49,6 +49,13 @@ def test_what_was_refused_is_told_by_the_exit_status(talks: Path, tmp_path: Path
     assert rows(tmp_path / "out") == {"a": "done", "b": "done", "c": "refused"}
 
 
+def test_with_strict_a_behaviour_that_was_dropped_counts(talks: Path, tmp_path: Path) -> None:
+    (talks / "a.bml").write_text('<bml id="b"><faceLexeme id="f" lexeme="NOPE"/></bml>')
+    command = [str(talks), "-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1"]
+    assert batch(*command).return_value == 0
+    assert batch(*command, "--strict").return_value == 1
+
+
 @pytest.mark.parametrize(
     ("args", "words"),
     [
