@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from realizer.settings import Settings
 
@@ -173,18 +173,24 @@ class Workers:
         with client, contextlib.suppress(TimeoutError, OSError):
             async with asyncio.timeout(PATIENCE):
                 line = await _first_line(client)
-                names = parse_qs(urlsplit(line.split(" ")[1] if " " in line else "/").query).get("session")
-                count = len(self._children)
-                if names is None:
-                    number = next(self._turn) % count
-                else:
-                    number = worker_of(names[-1], count, self._settings)
+                number = self._number(line)
                 while True:
                     try:
                         socket.send_fds(self._children[number][1], [READY], [client.fileno()])
                         return
                     except BlockingIOError:
                         await asyncio.sleep(STEP)
+
+
+    def _number(self, line: str) -> int:
+        """The worker of a request: that of its session, the one it names (`?worker=1`), or the next."""
+        query, count = parse_qs(line.partition("?")[2].partition(" ")[0]), len(self._children)
+        if "session" in query:
+            return worker_of(query["session"][-1], count, self._settings)
+        named = query.get("worker", [""])[-1]
+        if named in map(str, range(count)):
+            return int(named)
+        return next(self._turn) % count
 
 
 async def _first_line(client: socket.socket) -> str:

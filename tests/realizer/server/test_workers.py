@@ -100,6 +100,13 @@ def test_a_session_that_another_worker_has_says_how_it_is_reached(
     played(test())
 
 
+def test_each_worker_tells_its_own_numbers_to_who_names_it(workers: Workers) -> None:
+    for number in (0, 1, 1, 0):
+        address = f"http://127.0.0.1:{workers.port}/metrics?worker={number}"
+        with urllib.request.urlopen(address, timeout=LIMIT) as answer:
+            assert f'realizer_sessions{{worker="{number}"}}' in answer.read().decode()
+
+
 def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(workers: Workers) -> None:
     url = address(workers)
 
