@@ -31,10 +31,10 @@ WRITES = (".png", ".txt")
     show_default=True,
     help="Ours; those of Raouzaiou et al. 2002, corrected; the same as printed.",
 )
-@click.option("--angle", type=options.Number(), metavar="DEGREES", help="Place on Paul's wheel; any turn.")
-@click.option("--activation", type=options.Number(), help="0 the middle to 7 the rim.  [default: as full]")
-@click.option("--valence", type=options.Number(), help="With --arousal, instead of an angle: -1 to 1.")
-@click.option("--arousal", type=options.Number(), help="-1 to 1.")
+@click.option("--angle", type=float, metavar="DEGREES", help="Place on Paul's wheel; any turn.")
+@click.option("--activation", type=float, help="0 the middle to 7 the rim.  [default: as full]")
+@click.option("--valence", type=float, help="With --arousal, instead of an angle: -1 to 1.")
+@click.option("--arousal", type=float, help="-1 to 1.")
 @click.option("--seed", type=click.IntRange(0), help="Draw within the ranges instead of their middle.")
 @click.option(
     "-o",

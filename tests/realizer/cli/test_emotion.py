@@ -69,6 +69,10 @@ def test_the_middle_of_the_wheel_is_neutral(place: list[str]) -> None:
     assert (said["emotion"], said["ranges"], "shares" in said) == ("neutral", {}, False)
 
 
+def test_the_help_names_no_range_that_is_none() -> None:
+    assert "None" not in run("--help").stdout
+
+
 def test_nothing_is_told_where_the_file_cannot_be_written(tmp_path: Path) -> None:
     done = run("joy", "-o", str(tmp_path / "no" / "joy.txt"))
     assert done.exit_code != 0
@@ -115,7 +119,9 @@ def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path
         (["--valence", "0.3"], "wanted --valence and --arousal together"),
         (["--activation", "3"], "wanted --angle with --activation"),
         (["--angle", "3", "--activation", "40"], "activation: wanted 0..7, got 40"),
-        (["--angle", "nan"], "wanted a finite number, got nan"),
+        (["--angle", "nan"], "angle: wanted a number of degrees, got nan"),
+        (["--angle", "3", "--activation", "nan"], "activation: wanted 0..7, got nan"),
+        (["--valence", "nan", "--arousal", "0"], "valence: wanted -1..1, got nan"),
         (["--valence", "7", "--arousal", "0"], "valence: wanted -1..1, got 7"),
         (["joy", "-o", "joy.gif"], "joy.gif: wanted a name that ends in .png or .txt"),
         (["--wheel", "wheel.svg"], "wheel.svg: wanted a name that ends in .png"),
