@@ -74,7 +74,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
             "scene": 0,
             "scenes": [{"nodes": [FACE, NECK]}],
             "nodes": nodes,
-            "materials": [_material(*material) for material in MATERIALS],
+            "materials": [_material(*material) for material in MATERIALS[: 2 if balls else 1]],
             "meshes": meshes,
             "skins": [{"joints": [NECK, HEAD], "inverseBindMatrices": _unbound(file, pivot)}],
             "animations": [file.animation("performance", clock, keys)],

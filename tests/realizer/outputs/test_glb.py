@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -129,6 +130,19 @@ def test_eyes_that_are_pushed_move_on_their_nodes(tmp_path, read_by):
     assert seen["issues"]["messages"] == []
     for got, vertices in zip(seen["frames"], deform(face, poses), strict=True):
         assert far(got, split(face, vertices)) < 1.5 * TRUE
+
+
+def test_eyes_that_are_no_balls_are_part_of_the_face(tmp_path, read_by):
+    face = load_face("default")
+    flat = replace(face, basis={**face.basis, "eyes": tuple(((0, 0), at) for _, at in face.basis["eyes"])})
+    poses = np.zeros((2, len(face.takes)), np.float32)
+    for number, value in ((3, 400), (19, 700), (49, 2e4)):
+        poses[1, face.takes.index(fap(number).name)] = value
+    (tmp_path / "x.glb").write_bytes(encode_glb(flat, poses, 25.0))
+    seen = read_by("gltf.mjs", tmp_path / "x.glb", "0", "0.04")
+    assert seen["issues"]["messages"] == []
+    for got, vertices in zip(seen["frames"], deform(flat, poses), strict=True):
+        assert far(got, {face.name: vertices}) < 1.5 * TRUE
 
 
 def test_a_head_that_rests_is_a_file_without_targets(tmp_path, read_by):
