@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as dial
 from websockets.exceptions import InvalidStatus
 
 from realizer.server.serve import Server
@@ -30,6 +31,11 @@ def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
             await test(server)
 
     asyncio.run(run())
+
+
+def connect(url: str) -> dial:
+    """A client whose goodbye is not behind the frames that it has not read."""
+    return dial(url, max_queue=None)
 
 
 async def ask(socket: ClientConnection, **message: Any) -> dict[str, Any]:
@@ -277,7 +283,7 @@ def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
     async def test(server: Server) -> None:
         async def one(number: int) -> None:
             url = f"{server.url}?session=crowd-{number % 4}"
-            async with connect(url, max_queue=None) as socket:  # so that its end is not behind its frames
+            async with connect(url) as socket:
                 for stream in ("fap", "au", "arkit", "mesh", "audio", "schedule"):
                     await socket.send(json.dumps({"type": "subscribe", "stream": stream}))
                 await plays(socket, f"b{number}")
