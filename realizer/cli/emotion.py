@@ -22,7 +22,7 @@ WRITES = (".png", ".txt")
 
 
 @click.command()
-@click.argument("word", required=False)
+@click.argument("word", metavar="[WORD|FILE.txt]", required=False)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: ranges, and the 68 values.")
 @click.option(
     "--profiles",
@@ -67,6 +67,8 @@ def emotion(
     camera: str,
 ) -> None:
     """Say which FAPs an emotion moves, and how far: of WORD, or of a place on the wheel.
+
+    FILE.txt is a file of Paul's (2010, 6.3) with one profile, as -o writes it.
 
     \b
     realizer emotion guilty
@@ -113,9 +115,31 @@ def _asked(
             return wheel(angle, activation, profiles)
         if valence is not None and arousal is not None:
             return affect(valence, arousal, profiles)
+        if word is not None and word.lower().endswith(".txt"):
+            return _read(Path(word))
         return None if word is None else profile_of(word, profiles)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def _read(path: Path) -> Profile:
+    """The profile of a file.
+
+    Raises:
+        ValueError: no such file, what is none of Paul's, or more than one profile.
+    """
+    from realizer.emotion import read_profiles
+
+    try:
+        found = read_profiles(path.read_text("utf-8-sig"), str(path))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: wanted a text in UTF-8, got: {error.reason} at {error.start}") from None
+    except OSError as error:
+        raise ValueError(f"{path}: wanted a file of one profile, got: {error.strerror}") from None
+    if len(found) != 1:
+        names = ", ".join(profile.name for profile in found[:5])
+        raise ValueError(f"{path}: wanted one profile, got {len(found)}{names and ': ' + names}")
+    return found[0]
 
 
 def _mixed(

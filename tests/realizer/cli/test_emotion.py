@@ -86,6 +86,39 @@ def test_a_profile_is_written_as_a_file_of_pauls(tmp_path: Path) -> None:
     assert back.ranges == emotion("fear 3", "raw").ranges
 
 
+def test_a_file_of_pauls_is_told_as_a_word_is(tmp_path: Path) -> None:
+    path = tmp_path / "Fear.TXT"
+    run("fear 3", "--profiles", "raw", "-o", str(path))
+    said = json.loads(run(str(path), "--json").stdout)
+    assert said["values"] == json.loads(run("fear 3", "--profiles", "raw", "--json").stdout)["values"]
+    assert (said["emotion"], said["profiles"]) == ("Fear 3", str(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "wanted a file of one profile, got: No such file"),
+        ("", "wanted one profile, got 0"),
+        ("Joy 0\nF3 [1, 2]\nJoy 1\nF3 [1, 3]\n", "wanted one profile, got 2: Joy 0, Joy 1"),
+        ("Joy 0\nF3 [1\n", "line 2: Joy 0, column 1: wanted F3 [low, high]"),
+    ],
+)
+def test_what_is_no_file_of_one_profile_is_refused(text: str | None, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.txt"
+    if text is not None:
+        path.write_text(text, "utf-8")
+    done = run(str(path))
+    assert done.exit_code == 2
+    assert said in " ".join(done.stderr.split())
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_bytes(b"\xff\xfe")
+    done = run(str(tmp_path / "mine.txt"))
+    assert done.exit_code == 2
+    assert "mine.txt: wanted a text in UTF-8" in " ".join(done.stderr.split())
+
+
 def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path: Path) -> None:
     from PIL import Image
 
