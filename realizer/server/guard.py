@@ -40,7 +40,7 @@ class Guard:
         self._token = None if settings.token is None else _digest(settings.token)
         if self._token is not None:
             # At its finest the library logs whole requests, with what is in them.
-            logging.getLogger("websockets.server").setLevel(logging.INFO)
+            logging.getLogger("websockets.server").setLevel(logging.WARNING)
 
     @property
     def asks(self) -> bool:

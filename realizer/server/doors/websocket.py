@@ -203,7 +203,7 @@ class WebSocketDoor:
         except (HubError, JournalError) as error:
             await socket.close(1013, str(error)[:120])
             return
-        told = {"connection": number, "address": _address(socket)}
+        told = {"connection": number, "session": _query(request)[0], "address": _address(socket)}
         log.info("joined", extra=told)
         try:
             if greeting is not None:
