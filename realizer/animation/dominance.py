@@ -120,10 +120,10 @@ def _effort(phoneme: Phoneme) -> float:
     return float(np.clip(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"], facts["most"]))
 
 
-def key_times(phonemes: Sequence[Phoneme]) -> Float64:
-    """(n,) seconds from the first phoneme to the last, at the rate of the table (at least two)."""
+def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:
+    """(n,) seconds from `lead` before the first phoneme to the last, at the table's rate (at least two)."""
     rate = coarticulation()["rate"]
-    first, last = phonemes[0].start, max(phonemes[-1].end, phonemes[0].start + 2 / rate)
+    first, last = phonemes[0].start - lead, max(phonemes[-1].end, phonemes[0].start + 2 / rate)
     return np.linspace(first, last, int(np.ceil((last - first) * rate)) + 1)
 
 

@@ -21,7 +21,7 @@ __all__ = ["lip_channels"]
 OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # what opens further when speech is loud
 
 
-def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ...]:
+def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -> tuple[Channel, ...]:
     """How the mouth says `phonemes`: channels of the speech layer, in FAPU, and the presence "lips" 0..1.
 
     All values are 0 at the first and the last key. The gap between the inner lips (-FAP 4 - FAP 5, and at
@@ -31,6 +31,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
     Args:
         phonemes: in order, seconds from the start of the utterance; "" is a pause.
         start: seconds, when the utterance starts on the block's clock.
+        room: seconds before `start` in which the mouth may already make ready for the first sound.
 
     Returns:
         Channels for FAPs 3-13, 16, 17, 44-46, 51-60 and presence("lips"); () where nothing is said.
@@ -41,7 +42,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float) -> tuple[Channel, ..
     track = track_of(phonemes)
     if track is None:
         return ()
-    times = key_times(phonemes)
+    times = key_times(phonemes, min(room, facts["pauses"]["attack"]))
     taken = lips_taken(track, times)
     mouth = _mouth(track, times) * taken[:, None]
     _constrain(mouth, track, times, taken, facts)

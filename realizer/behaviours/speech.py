@@ -104,7 +104,7 @@ def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
     from realizer.animation.lips import lip_channels
 
     if utterance not in _made:
-        _made[utterance] = start, lip_channels(utterance.phonemes, start)
+        _made[utterance] = start, lip_channels(utterance.phonemes, start, room=max(start, 0.0))
     before, channels = _made[utterance]
     if start != before:
         channels = tuple(channel.shifted(start - before) for channel in channels)

@@ -251,3 +251,16 @@ def test_any_bilabial_closes(phonemes: tuple[Phoneme, ...]) -> None:
             centre = (phoneme.start + phoneme.end) / 2
             near = np.abs(times - centre) <= 0.0225
             assert gap(channels)[near].max() <= 1e-6
+
+
+@pytest.mark.parametrize("room", [0.0, 0.05, 0.1, 2.0])
+def test_the_lips_make_ready_for_a_first_closure_where_there_is_room(room: float) -> None:
+    lips, *_ = lip_channels(say("b ɑ t _", 0.08), 3.0, room=room)
+    early = min(room, coarticulation()["pauses"]["attack"])
+    assert lips.times[0] == pytest.approx(3.0 - early)
+    assert lips.values[0] == 0
+    begins = lips.times < 3.05
+    steepest = np.diff(lips.values[begins]) / np.diff(lips.times[begins])
+    # Taken over as long as there is room, they go slower.
+    assert steepest.max() < 1.6 / max(early, coarticulation()["pauses"]["least"])
+    assert lips.values[(lips.times > 3.025) & (lips.times < 3.2)].min() == pytest.approx(1, abs=1e-6)
