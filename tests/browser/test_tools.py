@@ -55,12 +55,6 @@ def page(opened):  # type: ignore[no-untyped-def]
     assert faults == []
 
 
-def state(page):  # type: ignore[no-untyped-def]
-    """The character as the service has it."""
-    answer = page.evaluate("() => realizerPage.link.ask({ type: 'state' })")
-    return answer["characters"][0]
-
-
 def shown(page, **aus: float) -> None:  # type: ignore[no-untyped-def]
     """Wait until the service shows these action units, and 0 of those that are 0."""
     page.wait_for_function(
@@ -205,6 +199,8 @@ def test_the_past_is_looked_at_and_left_again_by_mouse_and_keyboard(page) -> Non
     page.fill("#document", NOD.format("past"))
     page.click("#play")
     page.wait_for_selector("#log li:has-text('past ends')")
+    over = "() => { const { current, now } = realizerPage.timeline; return now > current?.ended; }"
+    page.wait_for_function(over)
     peak = page.evaluate("realizerPage.timeline.current.happened.get('f')[1].time")
     box = page.locator("#score .scrub").bounding_box()
     begin, end = page.evaluate("realizerPage.timeline.range")
@@ -273,8 +269,8 @@ def test_the_wheel_shows_what_is_clicked_by_the_profiles_that_are_chosen(page) -
     middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.click(middle[0], middle[1] - 60)
     page.wait_for_selector("#feels:has-text('surprise 100 %')")
-    shown(page, au12L=0)
-    assert state(page)["aus"]["5L"] > 0.2
+    raised = "async () => (await realizerPage.link.ask({ type: 'state' })).characters[0].aus['5L'] > 0.2"
+    page.wait_for_function(raised)
     page.press("#wheel svg", "ArrowLeft")
     page.wait_for_selector("#feels:has-text('sadness 11 %')")
     page.select_option("#profiles", "published")

@@ -61,6 +61,7 @@ link.onfeedback = (element, seq) => {
   else if (element.localName === "blockProgress" && id.endsWith(":end")) alive.delete(id.slice(0, -4));
 };
 link.onreply = (message) => {
+  if (message.type === "gap") log.last = 0;
   if (message.type === "welcome") faces = message.capabilities.faces ?? [];
   if (message.type === "state") showVoice(message.characters[0]?.voice ?? message.voice.name);
   if (message.type === "subscribed" && message.stream === "mesh") showFace(message);

@@ -109,9 +109,9 @@ export class Timeline {
       if (rows.some(({ element }, k) => this.curves.children[k] !== element) || rows.length !== this.curves.childElementCount) this.curves.replaceChildren(...rows.map(({ element }) => element));
       const style = getComputedStyle(this.panel);
       const colours = [style.getPropertyValue("--curve"), style.getPropertyValue("--curve-2")];
-      for (const row of rows) kind.draw(row, from, to, colours);
+      if (!current) this.rule(from, to);
+      for (const row of rows) kind.draw(row, from, to, this.scrub ?? now, colours);
     }
-    if (!current) this.rule(from, to);
     const time = this.scrub ?? now;
     const part = (time - from) / (to - from);
     const inside = part >= 0 && part <= 1;
@@ -148,7 +148,7 @@ export class Timeline {
           lane.append(fill, ...happened.map(({ name, time }) => tick("dot", place(time), `${name}: happened at ${(time - current.start).toFixed(2)} s`)));
         }
         const label = make("span", { title: `${line.element} ${line.id}` }, line.id);
-        return make("div.track", {}, label, lane);
+        return make(`div.track${line.words ? ".speech" : ""}`, {}, label, lane);
       }),
     );
     this.rule(from, to);
@@ -197,6 +197,7 @@ export class Timeline {
   // Look at the face as it was at a time; null, or later than now: at now.
   look(time) {
     this.scrub = time === null || time >= this.now ? null : Math.max(time, this.oldest());
+    this.looked = -Infinity;
     this.scrubbed(this.scrub);
   }
 }

@@ -48,12 +48,18 @@ export class Tracks {
     this.made = best.map(({ group, columns }) => {
       const canvas = make("canvas");
       const words = this.label(group);
-      return { columns, canvas, element: make("div.track.curve", {}, make("span", { title: words }, words), make("div.lane", {}, canvas)) };
+      const value = make("output");
+      const element = make("div.track.curve", {}, make("span", { title: words }, words), make("div.lane", {}, canvas, value));
+      return { columns, canvas, value, element };
     });
     return this.made;
   }
 
-  draw({ columns, canvas }, from, to, colours) {
+  // The curves from..to, and in figures what they are at a time.
+  draw({ columns, canvas, value }, from, to, time, colours) {
+    const here = this.frame(time);
+    const digits = this.reaches[columns[0]] > 1 ? 0 : 2;
+    value.textContent = here ? [...new Set(columns.map((k) => (here.values[k] + 0).toFixed(digits)))].reverse().join(" | ") : "";
     const ratio = Math.min(devicePixelRatio, 2);
     const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio];
     if (!width) return;
@@ -82,9 +88,13 @@ export class Tracks {
     });
   }
 
+  frame(time) {
+    return this.frames.findLast((one) => one.time <= time) ?? this.frames[0];
+  }
+
   // name -> value of the frame shown at a time.
   at(time) {
-    const frame = this.frames.findLast((one) => one.time <= time) ?? this.frames[0];
+    const frame = this.frame(time);
     return frame && Object.fromEntries(this.names.map((name, k) => [name, frame.values[k]]));
   }
 }
