@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from xml.sax.saxutils import unescape
@@ -21,6 +22,9 @@ SHORT = 160
 # And of which a part is made, from the second one on. Each is planned by itself while frames are due.
 PART = 400
 CHUNK = 500  # characters that are looked through at a time
+# Elements that are the same of each part as of the whole.
+MANNERS = frozenset({"emphasis", "lang", "prosody", "voice"})
+ELEMENT = re.compile(r"\s*(<([a-z-]+)\b[^<>]*>)(.*)(</\2\s*>)\s*", re.DOTALL)
 # What a second of speech is taken for while little of it is there: this many characters, with the weight of
 # so many characters of what is there.
 PACE, WEIGHT = 15.0, 60
@@ -46,7 +50,6 @@ class Growing:
         self._parts = _parts(say.ssml)
         self._coming = next(self._parts, None)
         self._asked: str | None = None
-        self._taken = 0  # characters of the text that were asked for
         self._characters = 0  # that are there
         self._joined: list[tuple[float, Utterance]] = []
         self._words: list[Word] = []
@@ -66,7 +69,6 @@ class Growing:
         if self._coming is None:
             return None
         self._asked, self._coming = self._coming, next(self._parts, None)
-        self._taken += len(self._asked)
         names = {name for name, _ in _marks(self._asked)}
         return replace(self._say, ssml=self._asked, marks=tuple(m for m in self._say.marks if m in names))
 
@@ -132,22 +134,42 @@ class Growing:
         """The marks of what is left, and how long that is."""
         spoken = sum(part.duration for _, part in self._joined)
         pace = (spoken + WEIGHT / PACE) / (self._characters + WEIGHT)  # s a character
-        text = self._say.ssml[self._taken :] if self._coming is not None else ""
-        marks = {name: self.made + before * pace for name, before in _marks(text)}
-        return marks, len(TAG.sub("", text)) * pace
+        if self._coming is None:
+            return {}, 0.0
+        text, there = self._say.ssml, self._characters
+        marks = {
+            name: self.made + (before - there) * pace for name, before in _marks(text) if before >= there
+        }
+        return marks, max(0, len(TAG.sub("", text)) - there) * pace
 
 
 def _parts(text: str) -> Iterator[str]:
     """The first clause alone, then as many as are a part."""
-    clauses, part, wanted = Clauses(), "", 1
-    for at in range(0, len(text), CHUNK):
-        for piece in clauses.feed(text[at : at + CHUNK], close=at + CHUNK >= len(text)):
-            part += piece
-            if len(part) >= wanted:
-                yield part
-                part, wanted = "", PART
+    part, wanted = "", 1
+    for piece in _pieces(text):
+        part += piece
+        if len(part) >= wanted:
+            yield part
+            part, wanted = "", PART
     if part:
         yield part
+
+
+def _pieces(text: str) -> Iterator[str]:
+    """Sentences and clauses; a long element that only says how to speak is around each part in it."""
+    clauses = Clauses()
+    for at in range(0, len(text), CHUNK):
+        for piece in clauses.feed(text[at : at + CHUNK], close=at + CHUNK >= len(text)):
+            around = ELEMENT.fullmatch(piece) if len(piece) > PART else None
+            if around is None or around[2] not in MANNERS or around[2] in _names(around[3]):
+                yield piece
+                continue
+            for inside in _parts(around[3]):
+                yield f"{around[1]}{inside}{around[4]}"
+
+
+def _names(text: str) -> set[str]:
+    return {tag[2] for tag in TAG.finditer(text)}
 
 
 def _marks(text: str) -> Iterator[tuple[str, int]]:

@@ -49,6 +49,19 @@ def test_the_first_part_is_a_clause_and_all_of_them_are_the_text() -> None:
     assert all(PART <= len(p.ssml) < 2 * PART for p in parts[1:-1])
 
 
+def test_what_is_said_in_another_manner_is_so_in_each_part(voice) -> None:
+    slow = Say(f'<prosody rate="slow">{TEXT}</prosody>', MARKS)
+    parts, made = grown(voice, slow)
+    assert parts[0].ssml.count(" ") < 15
+    assert len(parts) > 4
+    assert all(abs(u.duration / made[-1].duration - 1) < 0.25 for u in made[1:])
+    assert [p.ssml.count("<prosody") - p.ssml.count("</prosody") for p in parts] == [0] * len(parts)
+    assert made[-1].duration == pytest.approx(voice.say(slow).duration, rel=0.01)
+    assert set(made[-1].marks) == set(MARKS)
+    twice = Say(f'<prosody rate="slow">{TEXT}</prosody> And <prosody rate="fast">{TEXT}</prosody>', MARKS)
+    assert all(p.ssml.count("<prosody") == p.ssml.count("</prosody") for p in grown(SilentVoice(), twice)[0])
+
+
 def test_what_is_made_does_not_change_when_more_comes(voice) -> None:
     _, made = grown(voice, Say(TEXT, MARKS))
     for before, after in pairwise(made):
