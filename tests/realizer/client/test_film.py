@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from realizer.client import ClientError, connect
+from realizer.client.film import RATE
+from realizer.client.film import _each as each
+from realizer.client.film import _sound as sound_of
 from realizer.server.serve import Server
+from realizer.server.wire import FrameKind, WireFrame, pack, unpack
 from realizer.settings import Settings
 
 LIMIT = 120  # s
@@ -63,3 +69,24 @@ def test_a_suffix_that_is_no_film_is_refused(tmp_path: Path) -> None:
                 await client.film(tmp_path / "live.gif", HELD)
 
     serving(test)
+
+
+def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
+    packets = [
+        unpack(pack(FrameKind.SOUND, k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))
+        for k in range(4)
+    ]
+    packets.append(unpack(pack(FrameKind.SOUND, 2, 1.04, b"", forget=True)))
+    pcm = sound_of(packets, 1.01, 0.1)
+    step = RATE // 100
+    assert [int(pcm[k * step]) for k in range(5)] == [1, 2, 2, 0, 0]
+
+
+def test_a_picture_that_did_not_come_leaves_the_one_before() -> None:
+    def picture(frame: int, grey: int) -> WireFrame:
+        buffer = io.BytesIO()
+        Image.new("RGB", (16, 16), (grey,) * 3).save(buffer, "PNG")
+        return unpack(pack(FrameKind.PICTURE, frame, frame / 10, buffer.getvalue()))
+
+    shown = each([picture(0, 10), picture(1, 20), picture(4, 50)], 0.1, 10, 5)
+    assert [int(one[0, 0, 0]) for one in shown] == [20, 20, 20, 50, 50]
