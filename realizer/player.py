@@ -195,6 +195,10 @@ class Player:
         self._characters[character].set_direct(values, now)
         self._blocks.course.changed()
 
+    def held(self, character: int = 0) -> tuple[str, ...]:
+        """The names of the AUs and FAPs that are held directly, or have just been let go of."""
+        return tuple(self._characters[character].direct)
+
     def set_feeling(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
         """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the one held before; {}: none.
 

@@ -255,21 +255,26 @@ def _character(session: Session, message: CharacterMessage) -> None:
 
 def _set(session: Session, message: SetMessage, t: float) -> None:
     rows = faps()
+    index = index_of(session, message.character)
+    held = session.player.held(index)
     values: dict[str, float | None] = {}
-    for name, value in message.aus.items():
+    if message.aus is None:
+        values |= dict.fromkeys(name for name in held if name in AU_NAMES())
+    if message.faps is None:
+        values |= dict.fromkeys(name for name in held if name not in AU_NAMES())
+    for name, value in (message.aus or {}).items():
         names = [n for n in (name, f"{name}L", f"{name}R") if n in AU_NAMES()]
         if not names:
             raise Wrong("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
         values |= dict.fromkeys(names, value)
     movable = {row.name for row in rows[2:]}
-    for name, value in message.faps.items():
+    for name, value in (message.faps or {}).items():
         if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
             name = rows[int(name) - 1].name
         if name not in movable:
             raise Wrong("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
         values[name] = value
     feeling = _feeling(message.emotion) if "emotion" in message.model_fields_set else None
-    index = index_of(session, message.character)
     if feeling is not None:
         session.player.set_feeling(feeling, t, index)
     session.player.set_direct(values, t, index)

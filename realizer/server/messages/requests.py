@@ -167,7 +167,7 @@ class Feeling(Message):
 
 
 class SetMessage(Message):
-    """Holds an emotion, AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go.
+    """Holds an emotion, AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go, of one or of all.
 
     The emotion lies below, AUs refine it, FAPs come on top, whatever is sent first (Paul 2010, 7.4): an AU
     that is set is what it is set to, and so is a FAP, whatever AUs and speech ask of it.
@@ -183,10 +183,10 @@ class SetMessage(Message):
 
     type: Literal["set"]
     emotion: Feeling | None = None
-    aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] = Field(
+    aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] | None = Field(
         {}, validation_alias=AliasChoices("aus", "au"), description='"12" or "12L"'
     )
-    faps: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)] | None] = Field(
+    faps: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)] | None] | None = Field(
         {}, validation_alias=AliasChoices("faps", "fap"), description="name or number"
     )
     character: str | None = Field(None, max_length=256)

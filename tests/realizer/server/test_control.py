@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from realizer.animation.targets import axis
 from realizer.tables.emotions import emotion_faces
 
 SETS = (
@@ -102,6 +103,18 @@ def test_another_emotion_takes_its_place_without_a_jump_and_null_lets_go(face) -
     assert np.abs(np.diff(course, axis=0)).max() < 0.5  # a frame; it takes 0.3 s
     rest = face.set(emotion=None)
     assert max(rest.values()) < 0.01
+
+
+def test_null_lets_go_of_all_action_units_or_of_all_faps_and_of_nothing_else(face) -> None:
+    names = list(axis())
+    face.set(aus={"12": 0.5, "4": 0.5}, faps={"open_jaw": 200})
+    jaw, smile = names.index("open_jaw"), names.index("12L")
+    face.set(1, aus=None)
+    assert face.whole[smile] == 0
+    assert face.whole[jaw] == 200
+    face.set(1, aus={"12": 0.5}, faps=None)
+    assert face.whole[jaw] == 0
+    assert face.whole[smile] == 0.5
 
 
 def test_what_is_said_of_other_things_leaves_the_emotion(face) -> None:
