@@ -41,7 +41,9 @@ class Hello(Message):
     version: int = Field(PROTOCOL, description="of the protocol that the client speaks")
     session: str | None = Field(None, pattern=r"^[A-Za-z0-9._~-]{1,64}$")
     seen: int | None = Field(None, ge=0, description="seq of the last feedback that arrived")
-    token: str | None = Field(None, max_length=4096, description="of the service, where it asks for one and none came before")
+    token: str | None = Field(
+        None, max_length=4096, description="of the service, where it asks for one and none came before"
+    )
 
 
 class Subscribe(Message):
