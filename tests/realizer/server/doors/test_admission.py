@@ -127,20 +127,20 @@ def test_a_page_of_elsewhere_opens_no_socket() -> None:
     serving(test, origins=("https://app.example",))
 
 
-def test_a_flood_is_read_slowly_told_once_and_nothing_of_it_is_lost() -> None:
+def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
-            for k in range(120):
+            for k in range(8):
                 await socket.send(json.dumps({"type": "ping", "id": str(k)}))
             replies = []
-            while len([r for r in replies if r["type"] == "pong"]) < 120:
+            while len([r for r in replies if r["type"] == "pong"]) < 8:
                 replies.append(json.loads(await socket.recv()))
-        assert [r["id"] for r in replies if r["type"] == "pong"] == [str(k) for k in range(120)]
-        (error,) = (r for r in replies if r["type"] == "error")
-        assert error["code"] == "rate"
-        assert "REALIZER_MAX_RATE" in error["message"]
+        assert [r["id"] for r in replies if r["type"] == "pong"] == [str(k) for k in range(8)]
+        errors = [r for r in replies if r["type"] == "error"]
+        assert {error["code"] for error in errors} == {"rate"}
+        assert "REALIZER_MAX_RATE" in errors[0]["message"]
 
-    serving(test, max_rate=50)
+    serving(test, max_rate=2)
 
 
 def test_metrics_count_what_happened() -> None:
