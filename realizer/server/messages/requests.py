@@ -112,7 +112,7 @@ class Point(Message):
 
 
 class SceneMessage(Message):
-    """Declares where targets are; None forgets the scene.
+    """Declares where targets are; null forgets them.
 
     Objects come as {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
     """
