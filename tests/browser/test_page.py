@@ -67,18 +67,34 @@ def browser() -> Iterator[object]:
         opened.close()
 
 
-@pytest.fixture
-def page(browser, address):  # type: ignore[no-untyped-def]
-    """The page, open; any error on its console fails the test."""
+@pytest.fixture(scope="module")
+def opened(browser, address):  # type: ignore[no-untyped-def]
+    """The page, open, and the errors of its console."""
     # Playwright's own predicates need eval, which the page's policy forbids.
-    opened = browser.new_page(viewport={"width": 1000, "height": 640}, bypass_csp=True)
+    page = browser.new_page(viewport={"width": 1000, "height": 660}, bypass_csp=True)
     faults: list[str] = []
-    opened.on("pageerror", lambda error: faults.append(str(error)))
-    opened.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
-    opened.goto(address)
-    opened.wait_for_selector('#status[data-state="live"]')
-    yield opened
-    opened.close()
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
+    page.goto(address)
+    page.wait_for_selector('#status[data-state="live"]')
+    page.wait_for_selector("#lights button")
+    yield page, faults
+    page.close()
+
+
+@pytest.fixture
+def page(opened):  # type: ignore[no-untyped-def]
+    """The page as it was when it was opened; any error on its console fails the test."""
+    page, faults = opened
+    faults.clear()
+    page.set_viewport_size({"width": 1000, "height": 660})
+    page.evaluate("realizerPage.link.ask({ type: 'stop' })")
+    page.click("#tab-script")
+    for first in ("#lights button:first-child", "#faces button:first-child"):
+        if page.get_attribute(first, "aria-pressed") == "false":
+            page.click(first)
+    page.click("#clear")
+    yield page
     assert faults == []
 
 
@@ -129,12 +145,12 @@ def stage_of(page):  # type: ignore[no-untyped-def]
     return image[:, side : side + image.shape[0]]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def quiet_page(browser):  # type: ignore[no-untyped-def]
     """The page of a service without idle motion, its stage as high as a still."""
     command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle"]
     with serving(command) as address:
-        opened = browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
+        opened = browser.new_page(viewport={"width": 960, "height": 540}, bypass_csp=True)
         opened.goto(address)
         style = f"#stage {{ flex: none; width: {STILL + 60}px; height: {STILL}px; min-height: 0 }}"
         opened.add_style_tag(content=style + " .choice, #time { display: none !important }")
@@ -169,6 +185,7 @@ def test_a_frown_furrows_the_page_s_forehead_as_the_still_s(quiet_page) -> None:
         columns = brow.sum(axis=2).mean(axis=0)
         return float((np.median(columns) - columns).max())
 
+    quiet_page.evaluate("() => realizerPage.stage.shine('portrait')")
     calm = stage_of(quiet_page)
     parts = "".join(
         f'<faceFacs id="f{au}" au="{au}" amount="{amount}" start="0" end="600"/>'
@@ -278,8 +295,13 @@ def test_a_lost_connection_comes_back_with_what_was_missed(page) -> None:  # typ
     page.fill("#document", '<bml id="kept"><wait id="w" duration="0.3"/></bml>')
     page.click("#play")
     page.wait_for_selector("#log li:has-text('kept starts')")
-    page.evaluate("() => realizerPage.link.socket.close()")
-    page.wait_for_selector('#status[data-state="lost"]')
+    closed = """() => new Promise((done) => {
+      const status = document.getElementById("status");
+      const told = (_, watch) => (watch.disconnect(), done(status.dataset.state));
+      new MutationObserver(told).observe(status, { attributes: true });
+      realizerPage.link.socket.close();
+    })"""
+    assert page.evaluate(closed) == "lost"
     page.wait_for_selector('#status[data-state="live"]')
     page.wait_for_selector("#log li:has-text('kept ends')")
     lines = page.locator("#log li span").all_text_contents()

@@ -31,6 +31,7 @@ export class Timeline {
   reset() {
     this.blocks.clear();
     this.current = null;
+    this.stale = true;
     this.look(null);
   }
 
