@@ -1,0 +1,169 @@
+"""Two nodes that share a journal, behind the proxy that ships; the one that has the session is killed."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator, Sequence
+from contextlib import AsyncExitStack, ExitStack, contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import IO
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from bml_schema.feedback import parse_feedback
+
+CONFIGURATION = Path(__file__).parents[4] / "docker" / "haproxy.cfg"
+LIMIT = 60  # s; a hung test ends
+SEQ = re.compile(r'seq="(\d+)"')
+FIRST = """<bml id="a"><head id="n" lexeme="NOD" start="0.6"/>
+<speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
+NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
+
+
+class Node:
+    """A service of its own. `kill` is that of the system: it is told nothing."""
+
+    def __init__(self, journal: str) -> None:
+        command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
+        self._process = subprocess.Popen([*command, "--journal", journal], stdout=subprocess.PIPE, text=True)
+
+    @cached_property
+    def address(self) -> str:
+        """Where it listens, as soon as it does."""
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().split()[2].removeprefix("ws://").removesuffix("/ws")
+
+    def sessions(self) -> int:
+        with urllib.request.urlopen(f"http://{self.address}/healthz") as answer:
+            count: int = json.load(answer)["sessions"]
+        return count
+
+    def kill(self) -> None:
+        os.kill(self._process.pid, signal.SIGKILL)
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+@contextmanager
+def proxy(nodes: Sequence[Node], log: IO[str]) -> Iterator[str]:
+    """HAProxy with the configuration that ships, in front of two nodes; its address."""
+    if (program := shutil.which("haproxy")) is None:
+        pytest.skip("haproxy is not installed")
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        names = {f"NODE_{number}": node.address for number, node in enumerate(nodes, 1)}
+        process = subprocess.Popen(
+            [program, "-db", "-f", str(CONFIGURATION)],
+            env={**os.environ, **names, "PROXY_LISTEN": f"fd@{listening.fileno()}"},
+            pass_fds=[listening.fileno()],
+            stdout=log,
+        )
+        try:
+            yield f"127.0.0.1:{listening.getsockname()[1]}"
+        finally:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
+    with ExitStack() as stack:
+        one, other = Node(redis_url), Node(redis_url)  # both start at once
+        stack.callback(one.close)
+        stack.callback(other.close)
+        yield one, other
+
+
+async def feedback(client: ClientConnection, last: str) -> list[str]:
+    """Feedback up to the progress `last`, or to the end of the connection."""
+    told = []
+    try:
+        async for message in client:
+            if isinstance(message, str) and message.startswith("<"):
+                told.append(message)
+                if f'id="{last}"' in message:
+                    break
+    except ConnectionClosed:
+        pass
+    return told
+
+
+def test_a_client_that_comes_back_through_the_proxy_has_all_feedback_once_and_in_order(
+    nodes: tuple[Node, Node], tmp_path: Path
+) -> None:
+    async def test(at: str) -> list[str]:
+        url = f"ws://{at}/ws?session=show&token=hidden"
+        async with asyncio.timeout(LIMIT):
+            async with connect(url) as client:
+                await client.send(FIRST)
+                await client.send(NEXT)
+                first = await feedback(
+                    client, "a:s:m"
+                )  # the second block waits, the first one is in the middle
+                owner, survivor = sorted(nodes, key=Node.sessions, reverse=True)
+                assert (owner.sessions(), survivor.sessions()) == (1, 0)
+                owner.kill()
+                first += await feedback(client, "never")
+            seen = int(SEQ.search(first[-1])[1])  # type: ignore[index]
+            async with connect(f"{url}&seen={seen}") as client:  # the proxy has not found out yet
+                rest = await feedback(client, "b:end")
+            assert survivor.sessions() == 1
+        return first + rest
+
+    with (tmp_path / "proxy.log").open("w+") as log:
+        with proxy(nodes, log) as at:
+            told = asyncio.run(test(at))
+        log.seek(0)
+        written = log.read()
+    numbers = [int(SEQ.search(text)[1]) for text in told]  # type: ignore[index]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert any('id="a:end"' in text for text in told)
+    for text in told:
+        parse_feedback(text)
+    assert "GET /ws" in written
+    assert "hidden" not in written
+
+
+def test_the_clients_of_a_session_meet_and_sessions_are_shared_out(
+    nodes: tuple[Node, Node], tmp_path: Path
+) -> None:
+    names = [f"show-{number}" for number in range(16)]
+
+    async def test(at: str) -> None:
+        async with asyncio.timeout(LIMIT), AsyncExitStack() as stack:
+            clients = [
+                await stack.enter_async_context(connect(f"ws://{at}/ws?session={name}"))
+                for name in names + names
+            ]
+            counts = [node.sessions() for node in nodes]
+            assert sum(counts) == len(names)
+            assert min(counts) > 0
+            for client in clients:
+                await client.send('{"type": "ping", "id": 1}')
+                assert json.loads(await client.recv())["type"] == "pong"
+
+    with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
+        asyncio.run(test(at))
+
+
+def test_the_numbers_of_a_node_are_not_shown_to_everybody(nodes: tuple[Node, Node], tmp_path: Path) -> None:
+    with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
+        with urllib.request.urlopen(f"http://{at}/healthz") as answer:
+            assert json.load(answer)["status"] == "ok"
+        with pytest.raises(urllib.error.HTTPError, match="404") as refused:
+            urllib.request.urlopen(f"http://{at}/metrics")
+        refused.value.close()
