@@ -196,7 +196,8 @@ class Ensemble:
         """Stop these blocks, or all; returns the ids of those that played or waited."""
         self.advance(now)
         stopped = [p for p in self.cast.alive() if ids is None or p.block.id in ids]
-        for playing in stopped:
+        # The last first: a block that waits for another need not be planned anew before it is stopped too.
+        for playing in reversed(stopped):
             if not playing.done:
                 self.course.stop(playing, now)
         return [p.block.id for p in stopped]
