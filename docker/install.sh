@@ -22,6 +22,8 @@ python3 -m pip wheel --quiet --no-cache-dir --no-deps --wheel-dir "$wheels" "$so
 
 python3 -m venv --without-pip "$target"
 python3 -m pip --python "$target/bin/python3" install --quiet --no-cache-dir "$(echo "$wheels"/*.whl)[$extras]"
+# Tests of other packages: an eighth of it all.
+find "$target" -type d -name tests -prune -exec rm -rf {} +
 
 # An image that lacks something is not made.
 "$target/bin/realizer" --version
