@@ -21,7 +21,7 @@ from typing import IO
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bml_schema.feedback import parse_feedback
 
@@ -60,7 +60,7 @@ class Node:
 
 
 @contextmanager
-def proxy(nodes: Sequence[Node], log: IO[str]) -> Iterator[str]:
+def proxy(nodes: Sequence[Node], log: IO[str], **settings: str) -> Iterator[str]:
     """HAProxy with the configuration that ships, in front of two nodes; its address."""
     if (program := shutil.which("haproxy")) is None:
         pytest.skip("haproxy is not installed")
@@ -68,7 +68,7 @@ def proxy(nodes: Sequence[Node], log: IO[str]) -> Iterator[str]:
         names = {f"NODE_{number}": node.address for number, node in enumerate(nodes, 1)}
         process = subprocess.Popen(
             [program, "-db", "-f", str(CONFIGURATION)],
-            env={**os.environ, **names, "PROXY_LISTEN": f"fd@{listening.fileno()}"},
+            env={**os.environ, **names, **settings, "PROXY_LISTEN": f"fd@{listening.fileno()}"},
             pass_fds=[listening.fileno()],
             stdout=log,
         )
@@ -158,6 +158,19 @@ def test_the_clients_of_a_session_meet_and_sessions_are_shared_out(
 
     with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
         asyncio.run(test(at))
+
+
+def test_an_address_has_its_share_of_connections_and_no_more(
+    nodes: tuple[Node, Node], tmp_path: Path
+) -> None:
+    async def test(url: str) -> None:
+        async with asyncio.timeout(LIMIT), connect(url), connect(url):
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(url)
+            assert refused.value.response.status_code == 429
+
+    with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log, REALIZER_MAX_CONNECTIONS="2") as at:
+        asyncio.run(test(f"ws://{at}/ws?session=one"))
 
 
 def test_the_numbers_of_a_node_are_not_shown_to_everybody(nodes: tuple[Node, Node], tmp_path: Path) -> None:
