@@ -55,6 +55,8 @@ class Shell:
         self.settings = settings
 
         def ours(session: str) -> bool:
+            if self._journal is not None and session not in self._hub.sessions:
+                return False  # another process may have it: only `restore` asks, before somebody joins
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
         self._hub = Hub(self._make, settings.max_sessions, ours)

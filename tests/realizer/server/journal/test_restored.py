@@ -144,3 +144,24 @@ def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
 
     with serving(where) as (one, _), serving(where) as (other, _):
         asyncio.run(test(one, other))
+
+
+def test_a_hello_does_not_begin_a_session_anew_that_is_in_the_journal(where: str) -> None:
+    async def play(url: str) -> list[str]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept") as client:
+            await client.send(NEXT)
+            return await feedback(client, "b:end")
+
+    async def resume(url: str) -> list[str]:
+        async with asyncio.timeout(LIMIT), connect(url) as client:
+            await client.send(json.dumps({"type": "hello", "version": 1, "session": "kept", "seen": 0}))
+            refused = json.loads(await client.recv())
+            assert refused["code"] == "invalid"
+            assert "/ws?session=kept" in refused["message"]
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept&seen=0") as client:
+            return await feedback(client, "b:end")
+
+    with serving(where) as (url, _):
+        told = asyncio.run(play(url))
+    with serving(where) as (url, _):
+        assert asyncio.run(resume(url)) == told
