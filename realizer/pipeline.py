@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -415,16 +414,15 @@ def warning_of(error: BMLError) -> Warning:
 
 
 def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
-    """Let a voice say what a block wants; where it fails the silent voice takes over, said on stderr."""
+    """Let a voice say what a block wants; where it fails the silent voice takes over, with a warning."""
     utterances: dict[str, Utterance] = {}
     for behaviour, say in says.items():
         try:
             utterances[behaviour] = fitted(voice, say)
         except VoiceError as error:
-            from realizer.speech import SilentVoice
+            from realizer.speech.silent import without_sound
 
-            print(f"realizer: {behaviour}: {error}; going on without sound", file=sys.stderr)
-            utterances[behaviour] = fitted(SilentVoice(), say)
+            utterances[behaviour] = without_sound(say, error)
     return utterances
 
 

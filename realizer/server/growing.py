@@ -96,7 +96,7 @@ class Growing:
             start = round(start * self._rate) / self._rate
         self._joined.append((start, part))
         self._words += [Word(w.start + start, w.end + start, w.text) for w in part.words]
-        self._phonemes += [Phoneme(p.start + start, p.end + start, p.ipa, p.stress) for p in part.phonemes]
+        self._phonemes += [replace(p, start=p.start + start, end=p.end + start) for p in part.phonemes]
         self._marks |= {name: time + start for name, time in part.marks.items()}
         self.made = start + part.duration
         self._characters += len(TAG.sub("", self._asked))

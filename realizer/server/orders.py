@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from realizer.errors import RealizerError, VoiceError
 from realizer.player import Player
+from realizer.scheduling.timing import Warning
 from realizer.server.effects import Speak
 from realizer.server.growing import Growing, shortened
 from realizer.server.preparation import Preparation, Waiting
-from realizer.speech.fitting import fitted
+from realizer.speech.silent import without_sound
 from realizer.speech.utterance import Say, Utterance
 
 __all__: list[str] = []
@@ -90,7 +91,7 @@ class Orders:
         if not isinstance(result, Utterance):
             self.fault = str(result)
             try:
-                result = _silent(say)
+                result = without_sound(say, self.fault)
             except VoiceError:
                 self._preparation.unspoken(speak)
                 return []
@@ -143,10 +144,10 @@ class Orders:
             return False
         heard = t - playing.start - float(times[0])
         text.given = text.growing.take(part, heard + SOON if heard > text.growing.made - SOON else 0.0)
-        return self._player.respeak(block, behaviour, text.given, t)
-
-
-def _silent(say: Say) -> Utterance:
-    from realizer.speech import SilentVoice
-
-    return fitted(SilentVoice(), say)
+        if not self._player.respeak(block, behaviour, text.given, t):
+            return False
+        # Planning has told what was said of the parts before.
+        for fault in text.given.warnings[len(before.warnings) :]:
+            warning = Warning(f"{block}:{behaviour}", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"speech: {fault}")
+            self._player.refuse(warning, t, playing.block.character_id)
+        return True

@@ -111,7 +111,9 @@ class EngineProcess:
         if self._owner != os.getpid():  # after a fork of ours the process belongs to our parent
             self._process, self._end, self._owner = None, None, os.getpid()
         if self._process is not None:
-            return self._process
+            if self._process.poll() is None:
+                return self._process
+            self._stop()  # it died while nobody asked
         fix = self._engine.missing()
         if fix:
             raise VoiceError(fix)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from realizer.errors import VoiceError
+from realizer.speech.fitting import fitted
 from realizer.speech.spelling import letters_to_phonemes, syllable_facts, units
 from realizer.speech.ssml import Mark, read_script
 from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
 from realizer.speech.words import Item, Pause, Spelled, items
 
-__all__ = ["SilentVoice"]
+__all__ = ["SilentVoice", "without_sound"]
 
 SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
 VOWELS = "aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ"
@@ -35,6 +38,16 @@ class SilentVoice:
 
     def close(self) -> None:
         """Nothing to end."""
+
+
+def without_sound(say: Say, fault: VoiceError | str) -> Utterance:
+    """What the silent voice makes of what another one failed to say, with a warning that says why.
+
+    Raises:
+        VoiceError: the text is too long.
+    """
+    made = fitted(SilentVoice(), say)
+    return replace(made, warnings=(*made.warnings, f"{fault}; this one has no sound"))
 
 
 def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:

@@ -171,3 +171,13 @@ def test_any_text_is_made_to_its_end(pieces) -> None:
     if made:
         assert made[-1].duration == pytest.approx(sum(u.duration for _, u in made[-1].parts))
         assert replace(made[-1], parts=()).parts == ()
+
+
+def test_what_is_said_louder_stays_louder_when_more_comes() -> None:
+    class Loud(SilentVoice):
+        def say(self, request: Say) -> Utterance:
+            made = super().say(request)
+            return replace(made, phonemes=tuple(replace(p, volume=2.0) for p in made.phonemes))
+
+    _, made = grown(Loud(), Say(TEXT, MARKS))
+    assert {p.volume for p in made[-1].phonemes} == {2.0}

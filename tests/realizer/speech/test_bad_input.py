@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from typing import Any
 
 import pytest
 
@@ -17,7 +18,7 @@ from realizer.pipeline import VOCABULARY
 from realizer.scheduling.timing import Schedule
 from realizer.server.effects import Speak
 from realizer.server.studio import Studio
-from realizer.speech import EspeakVoice, Say, SilentVoice
+from realizer.speech import EspeakVoice, Say, Utterance, Voice, engine_process
 from realizer.speech.hibari import HibariVoice
 
 SSML = "application/ssml+xml"
@@ -30,7 +31,7 @@ def document(speech: str) -> str:
     )
 
 
-def played(speech: str, voice: EspeakVoice | HibariVoice | SilentVoice | str) -> Schedule:
+def played(speech: str, voice: Voice | str) -> Schedule:
     schedule = realizer.schedule(document(speech), voice=voice)
     assert points(schedule, "h")["end"] == 1.0
     return schedule
@@ -151,10 +152,16 @@ def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> Non
     [pytest.param("espeak", marks=pytest.mark.espeak), pytest.param("hibari", marks=pytest.mark.hibari)],
 )
 def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
-    name: str, capsys: pytest.CaptureFixture[str]
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     studio = Studio()
     answers: list[object] = []
+    exchange, begun = engine_process._exchange, threading.Event()
+
+    def announced(process: Any, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        begun.set()
+        return exchange(process, request)
+
     try:
         first = studio.speak(Speak(1, Say("One two three.", voice=name)))
         engine = studio._voices[name]
@@ -164,7 +171,9 @@ def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
         os.kill(pid, signal.SIGSTOP)  # so that it can never answer before it dies
         order = Speak(2, Say("It is raining here today. " * 50, voice=name))
         asking = threading.Thread(target=lambda: answers.append(studio.speak(order)))
+        monkeypatch.setattr(engine_process, "_exchange", announced)
         asking.start()
+        assert begun.wait(30)
         os.kill(pid, signal.SIGKILL)
         asking.join()
         again = studio.speak(Speak(3, Say("Four five six.", voice=name)))
@@ -177,3 +186,28 @@ def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 1
     assert "going on without sound" in told[0]
+
+
+@pytest.mark.espeak
+def test_an_engine_that_is_killed_while_nobody_asks_costs_nothing(voice: EspeakVoice) -> None:
+    voice.say(Say("Before it died."))
+    engine = voice._process._process
+    assert engine is not None
+    engine.kill()
+    engine.wait()
+    assert voice.say(Say("After it died.")).duration > 0.5
+
+
+def test_a_voice_that_fails_is_one_warning_and_the_others_play() -> None:
+    class Broken:
+        name = "broken"
+
+        def say(self, request: Say) -> Utterance:
+            raise VoiceError("it died")
+
+        def close(self) -> None:
+            pass
+
+    schedule = played('<text>one <sync id="a"/>two</text>', Broken())
+    assert warned(schedule) == ["line 1, /bml/speech[1]: speech: it died; this one has no sound"]
+    assert points(schedule, "s")["end"] > points(schedule, "s")["a"] > 0
