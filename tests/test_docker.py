@@ -242,6 +242,7 @@ def test_the_service_speaks_and_draws_where_nothing_can_be_written(installed: Pa
         "PYTHONPATH": sysconfig.get_path("purelib"),
         "REALIZER_HOST": "127.0.0.1",
         "REALIZER_PORT": "0",
+        "REALIZER_WORKERS": "2",
     }
     command = [str(installed / "bin" / "realizer"), "serve"]
     with confined(command, installed / "written", environment) as url:

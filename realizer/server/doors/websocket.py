@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import http
 import logging
+import os
 import socket
 import tempfile
 from collections import Counter
@@ -302,7 +303,9 @@ def _address(socket: ServerConnection) -> str:
 def _nowhere() -> socket.socket:
     """A socket to listen on that nobody can reach: the package's server must listen to serve at all."""
     here = socket.socket(socket.AF_UNIX)
-    with tempfile.TemporaryDirectory() as folder:
+    # In a container memory may be the only place that can be written.
+    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(dir=place) as folder:
         here.bind(f"{folder}/s")
     here.setblocking(False)
     return here
