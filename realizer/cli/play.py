@@ -178,6 +178,9 @@ def perform(
         sys.stdout.write("\n")
         sys.stdout.flush()
     elif output is not None:
+        if all(planned.failed for planned in realization.schedules):
+            click.echo(f"{output}: not written, as there is nothing to play", err=True)
+            return 1
         try:
             writer.write(realization, Path(output), drawing)
         except OSError as error:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import io
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +36,8 @@ async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping
 
     if path.suffix.lower() not in FORMATS:
         raise ClientError(f"wanted a film ({' or '.join(FORMATS)}), got {path.name}", "film")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path.parent))
     async with connect(_joining(client.url, client.session), token=client._token) as camera:
         await camera.subscribe("video", fps=fps, **{**LOOK, **look})
         await camera.subscribe("audio", rate=RATE, **{k: v for k, v in look.items() if k == "character"})

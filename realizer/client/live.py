@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bml_schema.feedback import BlockProgress, Feedback
-from realizer.client.mail import ANSWERS, ClientError, Frame, Mail, Until
+from realizer.client.mail import ANSWERS, ClientError, Frame, Mail, Until, blank
 from realizer.client.speech import Speech
 
 __all__ = ["Client"]
@@ -148,6 +148,7 @@ class Client:
 
         Raises:
             ClientError: the block was refused, or there are no pictures.
+            FileNotFoundError: the folder is not there; nothing is played.
             RealizerError: PyAV is not installed, or the suffix is no film's.
         """
         from realizer.client.film import record
@@ -161,6 +162,8 @@ class Client:
 
     async def _follow(self, bml: str) -> Until:
         """Send BML; how far its last block is."""
+        if blank(bml):
+            raise ClientError("wanted <bml>, got nothing", "refused")
         self._mail.sent(bml)
         until = Until(self._mail.last_block)
         self._mail.follow(until)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import deque
+from html import unescape
 from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
@@ -18,6 +19,7 @@ KEPT = 1_000
 KEPT_FEEDBACK = 10_000
 # Type of a control message -> type of its answer; the others have none.
 ANSWERS = {"hello": "welcome", "subscribe": "subscribed", "state": "state", "ping": "pong"}
+_COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 
 Frame = WireFrame | dict[str, Any]
@@ -38,6 +40,11 @@ class ClientError(RealizerError):
     def of(cls, error: dict[str, Any]) -> ClientError:
         """What a message `error` says."""
         return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
+
+
+def blank(bml: str) -> bool:
+    """Whether there is nothing in a text that the service would answer."""
+    return not _COMMENT.sub("", bml).strip()
 
 
 class Follower(Protocol):
@@ -88,8 +95,8 @@ class Mail:
             self._followers = [one for one in self._followers if not one.over]
 
     def sent(self, bml: str) -> None:
-        found = _BLOCK_ID.findall(bml)
-        self.last_block = found[-1] if found else None
+        found = _BLOCK_ID.findall(_COMMENT.sub("", bml))
+        self.last_block = unescape(found[-1]) if found else None
 
     def of(self, stream: str) -> deque[Frame]:
         """The newest messages of a stream; of `schedule` all, as each says what has changed since another."""

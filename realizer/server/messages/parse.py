@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+import re
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -22,6 +23,9 @@ from realizer.server.messages.requests import (
     Unsubscribe,
 )
 from realizer.server.messages.speech import SpeechMessage
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 __all__ = ["SUPPORTED", "Control", "parse_control"]
 
@@ -51,6 +55,36 @@ SUPPORTED: tuple[str, ...] = (
     "state",
     "ping",
 )
+# Kind of a pydantic error -> what was wanted, in the words of our other messages.
+_WANTED = {
+    "missing": "a value",
+    "extra_forbidden": "no field of that name",
+    "greater_than": "more than {gt:g}",
+    "greater_than_equal": "at least {ge:g}",
+    "less_than_equal": "at most {le:g}",
+    "multiple_of": "a multiple of {multiple_of:g}",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number of a usual size",
+    "int_from_float": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "literal_error": "{expected}",
+    "string_type": "a string",
+    "string_pattern_mismatch": "a string that matches {pattern}",
+    "string_too_short": "a string of at least {min_length} characters",
+    "string_too_long": "a string of at most {max_length} characters",
+    "too_long": "at most {max_length} of them",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+}
+# JSON can say what is no character: half of one that takes two.
+_SURROGATE = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
 _ADAPTER: TypeAdapter[Control] = TypeAdapter(Annotated[Control, Field(discriminator="type")])
 
 
@@ -67,6 +101,9 @@ def parse_control(text: str) -> Control | ErrorMessage:
         return ErrorMessage(code="bad-json", message="wanted a flat JSON object, got one nested too deeply")
     except ValueError as error:
         return ErrorMessage(code="bad-json", message=f"wanted a JSON object with a type: {error}")
+    if _SURROGATE.search(text) and not _is_text(message):
+        words = r"wanted text, got half a character: a lone \ud800..\udfff in a string"
+        return ErrorMessage(code="bad-json", message=words)
     kind = message.get("type")
     if kind not in SUPPORTED:
         return ErrorMessage(
@@ -83,10 +120,27 @@ def parse_control(text: str) -> Control | ErrorMessage:
     try:
         return _ADAPTER.validate_python(message)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
+        first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
-        said = first["msg"].removeprefix("Value error, ")
-        return ErrorMessage(code="invalid", message=f"{said}; got {_short(first['input'])}", where=where)
+        return ErrorMessage(code="invalid", message=_said(first), where=where)
+
+
+def _is_text(message: object) -> bool:
+    """Whether what was read of JSON can be written as UTF-8."""
+    try:
+        json.dumps(message, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _said(error: ErrorDetails) -> str:
+    """What was wanted and what came."""
+    kind, context = error["type"], error.get("ctx", {})
+    got = "nothing" if kind == "missing" else _short(error["input"])
+    if kind in _WANTED:
+        return f"wanted {_WANTED[kind].format(**context)}; got {got}"
+    return f"{error['msg'].removeprefix('Value error, ')}; got {got}"
 
 
 def _short(value: object) -> str:

@@ -89,6 +89,16 @@ def test_a_block_that_is_refused_is_left_out_and_said() -> None:
     assert "c" in done.stderr
 
 
+@pytest.mark.parametrize("text", ["", "<!-- later -->", 'title = "x"', "<bml/>", "<bml id='b'><oops"])
+def test_where_nothing_was_accepted_nothing_is_written(tmp_path: Path, text: str) -> None:
+    out = tmp_path / "x.png"
+    out.write_bytes(b"of before")
+    done = CliRunner().invoke(cli, ["realize", "-", "-o", str(out)], input=text, standalone_mode=False)
+    assert done.return_value == 1
+    assert "not written" in done.stderr
+    assert out.read_bytes() == b"of before"
+
+
 def test_a_block_that_a_later_one_replaces_keeps_the_times_it_was_planned_with() -> None:
     text = TALK + '<bml id="c" composition="REPLACE"><wait id="w" duration="1"/></bml>'
     first, second = times(text)

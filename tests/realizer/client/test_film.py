@@ -71,6 +71,16 @@ def test_a_suffix_that_is_no_film_is_refused(tmp_path: Path) -> None:
     serving(test)
 
 
+def test_a_folder_that_is_not_there_is_said_before_anything_is_played(tmp_path: Path) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(FileNotFoundError, match="nowhere"):
+                await client.film(tmp_path / "nowhere" / "x.mp4", '<bml id="b"/>')
+            assert not client._mail.feedback
+
+    serving(test)
+
+
 def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
     packets = [
         unpack(pack(FrameKind.SOUND, k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))

@@ -111,6 +111,16 @@ def test_play_waits_for_the_end_and_says_when_it_was() -> None:
     serving(test)
 
 
+@pytest.mark.parametrize("nothing", ["", " \n", "<!-- later -->", '<?xml version="1.0"?>'])
+def test_nothing_to_play_is_refused_at_once(nothing: str) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ClientError, match="wanted <bml>, got nothing"):
+                await client.play(nothing)
+
+    serving(test)
+
+
 def test_the_welcome_says_what_there_is_and_the_state_what_plays() -> None:
     async def test(url: str) -> None:
         async with connect(f"{url}?session=show") as client:

@@ -88,3 +88,17 @@ def test_a_block_is_over_with_its_end_or_its_refusal(told, last) -> None:
     if last == "b":
         with pytest.raises(ClientError):
             until.end()
+
+
+@pytest.mark.parametrize(
+    ("bml", "block"),
+    [
+        ('<bml id="a"/><bml id="b"/>', "b"),
+        ('<bml id="a"/><!-- <bml id="b"/> -->', "a"),
+        ('<bml id="a&amp;b"/>', "a&b"),
+        ("<bml/>", None),
+    ],
+)
+def test_the_last_block_is_the_last_that_is_no_comment(mail, bml, block) -> None:
+    mail.sent(bml)
+    assert mail.last_block == block

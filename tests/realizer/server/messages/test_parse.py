@@ -12,6 +12,7 @@ from realizer.server.messages import (
     STREAMS,
     SUPPORTED,
     ErrorMessage,
+    Ping,
     SceneMessage,
     Subscribe,
     parse_control,
@@ -39,28 +40,51 @@ def test_every_supported_type_is_understood() -> None:
         ("{", "bad-json", None, "JSON object"),
         ("{" * 100_000, "bad-json", None, "JSON object"),
         ('{"a":' * 50_000, "bad-json", None, "nested too deeply"),
+        (r'{"type":"ping","id":"\ud800"}', "bad-json", None, "half a character"),
+        (r'{"type":"ping","\uDFFF":1}', "bad-json", None, "half a character"),
         ("{}", "unsupported", "type", "hello, subscribe"),
         ('{"type":"dance"}', "unsupported", "type", '"dance"'),
         ('{"type":["hello"]}', "unsupported", "type", "hello"),
         ('{"type":"speak"}', "unsupported", "type", "hello"),
-        ('{"type":"anticipate"}', "invalid", "anticipate.id", "required"),
-        ('{"type":"anticipate","id":"a:b","syncs":{}}', "invalid", "anticipate.id", "pattern"),
+        ('{"type":"anticipate"}', "invalid", "anticipate.id", "wanted a value; got nothing"),
+        ('{"type":"anticipate","id":"a:b","syncs":{}}', "invalid", "anticipate.id", "a string that matches"),
         ('{"type":"subscribe","stream":"smell"}', "unsupported", "subscribe.stream", "fap, au"),
         ('{"type":"subscribe","stream":[]}', "unsupported", "subscribe.stream", "fap, au"),
-        ('{"type":"subscribe","stream":"fap","fps":-1}', "invalid", "subscribe.fps", "greater than 0"),
+        (
+            '{"type":"subscribe","stream":"fap","fps":-1}',
+            "invalid",
+            "subscribe.fps",
+            "wanted more than 0; got -1",
+        ),
         ('{"type":"subscribe","stream":"fap","fps":1e9}', "invalid", "subscribe.fps", "240"),
         ('{"type":"subscribe","stream":"fap","fps":NaN}', "invalid", "subscribe.fps", ""),
-        ('{"type":"subscribe","stream":"fap","colour":1}', "invalid", "subscribe.colour", "not permitted"),
+        (
+            '{"type":"subscribe","stream":"fap","colour":1}',
+            "invalid",
+            "subscribe.colour",
+            "no field of that name; got 1",
+        ),
+        (
+            '{"type":"subscribe","stream":"video","size":"64x64"}',
+            "invalid",
+            "subscribe.size",
+            "wanted a list",
+        ),
         ('{"type":"subscribe","stream":"video","size":[0,9]}', "invalid", "subscribe.size.0", "16"),
-        ('{"type":"subscribe","stream":"video","size":[1e30,9]}', "invalid", "subscribe.size.0", "int"),
+        (
+            '{"type":"subscribe","stream":"video","size":[1e30,9]}',
+            "invalid",
+            "subscribe.size.0",
+            "wanted a whole number",
+        ),
         ('{"type":"subscribe","stream":"video","format":"gif"}', "invalid", "subscribe.format", "'webp'"),
         ('{"type":"subscribe","stream":"video","quality":0}', "invalid", "subscribe.quality", "1"),
         ('{"type":"subscribe","stream":"video","background":"red"}', "invalid", "subscribe.background", ""),
         ('{"type":"subscribe","stream":"audio","rate":50}', "invalid", "subscribe.rate", "8000"),
         ('{"type":"subscribe","stream":"audio","rate":22051}', "invalid", "subscribe.rate", "50"),
-        ('{"type":"set","aus":{"12":7}}', "invalid", "set.aus.12", "less than or equal to 1"),
+        ('{"type":"set","aus":{"12":7}}', "invalid", "set.aus.12", "wanted at most 1; got 7"),
         ('{"type":"scene","objects":{"a":{"x":1e99,"y":0,"z":0}}}', "invalid", "scene.objects.a.x", "10000"),
-        ('{"type":"hello","session":"a b"}', "invalid", "hello.session", "pattern"),
+        ('{"type":"hello","session":"a b"}', "invalid", "hello.session", "a string that matches"),
         ('{"type":"ping","id":"' + "x" * 300_000 + '"}', "too-large", None, "at most"),
     ],
 )
@@ -69,6 +93,12 @@ def test_a_bad_message_is_told_what_was_wanted(text, code, where, says) -> None:
     assert isinstance(error, ErrorMessage)
     assert (error.code, error.where) == (code, where)
     assert says in error.message
+
+
+def test_a_character_that_takes_two_escapes_is_one() -> None:
+    message = parse_control(r'{"type":"ping","id":"\ud83d\ude00"}')
+    assert isinstance(message, Ping)
+    assert message.id == "\U0001f600"
 
 
 @given(st.text(max_size=200))
@@ -84,8 +114,8 @@ def test_any_text_gives_a_message_or_an_error(text) -> None:
         (',"id":"t","words":[]', ""),
         (',"id":"t","text":"Hello"', "the clip that this is said in"),
         (',"clip":"c","phonemes":[{"start":0,"ipa":"p"}],"visemes":[{"start":0,"viseme":1}]', "got both"),
-        (',"clip":"c","words":[{"start":-1,"text":"a"}]', "greater than or equal to 0"),
-        (',"id":"t 1","append":"x"', "pattern"),
+        (',"clip":"c","words":[{"start":-1,"text":"a"}]', "wanted at least 0; got -1"),
+        (',"id":"t 1","append":"x"', "a string that matches"),
     ],
 )
 def test_a_speech_says_what_it_lacks(fields, says) -> None:
