@@ -1,40 +1,25 @@
-"""Mutants of the corpus: what comes of them is a block or a BMLError, it plays to its end, none hangs up."""
+"""Whatever comes in broken: blocks and errors come of documents, nothing hangs, no session ends of it."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-import signal
-import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import islice
-from pathlib import Path
 
-import numpy as np
 import pytest
 from websockets.asyncio.client import connect
 
-from bml_schema import Block, BMLError, read
+from bml_schema import Block, BMLError, Feedback, read
 from realizer.behaviours import VOCABULARY
-from realizer.pipeline import submitted
-from realizer.player import Player
+from realizer.server.feedback_log import FeedbackLog
 from realizer.server.serve import Server
 from realizer.settings import Settings
-from realizer.speech import SilentVoice
+from tests.fuzz import corpus, no_hang, plays, tried
 from tests.mutants import mutants
 
-CORPUS = Path(__file__).parent / "corpus"
-HANG = (
-    5.0  # s of CPU for one mutant: far above the 0.1 s that is aimed at, so that a busy machine is no fault
-)
 LIMIT = 120  # s; a hung service ends
 OVER_THE_WIRE = 400
-
-
-def corpus() -> list[bytes]:
-    return [path.read_bytes() for path in sorted(CORPUS.rglob("*.xml"))]
 
 
 @pytest.fixture(scope="module")
@@ -45,29 +30,6 @@ def count(pytestconfig: pytest.Config) -> int:
 @pytest.fixture(scope="module")
 def seed(pytestconfig: pytest.Config) -> int:
     return int(pytestconfig.getoption("seed"))
-
-
-class HangError(Exception):
-    """More CPU than anything may take."""
-
-
-@contextmanager
-def no_hang(mutant: bytes) -> Iterator[list[float]]:
-    """Ends what takes too long; the list then holds the CPU seconds it took."""
-
-    def ring(*_: object) -> None:
-        raise HangError(mutant)
-
-    before = signal.signal(signal.SIGPROF, ring)
-    signal.setitimer(signal.ITIMER_PROF, HANG)
-    took: list[float] = []
-    start = time.process_time()
-    try:
-        yield took
-    finally:
-        took.append(time.process_time() - start)
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def test_whatever_is_read_gives_blocks_and_errors_and_blocks_play_to_their_end(
@@ -96,28 +58,27 @@ def test_whatever_is_read_gives_blocks_and_errors_and_blocks_play_to_their_end(
         print(f"\n{count} mutants of seed {seed}: {dict(results)}, {times}")
 
 
-def plays(items: list[Block | BMLError], *, faces: bool) -> None:
-    """Submit what is a block, and let time jump from deadline to deadline until nothing moves any more."""
-    player = Player(idle=False)
-    for item in items:
-        if isinstance(item, Block):
-            schedule = submitted(player, item, SilentVoice())
-            for points in schedule.times.values():
-                assert np.isfinite(points).all()
-                assert (np.diff(points) >= 0).all()
-    if faces:
-        frames = player.frames(np.linspace(0, min(player.end, 1e5), 5))
-        assert np.isfinite(frames.values).all()
-    for _ in range(100_000):
-        deadline = player.next_deadline()
-        if deadline is None:
-            break
-        for feedback in player.due(max(deadline, 0.0)):
-            assert feedback.to_xml()
-    else:
-        raise AssertionError("it goes on for ever")
-    waiting = [b for b in player.state(1e6)["blocks"] if b["status"] not in ("PENDING", "LURKING")]
-    assert not waiting
+@pytest.mark.parametrize(
+    ("target", "part"),
+    # Of as many seeds as there are mutants, so many: one try costs as much more.
+    [("faps", 10), ("tasks", 80), ("controls", 40), ("sessions", 300)],
+)
+def test_what_is_broken_in_every_way_is_stood(target: str, part: int, count: int, seed: int) -> None:
+    tried(target, range(seed, seed + max(1, count // part)))
+
+
+def test_a_law_that_is_broken_is_noticed_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    # One message in three is not numbered: clients of the session see the gap.
+    real = FeedbackLog.add
+
+    def forgetful(log: FeedbackLog, feedback: Feedback) -> None:
+        log.newest += log.newest % 3 == 1
+        real(log, feedback)
+
+    monkeypatch.setattr(FeedbackLog, "add", forgetful)
+    with pytest.raises(AssertionError, match=r"--only sessions --seed \d+$") as caught:
+        tried("sessions", range(10))
+    assert "after" in str(caught.value.__cause__)
 
 
 def test_no_mutant_ends_a_connection(count: int, seed: int) -> None:

@@ -106,21 +106,31 @@ def _dropped(warning: Warning, block: Block, schedule: Schedule) -> Dropped | No
     if id in schedule.times if problem is None else not problem.dropped:
         return None
     place = Place(problem.line, problem.path) if problem is not None else block.places.get(id or warning.id)
-    element = None
-    if place is not None:
-        element = place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None
     return Dropped(
-        id or warning.id, element, place.line if place is not None else None, warning.type, warning.text
+        id or warning.id,
+        _element(place),
+        place.line if place is not None else None,
+        warning.type,
+        warning.text,
     )
+
+
+def _element(place: Place | None) -> str | None:
+    """The name of what stands there."""
+    if place is None:
+        return None
+    return place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None
 
 
 def _cut(playing: Playing, id: str) -> Dropped:
     """What was ended before it began."""
     place, state = playing.block.places.get(id), playing.state.value
     when = "" if playing.stopped is None else f" at {playing.stopped:.3f} s"
+    # A block that waited is without it by now.
+    tag = next((node.tag for node in playing.block.behaviours if node.id == id), None)
     return Dropped(
         id,
-        playing.block[id].tag.rpartition("}")[2],
+        _element(place) if tag is None else tag.rpartition("}")[2],
         place.line if place is not None else None,
         state,
         f"cut off{when}, before it began",

@@ -7,7 +7,7 @@ import secrets
 from collections.abc import Callable
 
 from realizer.errors import RealizerError
-from realizer.server.effects import Effect, Move, Send
+from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.messages import ErrorMessage
 from realizer.server.session import Session
 from realizer.settings import raises
@@ -92,7 +92,10 @@ class Hub:
     def effects(self, session: Session, now: float) -> list[Effect]:
         """What is to be done for a session; connections that move to another one are moved here."""
         effects: list[Effect] = []
+        moved: set[int] = set()
         for effect in session.outgoing():
+            if isinstance(effect, Send) and effect.connection in moved:
+                continue  # it has been welcomed elsewhere: what comes from here would be taken for theirs
             if isinstance(effect, Move):
                 words = None
                 if not self._ours(effect.session):
@@ -104,7 +107,12 @@ class Hub:
                     effects.append(Send(effect.connection, error.text()))
                     continue
                 self.leave(effect.connection, now)
-                there = self.open(effect.connection, effect.session, now)
+                moved.add(effect.connection)
+                try:
+                    there = self.open(effect.connection, effect.session, now)
+                except HubError as error:  # it cannot be kept; what it has left may be gone
+                    effects.append(Close(effect.connection, 1013, str(error)[:120]))
+                    continue
                 there.welcome(effect.connection, now)
                 if effect.seen is not None:
                     there.resume(effect.connection, effect.seen)

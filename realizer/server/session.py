@@ -189,19 +189,25 @@ class Session:
         if self.closed or connection not in self._connections:
             return
         t = now - self.opened
+        # What was due is told before anything changes, whether somebody woke the session in time or not:
+        # who does all of it again from the journal is not woken in between.
+        self._publish(t)
+        kept = False
         if isinstance(message, bytes):
-            if self._keep(t, "sound", connection, message):
+            if kept := self._keep(t, "sound", connection, message):
                 self._take_clip(connection, message)
         elif message.lstrip("\ufeff \t\r\n").startswith("{"):
             control = parse_control(message.lstrip("\ufeff \t\r\n"))
             if isinstance(control, ErrorMessage):
                 self.reply(connection, control)
-            elif isinstance(control, PASSING) or self._keep(t, "text", connection, message):
+            elif isinstance(control, PASSING) or (kept := self._keep(t, "text", connection, message)):
                 follow(self, self._connections[connection], control, t)
-        elif self._keep(t, "text", connection, message) and (refused := self._inbox.put(message)) is not None:
-            self._refuse(refused, t)
-        if not self.closed:
-            self._work(t)
+        else:
+            kept = self._keep(t, "text", connection, message)
+            if kept and (refused := self._inbox.put(message)) is not None:
+                self._refuse(refused, t)
+        if not self.closed and self._work(t) and not kept:
+            self._tell(t, "tick")
 
     def _keep(self, t: float, kind: Kind, connection: int, message: str | bytes) -> bool:
         """Write a message into the journal; where that cannot be it is not taken, and its client is told."""
@@ -249,6 +255,7 @@ class Session:
         if self.closed:
             return
         t = now - self.opened
+        self._publish(t)
         if self._tell(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.orders.answer(speak, result, t)
             self._work(t)

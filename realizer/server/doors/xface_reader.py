@@ -31,7 +31,8 @@ _START = re.compile(rb"""<task((?:[^<>"']|"[^"<]*"|'[^'<]*')*)>""")
 _END = re.compile(rb"</task\s*>|\0|<task(?=[\s/>])")
 _PASSED = re.compile(rb"(?:[\s\0]|\xef\xbb\xbf|<\?[^<>]{0,200}\?>)+")
 _BOUND = re.compile(rb"\0|<task(?=[\s/>])")
-_VALUE = re.compile(r"""([\w:.-]+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+# A name is looked at once, from its beginning, however long it is.
+_VALUE = re.compile(r"""(?<![\w:.-])([\w:.-]++)\s*+=\s*(?:"([^"]*)"|'([^']*)')""")
 _PARAM = re.compile(r"<param\s*/>|<param\s*>|</param\s*>")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,63}")
 LONGEST_TAG = 4096  # bytes

@@ -154,6 +154,7 @@ ErrorCode = Literal[
     "render",
     "rate",
     "token",
+    "journal",
 ]
 
 

@@ -116,6 +116,17 @@ def test_what_was_ended_before_it_began_is_told_as_cut_off(lines) -> None:
     assert new.state == "LURKING"
 
 
+def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is_revoked() -> None:
+    player = Player(idle=False)
+    preplan = 'xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true"'
+    block = parse(f'<bml id="a" {preplan}><head id="n" lexeme="NOD"/></bml>', VOCABULARY)
+    schedule = player.submit(block, 0.0)
+    player.stop(0.5)
+    (line,) = lines_of(player.cast, [schedule])
+    assert line.state == "REVOKED"
+    assert [(d.id, d.element, d.type) for d in line.dropped] == [("n", "head", "REVOKED")]
+
+
 def test_a_behaviour_that_is_cut_off_keeps_what_has_passed() -> None:
     player = Player(idle=False)
     block = parse('<bml id="b"><gaze id="g" target="x" start="0" end="4"/></bml>', VOCABULARY)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from realizer.server.effects import Close
 from realizer.server.hub import Hub, HubError
 from realizer.server.session import Session
 from realizer.settings import Settings
@@ -86,3 +87,31 @@ def test_hello_moves_a_connection_to_the_session_it_names(hub) -> None:
     assert hub.session_of(2) is there
     assert here.id not in hub.sessions
     assert '"session":"show"' in effects[0].data
+
+
+def test_one_that_has_moved_hears_nothing_more_of_where_it_was(hub) -> None:
+    hub.open(1, "show", 0.0)
+    here = hub.open(2, "here", 0.0)
+    here.receive(2, '<bml id="b"><wait id="w" duration="1"/></bml>', 0.0)
+    hub.effects(here, 0.0)
+    # Something of the old session is due in the very moment in which it goes.
+    here.receive(2, '{"type":"hello","session":"show"}', 0.0)
+    effects = hub.effects(here, 0.0)
+    welcome = next(n for n, effect in enumerate(effects) if '"session":"show"' in effect.data)
+    assert [effect.data for effect in effects[welcome + 1 :]] == []
+    assert here.log.newest > 0
+
+
+def test_hello_into_a_session_that_cannot_be_kept_ends_the_connection_with_words() -> None:
+    settings = Settings()
+
+    def make(id: str, now: float, named: bool) -> Session:
+        if id == "show":
+            raise HubError(503, "the journal has no room")
+        return Session(id, settings, now, named=named)
+
+    hub = Hub(make, 3)
+    here = hub.open(1, "here", 0.0)
+    here.receive(1, '{"type":"hello","session":"show"}', 0.5)
+    assert hub.effects(here, 0.5) == [Close(1, 1013, "the journal has no room")]
+    assert hub.session_of(1) is None

@@ -111,6 +111,12 @@ def test_an_absurd_size_of_a_file_is_a_fault_and_nothing_is_waited_for(size: str
     assert after == STOP
 
 
+def test_a_tag_of_one_word_that_never_ends_costs_no_more_than_its_length() -> None:
+    # Where each letter began a search of its own this took a minute of processor time.
+    everything = found(b"<task " + b"x" * 100_000 + b">" + b"y" * 3000 + b"\0" + NEXT)
+    assert everything[-1] == STOP
+
+
 @given(st.binary(max_size=300), st.integers(1, 100))
 def test_any_bytes_are_tasks_or_faults_and_a_nul_sets_it_right(data: bytes, cut: int) -> None:
     everything = found(data.replace(b"UPLOAD_WAV", b"") + b"\0" + NEXT, cut)
