@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from xml.sax.saxutils import escape, quoteattr, unescape
 
@@ -18,6 +18,8 @@ from realizer.speech.ssml import EMPTY, SPOKEN
 __all__ = ["Piece", "clip_block", "text_block"]
 
 ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
+# A tag of which the rest never came.
+BROKEN = re.compile(r"</?(?:[\w.-]+:)?([A-Za-z][\w.-]+)(?:\s[^<>]*)?$")
 PREFIXES = {"bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 # Elements beside behaviours that stand in a block and not in its text.
 BESIDE = frozenset({"constraint", "required"})
@@ -57,18 +59,24 @@ def text_block(text: str, piece: Piece) -> Block:
 
     <sync id="m"/> is a sync point of the behaviour, other SSML is handed to the voice. A behaviour needs no
     id; one without a sync reference starts where it stands in the text. References to syncs of the speech are
-    `ID:m`, also to those of earlier pieces. What is no XML is spoken without its tags.
+    `ID:m`, also to those of earlier pieces. What is no XML, or has syncs that cannot be, is spoken without
+    its tags. A tag that breaks off at the end is left out.
     """
     work = _Text(piece)
     work.read(legal(text))
     found = list(read(piece.document(work.inside()), VOCABULARY))
-    if len(found) == 1 and isinstance(found[0], Block):
-        return found[0]
+    block = found[0] if len(found) == 1 and isinstance(found[0], Block) else None
+    if block is not None and (not work.spoken or any(node.id == piece.speech for node in block.behaviours)):
+        return block
     plain = _Text(piece)
     plain.say(TAG.sub(" ", legal(text)))
-    (block,) = read(piece.document(plain.inside()), VOCABULARY)
-    assert isinstance(block, Block)
-    return block
+    (spoken,) = read(piece.document(plain.inside()), VOCABULARY)
+    assert isinstance(spoken, Block)
+    if block is None:
+        return spoken
+    # The words count for more than what is wrong with their syncs, which is told all the same.
+    children = (*spoken.children, *block.children)
+    return replace(block, children=children, places={**block.places, **spoken.places})
 
 
 def clip_block(clip: str, piece: Piece) -> Block:
@@ -110,7 +118,10 @@ class _Text:
                     self._mark(unescape(named[1:-1], QUOTES), _written(values, {"ref"}))
             else:
                 self._markup(tag, name)
-        self.say(text[at:])
+        rest = text[at:]
+        if (broken := BROKEN.search(rest)) and _known(broken[1]):
+            rest = rest[: broken.start()]
+        self.say(rest)
 
     def say(self, text: str) -> None:
         """Plain text; & and < need not be escaped in it."""
@@ -189,3 +200,7 @@ def _closed(text: str, tag: re.Match[str]) -> int:
 def _behaviours() -> Mapping[str, frozenset[str]]:
     """Name of a behaviour -> its sync points."""
     return {tag.rpartition("}")[2]: frozenset(node.sync_points) for tag, node in VOCABULARY.items()}
+
+
+def _known(name: str) -> bool:
+    return name in SPOKEN or name in EMPTY or name in BESIDE or name in _behaviours()

@@ -242,7 +242,9 @@ class Speeches:
         for speech in self._speeches.values():
             if speech.over:
                 continue
-            if not speech.closed or speech.owed or speech.unsaid:
+            # Before its own block starts nobody knows when that is: it must not end before.
+            placed = self._player.cast.find(speech.id) is not None
+            if not (speech.closed and placed) or speech.owed or speech.unsaid:
                 end = t + OPEN if speech.end < t + OPEN / 2 else speech.end
             else:
                 last = (self._player.cast.find(id) for id in speech.ahead)

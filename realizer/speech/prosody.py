@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["PLAIN", "Prosody"]
+__all__ = ["PLAIN", "Prosody", "understood"]
 
 # SSML 1.1 leaves the size of the named steps to the engine: these are ours.
 RATES = {"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.4, "x-fast": 1.8}
@@ -23,6 +23,7 @@ VOLUMES = {
 LEAST_RATE, MOST_RATE = 0.25, 4.0
 LEAST_PITCH, MOST_PITCH = 0.5, 2.0
 MOST_VOLUME = 4.0
+HERTZ = re.compile(r"\s*[+-]?(\d+(?:\.\d+)?|\.\d+)\s*Hz\s*", re.IGNORECASE)
 NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|)\s*", re.IGNORECASE)
 
 
@@ -50,6 +51,14 @@ class Prosody:
 
 
 PLAIN = Prosody()
+
+
+def understood(attribute: str, value: str) -> bool:
+    """Whether an attribute of <prosody> says something; of another one than rate, pitch and volume: True."""
+    names = {"rate": RATES, "pitch": PITCHES, "volume": VOLUMES}.get(attribute)
+    if names is None or value.strip() in names or NUMBER.fullmatch(value):
+        return True
+    return attribute == "pitch" and bool(HERTZ.fullmatch(value))
 
 
 def _factor(text: str, names: Mapping[str, float]) -> float:

@@ -10,6 +10,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
 from realizer.errors import VoiceError
+from realizer.speech.prosody import understood
 from realizer.speech.utterance import MOST_TEXT, Say
 
 __all__ = ["Break", "Mark", "Script", "Tag", "read_script"]
@@ -31,6 +32,8 @@ SPOKEN: Mapping[str, tuple[str, ...]] = {
     "voice": ("xml:lang", "name", "gender", "age", "variant"),
 }
 EMPTY = ("break", "mark", "bookmark", "sync")
+# And those that change nothing a voice could do: their text is spoken as it is.
+PLAIN = frozenset({"desc", "lexicon", "lookup", "meta", "metadata", "speak", "token", "w"})
 STRENGTHS = {"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.2}  # s
 CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
 
@@ -96,8 +99,9 @@ class Script:
 def read_script(request: Say) -> Script:
     """The script of a request. Wrong SSML is spoken as plain text, its marks kept, with a warning.
 
-    Control characters, lone surrogates and emoji are left out with a warning; elements and attributes that
-    are not SSML are left out silently, their text is spoken.
+    Control characters, lone surrogates, emoji, elements that are not SSML (their text is spoken), marks
+    without a name or with that of an earlier one, and values that nobody understands are left out with a
+    warning; attributes that are not SSML are left out silently.
 
     Raises:
         VoiceError: the text is longer than `MOST_TEXT` characters.
@@ -112,10 +116,18 @@ def read_script(request: Say) -> Script:
     if wrong:
         warnings.append(f"{wrong} control characters in the text are left out")
     try:
-        parts = list(_parse(ssml))
+        parts, odd = _parse(ssml)
+        warnings += odd
     except expat.ExpatError as error:
         warnings.append(f"the text is not well-formed SSML ({error}): spoken as plain text")
         parts = list(_scrape(ssml))
+    if any(isinstance(part, Mark) and not part.name for part in parts):
+        warnings.append("a mark without a name is left out")
+    names = [part.name for part in parts if isinstance(part, Mark) and part.name]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        warnings.append(f"there are several marks {name!r}: the first one counts")
+    seen = {""}
+    parts = [part for part in parts if not (isinstance(part, Mark) and _twice(part.name, seen))]
     if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
         warnings.append("emoji in the text are not spoken")
         parts = [PICTURES.sub(" ", part) if isinstance(part, str) else part for part in parts]
@@ -126,18 +138,35 @@ def read_script(request: Say) -> Script:
     return script
 
 
-def _parse(ssml: str) -> list[Part]:
+def _twice(name: str, seen: set[str]) -> bool:
+    """Whether a name is in there already; it is from now on."""
+    there = name in seen
+    seen.add(name)
+    return there
+
+
+def _parse(ssml: str) -> tuple[list[Part], list[str]]:
+    """The parts, and what is odd about them, in sentences."""
     parts: list[Part] = []
+    odd: list[str] = []
     reader = expat.ParserCreate()
     reader.buffer_text = True
 
     def start(name: str, attributes: dict[str, str]) -> None:
         name = name.rpartition(":")[2]
         if name in EMPTY:
-            parts.extend(_point(name, attributes))
+            parts.extend(_point(name, attributes, odd))
         elif name in SPOKEN:
+            if name == "prosody":
+                odd.extend(
+                    f'{key}="{value[:40]}" of prosody is not understood'
+                    for key, value in attributes.items()
+                    if not understood(key, value)
+                )
             kept = ((k, attributes[k][:LONGEST_ATTRIBUTE]) for k in SPOKEN[name] if k in attributes)
             parts.append(Tag(name, tuple(kept)))
+        elif name not in PLAIN:
+            odd.append(f"<{name[:40]}> is not spoken SSML: it is left out, text in it is not")
 
     def end(name: str) -> None:
         name = name.rpartition(":")[2]
@@ -151,17 +180,24 @@ def _parse(ssml: str) -> list[Part]:
     reader.EndElementHandler = end
     reader.CharacterDataHandler = text
     reader.Parse(f"<speak>{ssml}</speak>".encode(), True)
-    return parts
+    return parts, list(dict.fromkeys(odd))
 
 
-def _point(name: str, attributes: Mapping[str, str]) -> Iterator[Part]:
-    """An element without content: a mark by any of its spellings, or a break."""
+def _point(name: str, attributes: Mapping[str, str], odd: list[str]) -> Iterator[Part]:
+    """An element without content: a mark by any of its spellings, or a break; what is odd goes to `odd`."""
     if name == "break":
-        clock = CLOCK.fullmatch(attributes.get("time", ""))
+        time, strength = attributes.get("time"), attributes.get("strength", "medium")
+        clock = CLOCK.fullmatch(time or "")
         if clock:
             seconds = float(clock[1]) / (1000 if clock[2] == "ms" else 1)
+            if seconds > LONGEST_BREAK:
+                odd.append(f"a break of {seconds:g} s is cut to {LONGEST_BREAK:g} s")
         else:
-            seconds = STRENGTHS.get(attributes.get("strength", "medium"), STRENGTHS["medium"])
+            seconds = STRENGTHS.get(strength, STRENGTHS["medium"])
+            if time is not None:
+                odd.append(f'time="{time[:40]}" of break is not understood')
+            if strength not in STRENGTHS:
+                odd.append(f'strength="{strength[:40]}" of break is not understood')
         yield Break(min(seconds, LONGEST_BREAK))
     else:
         # SSML <mark name>, SAPI <bookmark mark>, BML <sync id>.

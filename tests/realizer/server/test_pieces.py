@@ -89,3 +89,17 @@ def test_a_clip_is_a_speech_too() -> None:
 @given(st.text(alphabet='ab<>/="&;sync \x00\ud800', max_size=60))
 def test_any_text_gives_a_block(text) -> None:
     assert text_block(text, PIECE).id == "turn.2"
+
+
+@pytest.mark.parametrize("syncs", ['<sync id=""/>', '<sync id="m"/>some <sync id="m"/>', '<sync id="a b"/>'])
+def test_a_sync_that_cannot_be_is_told_and_costs_no_word(syncs: str) -> None:
+    block = text_block(f'Have {syncs}tea <head id="n" lexeme="NOD" start="1"/>here.', PIECE)
+    assert said(block).split()[-2:] == ["tea", "here."]
+    assert ["/sync[" in p.path or "sync" in p.text for p in block.problems] == [True]
+    assert block["n"].syncs["start"].offset == 1
+
+
+@pytest.mark.parametrize("tag", ['<sync id="m', "<sync", "</prosody", '<realizer:emotion name="joy'])
+def test_a_tag_that_breaks_off_is_not_spoken(tag: str) -> None:
+    assert said(text_block(f"Good morning. {tag}", PIECE)).strip() == "Good morning."
+    assert said(text_block("Is a <b?", PIECE)) == "Is a <b?"

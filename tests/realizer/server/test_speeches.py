@@ -12,7 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
-from bml_schema.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, parse_feedback
+from bml_schema.feedback import (
+    BlockProgress,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+    parse_feedback,
+)
 from realizer.server import speeches
 from realizer.server.effects import Effect, Speak
 from realizer.server.serve import Server
@@ -125,6 +131,13 @@ def test_a_sync_that_never_comes_costs_what_names_it_and_nothing_else() -> None:
     assert "b:w:end" in at
     assert "b:n:stroke" not in at
     assert "turn:end" in at
+
+
+def test_a_speech_that_ends_without_a_word_is_no_fault() -> None:
+    driver = Talker()
+    told = [*driver.send({"type": "speech", "id": "turn", "close": True}).feedback, *driver.run(1).feedback]
+    assert [f.status for f in told if isinstance(f, BlockProgress) and f.id == "turn:end"] == ["DONE"]
+    assert not [f for f in told if isinstance(f, WarningFeedback)]
 
 
 def test_others_follow_the_speech_as_one_block() -> None:
