@@ -214,10 +214,11 @@ class Player:
 
     def due(self, now: float) -> list[Feedback]:
         """Feedback whose time has come, in the order of report, each once."""
-        if not self._blocks.stirs(now):
+        forgettable = now - self.history - RELAX - AFTERMATH
+        if not self._blocks.stirs(now, forgettable):
             return []
         out = self._blocks.due(now)
-        forgotten = self._blocks.forget(now - self.history - RELAX - AFTERMATH)
+        forgotten = self._blocks.forget(forgettable)
         if forgotten:
             for character in self._characters:
                 character.forget(now - self.history)

@@ -45,9 +45,9 @@ class Cast:
         self._ended.append(playing)
 
     @property
-    def has_ended(self) -> bool:
-        """Whether there are blocks that have ended and are not forgotten."""
-        return bool(self._ended)
+    def first_gone(self) -> float:
+        """From when on nothing is to be seen of the first block that has ended; infinite where none has."""
+        return min((p.gone for p in self._ended), default=float("inf"))
 
     def forget(self, before: float) -> list[Playing]:
         """Drop the blocks of which nothing is to be seen from a time on; returns them."""

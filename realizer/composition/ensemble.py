@@ -126,10 +126,10 @@ class Ensemble:
     def next_deadline(self) -> float | None:
         return float("-inf") if self.reports else self.course.calendar.next
 
-    def stirs(self, now: float) -> bool:
-        """Whether something is due by then, or has ended and is not forgotten."""
+    def stirs(self, now: float, before: float) -> bool:
+        """Whether `due(now)` or `forget(before)` would have something."""
         due = self.next_deadline()
-        return self.cast.has_ended or (due is not None and due <= now)
+        return (due is not None and due <= now) or self.cast.first_gone < before
 
     def forget(self, before: float) -> bool:
         """Drop blocks of which nothing is to be seen after a time; True where there were some."""
