@@ -10,7 +10,8 @@ import numpy as np
 
 from realizer.arrays import Int16
 from realizer.speech.merged import bare, cuts, is_vowel
-from realizer.speech.ssml import Break, Mark, Script, write_tag
+from realizer.speech.prosody import PLAIN
+from realizer.speech.ssml import Break, Mark, Script, Tag, write_tag
 from realizer.speech.utterance import Phoneme, Word
 from realizer.speech.words import PlacedMark, words_in
 
@@ -20,6 +21,9 @@ WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
 STRESS = {"ˈ": 1, "ˌ": 2}
 SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
 LEAST_CLOSURE = 0.01  # s
+# Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
+OCTAVES = 0.72
+MOST_PITCH = 198.0  # %; its setting ends there
 KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
 
 Event = tuple[int, int, int, str]
@@ -73,8 +77,24 @@ def write_document(script: Script) -> Document:
             text += f'<break time="{round(part.seconds * 1000)}ms"/>'
             marks = [PlacedMark(m.name, m.word, m.paused or m.word == len(words)) for m in marks]
         else:
-            text += write_tag(part)
+            text += write_tag(_in_its_units(part))
     return Document(text + "</speak>", tuple(words), tuple(marks))
+
+
+def _in_its_units(tag: Tag) -> Tag:
+    """The tag with volume and pitch of <prosody> as espeak-ng means them.
+
+    It reads decibels and semitones as per cent, and its pitch is a setting and not a factor.
+    """
+    if tag.name != "prosody" or tag.attributes is None:
+        return tag
+    given = dict(tag.attributes)
+    manner = PLAIN.within(given)
+    if "volume" in given:
+        given["volume"] = f"{100 * manner.volume:.1f}%"
+    if manner.pitch != PLAIN.pitch:  # of Hz it alone knows what they are
+        given["pitch"] = f"{min(MOST_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
+    return Tag(tag.name, tuple(given.items()))
 
 
 def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Timeline:

@@ -492,3 +492,35 @@ def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
     assert said.words[0].end > said.words[0].start
     assert sum(bool(p.ipa) for p in said.phonemes) > 3
     assert not said.warnings
+
+
+@pytest.mark.parametrize(
+    ("volume", "part"),
+    [("+6dB", 2.0), ("-6dB", 0.5), ("soft", 0.5), ("50", 0.5), ("150%", 1.5), ("silent", 0.0)],
+)
+def test_the_sound_is_as_loud_as_the_lips_are_told(voice: EspeakVoice, volume: str, part: float) -> None:
+    text = "Hello there my friend."
+    plain = voice.say(Say(text)).pcm
+    said = voice.say(Say(f'<prosody volume="{volume}">{text}</prosody>')).pcm
+    assert plain is not None
+    assert said is not None
+    assert np.std(said) / np.std(plain) == pytest.approx(part, rel=0.05, abs=0.01)
+
+
+@pytest.mark.parametrize("semitones", [-4, -2, 2, 4])
+def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
+    text = "Hello there my friend, how are you doing."
+
+    def pitch(ssml: str) -> float:
+        """Hz: the median over voiced stretches of 50 ms, by autocorrelation."""
+        pcm, heard = voice.say(Say(ssml)).pcm, []
+        assert pcm is not None
+        for at in range(0, len(pcm) - 1102, 551):
+            window = pcm[at : at + 1102].astype(float)
+            if np.std(window) > 800:
+                echo = np.correlate(window, window, "full")[1101:]
+                heard.append(22050 / (55 + int(np.argmax(echo[55:441]))))
+        return float(np.median(heard))
+
+    asked = pitch(f'<prosody pitch="{semitones:+d}st">{text}</prosody>')
+    assert 12 * np.log2(asked / pitch(text)) == pytest.approx(semitones, abs=1.0)
