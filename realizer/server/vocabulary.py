@@ -17,7 +17,7 @@ PREFIXES = {
     EXTENSIONS: "",
     "http://www.asap-project.org/bmla": "bmla",
     "http://hmi.ewi.utwente.nl/bmlt": "bmlt",
-    "urn:bml-realizer:1": "x",
+    "urn:bml-realizer:1": "realizer",
 }
 # What `shape_of` does not tell: a constraint is read by the parser itself.
 RELATIONS = ("synchronize", "before", "after")

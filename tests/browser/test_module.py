@@ -78,6 +78,29 @@ def test_a_block_is_played_to_its_end(page) -> None:  # type: ignore[no-untyped-
     assert page.evaluate("told.length") >= 4
 
 
+def test_what_is_played_before_the_connection_is_there_is_not_lost(page) -> None:  # type: ignore[no-untyped-def]
+    script = """async (bml) => {
+      const other = new realizer.constructor({ url: realizer.url.href, session: "early" });
+      const end = other.play(bml);
+      other.connect();
+      const id = (await end).getAttribute("id");
+      other.close();
+      return id;
+    }"""
+    assert page.evaluate(script, WAIT.format("e", 0.1)) == "e:end"
+
+
+@pytest.mark.parametrize("nothing", ["", " \n", "<!-- later -->"])
+def test_nothing_to_play_is_refused_at_once(page, nothing) -> None:  # type: ignore[no-untyped-def]
+    script = "(nothing) => realizer.play(nothing).catch((error) => [error.code, error.message])"
+    assert page.evaluate(script, nothing) == ["refused", "wanted <bml>, got nothing"]
+
+
+def test_the_block_that_is_awaited_is_no_comment(page) -> None:  # type: ignore[no-untyped-def]
+    bml = WAIT.format("real", 0.1) + "<!-- " + WAIT.format("not", 0.1) + " -->"
+    assert page.evaluate("async (bml) => (await realizer.play(bml)).getAttribute('id')", bml) == "real:end"
+
+
 def test_a_refused_block_rejects_with_its_warning(page) -> None:  # type: ignore[no-untyped-def]
     refused = '<bml id="no"><required><head id="n" lexeme="NONE"/></required></bml>'
     said = page.evaluate("(bml) => realizer.play(bml).catch((error) => [error.code, error.where])", refused)

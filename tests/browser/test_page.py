@@ -257,6 +257,16 @@ def test_the_examples_are_at_hand(page) -> None:  # type: ignore[no-untyped-def]
     assert "Greeting" in names
     page.click("#gallery button:nth-child(2)")
     assert "really" in page.evaluate("realizerPage.editor.text")
+    page.wait_for_selector("#gallery button:nth-child(2)[aria-pressed=true]")
+    page.fill("#document", '<bml id="own"/>')
+    page.wait_for_function("!document.querySelector('#gallery [aria-pressed=true]')")
+
+
+@pytest.mark.parametrize("width", [1280, 1366, 1920])
+def test_what_sifts_the_feedback_stands_in_whole_rows(page, width) -> None:  # type: ignore[no-untyped-def]
+    page.set_viewport_size({"width": width, "height": 800})
+    title, clear = (page.locator(f"#log-head {what}").bounding_box() for what in ("h2", "#clear"))
+    assert abs(title["y"] + title["height"] / 2 - clear["y"] - clear["height"] / 2) < 2
 
 
 def test_the_same_document_can_be_played_while_it_plays(page) -> None:  # type: ignore[no-untyped-def]

@@ -131,7 +131,7 @@ def test_elements_are_completed_where_they_may_stand(page) -> None:  # type: ign
     write(page, '<bml id="a">\n|\n</bml>')
     page.keyboard.type("<")
     names = offered(page)
-    assert {"faceLexeme", "speech", "x:emotion"} <= set(names)
+    assert {"faceLexeme", "speech", "realizer:emotion"} <= set(names)
     assert "text" not in names
     page.keyboard.type("faceLex")
     assert "<faceLexeme " in accept(page, "faceLexeme")
@@ -139,11 +139,11 @@ def test_elements_are_completed_where_they_may_stand(page) -> None:  # type: ign
 
 def test_an_extension_brings_its_namespace(page) -> None:  # type: ignore[no-untyped-def]
     write(page, '<bml id="a">\n|\n</bml>')
-    page.keyboard.type("<x:emo")
+    page.keyboard.type("<realizer:emo")
     offered(page)
-    text = accept(page, "x:emotion")
-    assert text.startswith('<bml xmlns:x="urn:bml-realizer:1" id="a">')
-    assert "<x:emotion " in text
+    text = accept(page, "realizer:emotion")
+    assert text.startswith('<bml xmlns:realizer="urn:bml-realizer:1" id="a">')
+    assert "<realizer:emotion " in text
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,11 @@ def test_sliders_are_found_by_number_and_name(page) -> None:  # type: ignore[no-
     page.click("#tab-aus")
     page.fill("#find-aus", "dimpl")
     assert page.locator(".row.au:visible").count() == 1
+    page.fill("#find-aus", "no such unit")
+    words = "getComputedStyle(document.querySelector('#au-sliders'), '::before').content"
+    assert page.evaluate(words) == '"None is called so."'
     page.fill("#find-aus", "")
+    assert page.evaluate(words) == "none"
     page.click("#tab-faps")
     page.fill("#find-faps", "f31")
     assert page.locator(".row.fap:visible > span").all_text_contents() == ["raise l i eyebrow"]

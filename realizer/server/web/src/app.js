@@ -189,6 +189,7 @@ function showFaults(found) {
   const line = faults[0]?.spots[0]?.line;
   const first = faults[0] ? `${line ? `line ${line}: ` : ""}${faults[0].text}` : "";
   const empty = !editor.text.trim();
+  mark();
   at("problems").dataset.state = found === null || empty ? "none" : bad.length ? "bad" : advice.length ? "advice" : "good";
   at("problems").title = first;
   at("problems-text").textContent = found === null ? "Not checked" : empty ? "Nothing to play yet" : faults.length ? `${[count(bad, "fault"), count(advice, "advice")].filter(Boolean).join(", ")}: ${first}` : "No faults";
@@ -212,14 +213,19 @@ addEventListener("keydown", (event) => {
   event.stopPropagation();
 }, true);
 
+// The example that stands in the editor as it came.
+function mark() {
+  for (const card of at("gallery").children) card.ariaPressed = String(card.value === editor.text);
+}
+
 async function examples() {
   const rows = await (await fetch("examples.json")).json();
   const cards = rows.map((row) => {
     const about = row.bml.match(/<!--\s*([\s\S]*?)\s*-->/)?.[1].replace(/\s+/g, " ") ?? "";
-    const card = make("button.card", { type: "button", title: about }, make("b", {}, row.title), make("span", {}, about));
+    const card = make("button.card", { type: "button", value: row.bml, title: about }, make("b", {}, row.title), make("span", {}, about));
     card.onclick = () => {
       editor.text = row.bml;
-      for (const other of cards) other.ariaPressed = String(other === card);
+      mark();
     };
     return card;
   });

@@ -36,6 +36,7 @@ const KINDS = {
 };
 const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
 const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
+const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
 const keyOf = ({ stream, character }) => `${stream}/${character ?? ""}`;
 
@@ -73,6 +74,7 @@ export class Realizer {
   #closed = false;
   #asked = []; // { message, resolve, reject } of questions without an answer yet
   #streams = new Map(); // "stream/character" -> { message, take, index of the character }
+  #unsent = []; // what is to be played when the connection is there
   #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
 
   /**
@@ -105,6 +107,7 @@ export class Realizer {
       this.#tries = 0;
       for (const { message } of this.#streams.values()) this.#post(message);
       for (const { message } of this.#asked) if (message.type !== "subscribe") this.#post(message);
+      for (const text of this.#unsent.splice(0)) this.send(text);
       this.onopen();
     };
     socket.onmessage = (event) => this.#receive(event.data);
@@ -122,6 +125,7 @@ export class Realizer {
     const over = new RealizerError("the connection was closed");
     for (const { reject } of [...this.#asked, ...[...this.#awaited.values()].flat()]) reject(over);
     this.#asked = [];
+    this.#unsent = [];
     this.#awaited.clear();
   }
 
@@ -168,13 +172,17 @@ export class Realizer {
   }
 
   /**
-   * Send BML and wait for the end of its last block.
+   * Send BML, as soon as the connection is there, and wait for the end of its last block.
    * @returns {Promise<Element>} the feedback that told it; rejects where the block is refused
    */
   play(text) {
-    const ids = [...text.matchAll(BLOCK)];
+    const bare = text.replace(COMMENT, "");
+    // The service answers every text but one in which there is nothing.
+    if (!bare.trim()) return Promise.reject(new RealizerError("wanted <bml>, got nothing", "refused"));
+    const ids = [...bare.matchAll(BLOCK)];
     const end = this.ended(ids.length ? ids.at(-1)[1] : "<no id>");
-    this.send(text);
+    if (this.open) this.send(text);
+    else this.#unsent.push(text);
     return end;
   }
 

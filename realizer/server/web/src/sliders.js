@@ -31,6 +31,7 @@ class Sliders {
   find(words) {
     for (const row of this.rows) row.element.hidden = !row.words.includes(words);
     for (const group of this.panel.children) group.hidden = [...group.querySelectorAll(".row")].every((row) => row.hidden);
+    this.panel.classList.toggle("none", this.rows.every((row) => row.element.hidden));
   }
 
   refresh() {

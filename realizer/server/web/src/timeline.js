@@ -82,7 +82,7 @@ export class Timeline {
 
   get range() {
     const { current, now } = this;
-    if (!current) return [now - IDLE, now + 0.02 * IDLE];
+    if (!current) return [now - IDLE, now + 0.09 * IDLE];
     const end = Math.max(current.start + LEAST, current.ended ?? current.end ?? now, ...[...current.first.values()].flat().map(({ at }) => at ?? 0));
     const length = Math.min(end, current.start + 3600) - current.start;
     return [current.start - 0.03 * length, current.start + length + AFTER];
