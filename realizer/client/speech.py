@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
@@ -11,6 +13,9 @@ from realizer.client.mail import ClientError
 __all__ = ["Speech", "SyncSpeech"]
 
 LONGEST = 20_000  # characters that one message may append
+# What comes sooner behind the last message goes with the next one: nobody reads faster, and a service takes
+# only so many messages a second, behind which a stop would wait.
+PAUSE = 0.01  # s
 
 
 class Heard:
@@ -90,18 +95,28 @@ class Speech:
         self._control = control
         self._wait = wait
         self._opening = opening
+        self._unsent = ""
+        self._pausing: asyncio.Task[None] | None = None
 
     async def append(self, text: str) -> None:
-        """Say more: text with <sync id="m"/>, SSML and behaviours in it, each sentence when it is whole."""
-        for at in range(0, max(1, len(text)), LONGEST):
-            await self._send(append=text[at : at + LONGEST])
+        """Say more: text with <sync id="m"/>, SSML and behaviours in it, each sentence when it is whole.
+
+        It is sent at once, or a moment after the last message was.
+        """
+        self._unsent += text
+        if self._pausing is None or self._pausing.done():
+            await self._flush()
+            self._pausing = asyncio.create_task(self._pause())
 
     async def close(self) -> None:
         """Nothing follows: what is left is said."""
+        if self._unsent:
+            await self._flush()
         await self._send(close=True)
 
     async def stop(self) -> None:
         """Fall silent at once."""
+        self._unsent = ""
         await self._control("stop", blocks=[self.id])
 
     async def until(self, sync: str) -> float:
@@ -121,6 +136,19 @@ class Speech:
         """
         await self._wait(lambda: self.heard.over)
         return self.heard.ended()
+
+    async def _flush(self) -> None:
+        text, self._unsent = self._unsent, ""
+        for at in range(0, max(1, len(text)), LONGEST):
+            await self._send(append=text[at : at + LONGEST])
+
+    async def _pause(self) -> None:
+        """Send what comes, a few times a second; a connection that has ended tells so whoever waits."""
+        await asyncio.sleep(PAUSE)
+        with contextlib.suppress(Exception):
+            while self._unsent:
+                await self._flush()
+                await asyncio.sleep(PAUSE)
 
     async def _send(self, **fields: Any) -> None:
         opening, self._opening = self._opening, {}

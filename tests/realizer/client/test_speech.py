@@ -8,7 +8,7 @@ import pytest
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from realizer.client import ClientError, connect
-from realizer.client.speech import Heard
+from realizer.client.speech import Heard, Speech
 
 from .test_live import serving
 
@@ -30,6 +30,40 @@ def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:
             assert told["n:n:start"].global_time == pytest.approx(second)
 
     serving(test)
+
+
+def test_tokens_that_come_at_once_go_together_and_a_stop_waits_for_none() -> None:
+    async def test() -> None:
+        sent: list[tuple[str, dict[str, object]]] = []
+
+        async def control(type: str, **fields: object) -> None:
+            sent.append((type, fields))
+
+        async def wait(_: object) -> None: ...
+
+        speech = Speech("s1", control, wait, {"language": "nl"})
+        for token in ("One ", *["two "] * 5000):
+            await speech.append(token)
+        assert [fields["append"] for _, fields in sent] == ["One "]
+        while len(sent) < 2:
+            await asyncio.sleep(0)
+        await speech.append("three")
+        await speech.close()
+        assert sent[0][1]["language"] == "nl"
+        assert (
+            "".join(str(fields.get("append", "")) for _, fields in sent) == "One " + "two " * 5000 + "three"
+        )
+        assert [bool(fields.get("close")) for _, fields in sent] == [False, False, False, True]
+
+        stopped = Speech("s2", control, wait, {})
+        sent.clear()
+        await stopped.append("One. ")
+        await stopped.append("Two. ")
+        await stopped.stop()
+        await stopped.close()
+        assert [type for type, _ in sent] == ["speech", "stop", "speech"]
+
+    asyncio.run(test())
 
 
 def test_a_speech_is_stopped_and_says_what_was_heard() -> None:

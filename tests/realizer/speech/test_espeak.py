@@ -6,14 +6,17 @@ import gc
 import importlib.util
 import os
 import signal
+import subprocess
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from realizer.errors import VoiceError
+from realizer.speech import engine_process
 from realizer.speech.engine_process import RUN
 from realizer.speech.espeak import ENGINE, EspeakVoice, choose_voice
 from realizer.speech.espeak_worker import Event, label
@@ -259,12 +262,20 @@ def test_many_threads_may_speak_at_once(voice: EspeakVoice) -> None:
     assert all(same(said[n, k], voice.say(texts[(k + n) % 8])) for n, k in said)
 
 
-def test_a_killed_engine_fails_one_text_and_no_more(voice: EspeakVoice) -> None:
+def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
+    voice: EspeakVoice, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lone = EspeakVoice()
+    exchange = engine_process._exchange
+
+    def killed(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        monkeypatch.undo()
+        process.kill()
+        return exchange(process, request)
+
     try:
         lone.say(Say("first"))
-        assert lone.pid is not None
-        os.kill(lone.pid, signal.SIGKILL)
+        monkeypatch.setattr(engine_process, "_exchange", killed)
         with pytest.raises(VoiceError, match="starts it again"):
             lone.say(HELLO)
         assert same(lone.say(HELLO), voice.say(HELLO))

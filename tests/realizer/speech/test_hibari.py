@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-import signal
+import subprocess
 import threading
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from realizer.animation.visemes import phoneme_features
 from realizer.errors import VoiceError
-from realizer.speech import find_voice
+from realizer.speech import engine_process, find_voice
 from realizer.speech.fitting import fitted
 from realizer.speech.hibari import HibariVoice
 from realizer.speech.hibari_text import Run, runs
@@ -222,12 +223,20 @@ def test_many_threads_may_speak_at_once(neural: HibariVoice) -> None:
 
 
 @hibari
-def test_a_killed_engine_fails_one_text_and_no_more(neural: HibariVoice) -> None:
+def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
+    neural: HibariVoice, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lone = HibariVoice()
+    exchange = engine_process._exchange
+
+    def killed(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        monkeypatch.undo()
+        process.kill()
+        return exchange(process, request)
+
     try:
         lone.say(Say("first"))
-        assert lone.pid is not None
-        os.kill(lone.pid, signal.SIGKILL)
+        monkeypatch.setattr(engine_process, "_exchange", killed)
         with pytest.raises(VoiceError, match=r"hibari ended .* starts it again"):
             lone.say(HELLO)
         assert same(lone.say(HELLO), neural.say(HELLO))
