@@ -19,7 +19,7 @@ from realizer.server.hub import Hub, HubError
 from realizer.server.journal import Journal, JournalError, journal_at
 from realizer.server.journal.folder import FolderJournal, head
 from realizer.server.journal.notes import Notes
-from realizer.server.journal.replay import replay
+from realizer.server.journal.replay import caught_up, replay
 from realizer.server.metrics import Metrics
 from realizer.server.session import Session
 from realizer.server.studio import Studio
@@ -157,8 +157,11 @@ class Shell:
         """
         self._hub.check(name)
 
-    async def restore(self, name: str | None) -> None:
+    async def restore(self, name: str | None, seen: int | None = None) -> None:
         """Go on with a session that another process has had, before somebody joins it.
+
+        Args:
+            seen: seq of the feedback that who comes had last: the session has come at least so far.
 
         Raises:
             JournalError: the journal cannot be read.
@@ -166,24 +169,25 @@ class Shell:
         if self._journal is None or name is None or name in self._hub.sessions:
             return
         if name not in self._restoring:
-            self._restoring[name] = self._loop.create_task(self._restore(self._journal, name))
+            self._restoring[name] = self._loop.create_task(self._restore(self._journal, name, seen or 0))
         await asyncio.shield(self._restoring[name])
 
-    async def _restore(self, journal: Journal, name: str) -> None:
+    async def _restore(self, journal: Journal, name: str, seen: int) -> None:
         try:
             if (kept := journal.take(name)) is None:
                 return
             epoch, entries = kept
             session = self._new(name, 0.0, named=True, epoch=epoch)
             owed = await self._loop.run_in_executor(None, replay, session, entries, self._studio.speak)
-            now = self._loop.time()
-            session.opened = now - (time.time() - epoch)
             session.notes = Notes(name, [journal])
+            at, more = caught_up(session, entries[-1].at if entries else 0.0, seen)
+            now = self._loop.time()
+            session.opened = now - max(at, time.time() - epoch)
             for connection in session.connections:  # which went with the other process
                 session.disconnect(connection, now)
             self._hub.sessions[name] = session
             log.info("session %s is gone on with, %d entries long", name, len(entries))
-            for effect in owed:
+            for effect in (*owed, *more):
                 self._do(session, effect)
             self._pump(session)
         finally:

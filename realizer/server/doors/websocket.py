@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
+from weakref import WeakSet
 
 from websockets.asyncio.server import Server as SocketServer
 from websockets.asyncio.server import ServerConnection, broadcast
@@ -20,6 +21,7 @@ from websockets.asyncio.server import serve as listen
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
+from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from realizer.server import guard
@@ -38,6 +40,8 @@ log = logging.getLogger(__name__)
 
 # How often a client is asked whether it is there, and how long it has for the answer.
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
+# How long one that connects has to say what it wants.
+OPENING = 10.0  # s
 # A client that has not answered the close by then is gone.
 GOODBYE = 2.0  # s
 
@@ -58,6 +62,7 @@ class WebSocketDoor:
         self._guard = Guard(settings)
         self._site = Site(shell.health, settings)
         self._socket: SocketServer | None = None
+        self._opened = WeakSet[ServerConnection]()
         self._closing: set[asyncio.Task[None]] = set()
         self._checking = asyncio.Lock()
         self._from: Counter[str] = Counter()  # address -> WebSockets that are open
@@ -84,11 +89,13 @@ class WebSocketDoor:
         }
         if not self._listens:
             where = {"unix": True, "sock": _nowhere()}
+        where["create_connection"] = self._open
         self._socket = await listen(
             self._handle,
             process_request=self._http,
             compression=None,  # frames are dense and late is worse than large
             max_size=self._settings.max_message,
+            open_timeout=OPENING,
             close_timeout=GOODBYE,
             server_header=None,
             **PATIENCE,
@@ -107,7 +114,12 @@ class WebSocketDoor:
     def _connection(self) -> ServerConnection:
         assert self._socket is not None
         protocol = ServerProtocol(max_size=self._settings.max_message)
-        return ServerConnection(protocol, self._socket, close_timeout=GOODBYE, **PATIENCE)
+        return self._open(protocol, self._socket, close_timeout=GOODBYE, **PATIENCE)
+
+    def _open(self, *arguments: Any, **named: Any) -> ServerConnection:
+        connection = ServerConnection(*arguments, **named)
+        self._opened.add(connection)
+        return connection
 
     async def ready(self) -> None:
         return
@@ -119,6 +131,9 @@ class WebSocketDoor:
     async def close(self) -> None:
         if self._socket is not None:
             self._socket.close(close_connections=False)
+            for one in list(self._opened):
+                if one.state is State.CONNECTING:  # it may never say what it wants
+                    one.transport.abort()
             for socket in list(self._socket.connections):
                 # After a drain the door is closed already; its connections are closed one by one.
                 self._closing.add(asyncio.create_task(socket.close(1001, "the service ends")))
@@ -199,7 +214,7 @@ class WebSocketDoor:
             if greeting is None:
                 return
         try:
-            await self._shell.restore(_query(request)[0])
+            await self._shell.restore(*_query(request))
             number = self._shell.join(client, *_query(request))
         except (HubError, JournalError) as error:
             await socket.close(1013, str(error)[:120])

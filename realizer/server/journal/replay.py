@@ -10,7 +10,7 @@ from realizer.server.journal.entry import Entry
 from realizer.server.session import Session
 from realizer.speech.utterance import Utterance
 
-__all__ = ["replay"]
+__all__ = ["caught_up", "replay"]
 
 
 def replay(
@@ -45,3 +45,23 @@ def replay(
             if isinstance(effect, Speak):
                 owed[effect.id] = effect
     return list(owed.values())
+
+
+def caught_up(session: Session, at: float, seen: int) -> tuple[float, list[Effect]]:
+    """Let time pass until a session has told again what somebody has seen of it already.
+
+    The clock that says how much has passed may be another machine's, or have been set back.
+
+    Args:
+        at: seconds on the clock of the session, which was opened at 0, at its last entry.
+        seen: seq of the feedback that its client had last; 0 where it had none.
+
+    Returns:
+        Seconds on its clock, and what its shell owes it.
+    """
+    owed: list[Effect] = []
+    while session.log.newest < seen and (due := session.player.next_deadline()) is not None:
+        at = max(at, due)
+        session.tick(at)
+        owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
+    return at, owed

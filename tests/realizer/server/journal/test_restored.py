@@ -22,6 +22,7 @@ FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
 <head id="n" lexeme="NOD" start="0.6"/>
 <speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
+POINTS = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
 SCENE = json.dumps({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}})
 
 
@@ -103,6 +104,47 @@ def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(w
         undisturbed = asyncio.run(whole(url))
     # Which is told first of two that have nothing to do with each other depends on when messages came.
     assert sorted(points(first + rest)) == sorted(points(undisturbed))
+
+
+def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_and_in_order(
+    where: str,
+) -> None:
+    block = '<bml id="b"><head id="n" lexeme="NOD" start="{:.2f}" end="{:.2f}"/></bml>'
+    told: dict[int, list[str]] = {k: [] for k in range(50)}
+
+    async def before(url: str, service: subprocess.Popen[str]) -> None:
+        playing = asyncio.Barrier(len(told))
+
+        async def one(k: int) -> None:
+            async with connect(f"{url}?session=one-{k}") as client:
+                await client.send(SCENE)
+                await client.send(block.format(k / 50, 1.5 + k / 50))
+                told[k] += await feedback(client, "b:start")
+                await playing.wait()  # all of them play, each is elsewhere
+                service.kill()
+                told[k] += await feedback(client, "never")
+
+        async with asyncio.timeout(LIMIT):
+            await asyncio.gather(*map(one, told))
+
+    async def after(url: str) -> None:
+        async def one(k: int) -> None:
+            seen = int(SEQ.search(told[k][-1])[1])  # type: ignore[index]
+            async with connect(f"{url}?session=one-{k}&seen={seen}") as client:
+                told[k] += await feedback(client, "b:end")
+
+        async with asyncio.timeout(LIMIT):
+            await asyncio.gather(*map(one, told))
+
+    with serving(where) as (url, service):
+        asyncio.run(before(url, service))
+    assert any("b:end" not in text for texts in told.values() for text in texts[-1:])
+    with serving(where) as (url, _):
+        asyncio.run(after(url))
+    for texts in told.values():
+        numbers = [int(SEQ.search(text)[1]) for text in texts]  # type: ignore[index]
+        assert numbers == list(range(1, len(numbers) + 1))
+        assert points(texts) == ["b:start", *(f"b:n:{point}" for point in POINTS), "b:end"]
 
 
 def test_what_is_held_is_held_afterwards(where: str) -> None:

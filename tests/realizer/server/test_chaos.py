@@ -1,0 +1,398 @@
+"""The service while what it stands on fails: engines, the disk, the clock of the machine, its clients."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import fcntl
+import io
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import termios
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from bml_schema.feedback import parse_feedback
+from realizer.server.serve import Server
+from realizer.server.wire import FrameKind, unpack
+from realizer.settings import Settings
+from realizer.speech.espeak import EspeakVoice
+from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, masked, well_told
+
+LIMIT = 60  # s; a hung test ends
+WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
+TALK = '<bml id="{}"><speech id="s"><text>{}</text></speech></bml>'
+SEQ = re.compile(r'seq="(\d+)"')
+
+
+def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
+    async def run() -> None:
+        told = {"port": 0, "voice": "silent", **settings}
+        async with asyncio.timeout(LIMIT), Server(Settings(**told)) as server:
+            await test(server)
+
+    asyncio.run(run())
+
+
+async def until(client: ClientConnection, last: str) -> list[str]:
+    """Feedback up to the message that has `last` in it."""
+    told = []
+    async for message in client:
+        if isinstance(message, str) and message.startswith("<"):
+            told.append(message)
+            if last in message:
+                return told
+    raise AssertionError(f"the connection ended before {last}")
+
+
+async def plays(client: ClientConnection, block: str) -> None:
+    """The client's next block is played to its end."""
+    await client.send(WAIT.format(block, 0.05))
+    await until(client, f'id="{block}:end"')
+
+
+def numbers(told: list[str]) -> list[int]:
+    return [int(found[1]) for text in told if (found := SEQ.search(text)) is not None]
+
+
+# engines ----------------------------------------------------------------------------------------
+
+
+def unread(engine: EspeakVoice) -> int:
+    """Bytes of a request that an engine has been sent and has not read."""
+    process = engine._process._process
+    assert process is not None
+    assert process.stdin is not None
+    return struct.unpack("i", fcntl.ioctl(process.stdin.fileno(), termios.FIONREAD, bytes(4)))[0]
+
+
+@pytest.mark.espeak
+def test_a_voice_that_is_killed_in_a_text_costs_its_sound_and_one_warning(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url, max_queue=None) as client:
+            await client.send(TALK.format("first", "One."))
+            first = await until(client, 'id="first:end"')
+            engine = server._shell._studio._voices["espeak"]
+            assert isinstance(engine, EspeakVoice)
+            assert engine.pid is not None
+            os.kill(engine.pid, signal.SIGSTOP)  # so that it can never answer before it dies
+            await client.send(TALK.format("killed", "Two."))
+            while not unread(engine):
+                await asyncio.sleep(0)
+            os.kill(engine.pid, signal.SIGKILL)
+            told = await until(client, 'id="killed:end"')
+            await client.send('{"type":"subscribe","stream":"audio"}')
+            await client.send(TALK.format("next", "Three."))
+            heard, rest = 0, []
+            while not rest or 'id="next:end"' not in rest[-1]:
+                message = await client.recv()
+                if isinstance(message, bytes):
+                    heard += unpack(message).kind is FrameKind.SOUND
+                elif message.startswith("<"):
+                    rest.append(message)
+        assert heard
+        warnings = ["warningFeedback" in text for text in (*first, *told, *rest)]
+        assert sum(warnings) == 1
+        assert any("warningFeedback" in text and "killed:s" in text for text in told)
+        assert 'status="DONE"' in told[-1]
+        assert numbers(first + told + rest) == list(range(1, len(warnings) + 1))
+
+    serving(test, voice="espeak")
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("realizer: ")]
+    assert len(said) == 1
+    assert said[0].endswith("going on without sound")
+
+
+@pytest.mark.gl
+def test_a_renderer_that_is_killed_is_started_again_and_pictures_go_on() -> None:
+    async def picture(client: ClientConnection) -> float:
+        while True:
+            message = await client.recv()
+            if isinstance(message, bytes):
+                frame = unpack(message)
+                Image.open(io.BytesIO(frame.payload)).load()
+                return frame.time
+            assert '"error"' not in message
+
+    async def test(server: Server) -> None:
+        async with connect(server.url, max_queue=None) as client:
+            await client.send('{"type":"subscribe","stream":"video","size":[32,32],"fps":5}')
+            times = [await picture(client)]
+            ((renderer, _),) = server._shell._studio._renderers.values()
+            assert renderer.pid is not None
+            os.kill(renderer.pid, signal.SIGKILL)
+            times += [await picture(client) for _ in range(3)]
+            assert times == sorted(set(times))
+            await plays(client, "b")
+
+    serving(test)
+
+
+# the disk ---------------------------------------------------------------------------------------
+
+
+@dataclass
+class Disk:
+    """A place for a journal: `fill` takes all room of it, `free` gives it back."""
+
+    path: Path
+    fill: Callable[[Server], None]
+    free: Callable[[Server], None]
+
+
+@pytest.fixture(params=["pages", "tmpfs"])
+def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
+    """A file that may not grow, which the database itself sees to; or a disk that is full, where one may."""
+    if request.param == "pages":
+
+        def pages(server: Server, most: int) -> None:
+            file = server._shell._journal._file  # type: ignore[union-attr]
+            (used,) = file.execute("PRAGMA page_count").fetchone()
+            file.execute(f"PRAGMA max_page_count = {most or used}")
+
+        yield Disk(tmp_path / "journal.db", lambda s: pages(s, 0), lambda s: pages(s, 10**6))
+        return
+    folder, mount = tmp_path / "disk", shutil.which("mount")
+    folder.mkdir()
+    options = ["-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)]
+    if mount is None or subprocess.run([mount, *options], capture_output=True).returncode:
+        pytest.skip("wanted the right to mount a disk")
+    filler = folder / "filler"
+
+    def fill(server: Server) -> None:
+        with contextlib.suppress(OSError), filler.open("wb", buffering=0) as file:
+            while file.write(bytes(512)):
+                pass
+        assert not shutil.disk_usage(folder).free
+
+    yield Disk(folder / "journal.db", fill, lambda s: filler.unlink())
+    subprocess.run(["umount", str(folder)], check=True, capture_output=True)
+
+
+def test_a_full_disk_refuses_what_comes_in_words_and_what_plays_goes_on(disk: Disk) -> None:
+    large = f"<!--{'x' * 20_000}-->"
+
+    async def before(server: Server) -> list[str]:
+        async with connect(f"{server.url}?session=full", max_queue=None) as client:
+            await client.send(WAIT.format("plays", 1.0))
+            told = await until(client, 'id="plays:start"')
+            disk.fill(server)
+            await client.send(WAIT.format("late", 0.1) + large)
+            refused = await until(client, 'id="late"')
+            assert "warningFeedback" in refused[-1]
+            assert "this could not be kept, so it is not taken" in refused[-1]
+            assert re.search("full|space", refused[-1])
+            await client.send(json.dumps({"type": "set", "aus": {"12": 1}, "faps": {"x" * 20_000: 1}}))
+            while not (message := str(await client.recv())).startswith("{"):
+                refused.append(message)
+            assert json.loads(message)["code"] == "journal"
+            await client.send('{"type":"ping"}')  # which nobody need keep
+            while not (message := str(await client.recv())).startswith("{"):
+                refused.append(message)
+            assert json.loads(message)["type"] == "pong"
+            if not any('id="plays:end"' in text for text in refused):
+                refused += await until(client, 'id="plays:end"')
+            disk.free(server)
+            await client.send(WAIT.format("again", 0.1))
+            return told + refused + await until(client, 'id="again:end"')
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=str(disk.path))
+        async with asyncio.timeout(LIMIT):
+            async with Server(settings) as server:
+                told = await before(server)
+            ends = [text for text in told if re.search(r'blockProgress.* id="\w+:end"', text)]
+            assert [re.search(r' id="(\w+):end"', text)[1] for text in ends] == ["plays", "again"]  # type: ignore[index]
+            assert numbers(told) == list(range(1, len(told) + 1))
+            async with Server(settings) as server, connect(f"{server.url}?session=full") as client:
+                await plays(client, "afterwards")
+
+    asyncio.run(run())
+
+
+async def crowd(server: Server) -> None:
+    """Sessions of all names, one after the other; what is left of the last page takes some."""
+    for k in range(1000):
+        async with connect(f"{server.url}?session=new-{k}") as one:
+            await one.send('{"type":"ping"}')
+            await one.recv()
+
+
+def test_a_session_that_cannot_be_kept_is_refused_and_the_others_play_on(disk: Disk) -> None:
+    async def test(server: Server) -> None:
+        async with (
+            connect(f"{server.url}?session=there", max_queue=None) as client,
+            connect(server.url) as free,
+        ):
+            disk.fill(server)
+            with pytest.raises(ConnectionClosed) as closed:
+                await crowd(server)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1013
+            assert "journal" in closed.value.rcvd.reason
+            await plays(free, "unnamed sessions need no journal")
+            disk.free(server)
+            await plays(client, "b")
+
+    serving(test, journal=str(disk.path))
+
+
+# the clock --------------------------------------------------------------------------------------
+
+
+class Clock:
+    """The machine's clock, which somebody sets: `time.time` with steps."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        real = time.time
+        self.step = 0.0
+        monkeypatch.setattr(time, "time", lambda: real() + self.step)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    return Clock(monkeypatch)
+
+
+def test_a_clock_that_is_set_back_and_forth_changes_nothing_of_what_plays(clock: Clock) -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url, max_queue=None) as client:
+            await client.send('<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="0.9"/></bml>')
+            told = await until(client, 'id="b:start"')
+            for step in (-86400.0, 86400.0, -5.0, 0.0):
+                clock.step = step
+                told += await until(client, "syncPointProgress")
+            told += await until(client, 'id="b:end"')
+            assert numbers(told) == list(range(1, len(told) + 1))
+            progress = [f for f in map(parse_feedback, told) if hasattr(f, "global_time")]
+            times = [f.global_time for f in progress]
+            assert times == sorted(times)
+            assert times[-1] - times[0] == pytest.approx(0.9, abs=1e-3)
+
+    serving(test)
+
+
+@pytest.mark.parametrize("step", [-3600.0, -0.3, 3600.0])
+def test_a_client_that_comes_back_where_clocks_are_other_ones_has_all_feedback_once(
+    clock: Clock, tmp_path: Path, step: float
+) -> None:
+    block = '<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="1.5"/></bml>'
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
+        async with asyncio.timeout(LIMIT):
+            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+                await client.send(block)
+                told = await until(client, 'id="b:n:end"')  # long after its last message
+            clock.step = step
+            seen = numbers(told)[-1]
+            async with Server(settings) as server, connect(f"{server.url}?session=s&seen={seen}") as client:
+                told += await until(client, 'id="b:end"')
+                await plays(client, "c")
+        assert numbers(told) == list(range(1, len(told) + 1))
+        times = [f.global_time for f in map(parse_feedback, told) if hasattr(f, "global_time")]
+        assert times == sorted(times)
+
+    asyncio.run(run())
+
+
+# clients ----------------------------------------------------------------------------------------
+
+
+async def emptied(server: Server, files: int) -> None:
+    """Wait until nobody is there any more, and nothing is open that was not before."""
+    while server._shell.health()["connections"] or files_open(os.getpid()) > files:
+        await asyncio.sleep(0.01)
+
+
+def test_two_thousand_that_come_and_go_leave_nothing_behind() -> None:
+    async def test(server: Server) -> None:
+        await asyncio.to_thread(come_and_go, server.port, 10, 10)
+        files = files_open(os.getpid())
+        await emptied(server, files)
+        files = files_open(os.getpid())
+        await asyncio.to_thread(come_and_go, server.port, 2000, 10)
+        await emptied(server, files)
+        assert server._shell.health() == {"sessions": 10, "connections": 0}
+        async with connect(server.url) as client:
+            await plays(client, "b")
+
+    serving(test, max_sessions=50)
+
+
+def test_forty_documents_at_once_while_twenty_sessions_stream_are_all_played_and_told_of() -> None:
+    async def test(server: Server) -> None:
+        for told in await at_once(server.port, 20, 40):
+            well_told(told, 2)
+
+    serving(test)
+
+
+def test_one_who_closes_its_side_only_is_let_go() -> None:
+    async def test(server: Server) -> None:
+        got = await asyncio.to_thread(half_closed, server.port, "show")
+        assert b"b:end" not in got
+        while server._shell.health()["connections"]:
+            await asyncio.sleep(0.01)
+        async with connect(f"{server.url}?session=show&seen=0") as again:
+            await until(again, 'id="b:end"')  # what it has asked for was played
+
+    serving(test)
+
+
+def test_those_who_connect_and_say_nothing_or_half_a_word_keep_nobody_waiting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("realizer.server.doors.websocket.OPENING", 3600.0)
+
+    async def test(server: Server) -> None:
+        silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(100)]
+        try:
+            for k, one in enumerate(silent):
+                one.sendall((b"", b"GET /ws HT", b"GET /ws HTTP/1.1\r\nHost: x\r\n", b"\x16\x03\x01")[k % 4])
+            async with connect(server.url) as client:
+                await plays(client, "b")
+            await server.close()  # does not wait for them
+        finally:
+            for one in silent:
+                one.close()
+
+    serving(test)
+
+
+def test_one_who_floods_with_documents_is_told_and_the_others_notice_nothing() -> None:
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=other") as other:
+            raw = await asyncio.to_thread(joined, server.port, "flooded")
+            with raw:
+                flood = masked(WAIT.format("b", 30)) * 3000
+                sending = asyncio.create_task(asyncio.to_thread(raw.sendall, flood))
+                for k in range(3):
+                    await plays(other, f"b{k}")
+                async with connect(f"{server.url}?session=flooded&seen=0", max_queue=None) as viewer:
+                    await until(viewer, "warningFeedback")
+                    await viewer.send('{"type":"ping"}')
+                    while '"pong"' not in str(await viewer.recv()):
+                        pass
+                raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                raw.shutdown(socket.SHUT_RDWR)
+                await asyncio.gather(sending, return_exceptions=True)
+            await plays(other, "last")
+
+    serving(test)
