@@ -7,8 +7,9 @@ import json
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from realizer.behaviours.kind import Position
 from realizer.server.journal.entry import Entry, JournalError
@@ -33,7 +34,7 @@ class FolderJournal:
     def __init__(self, folder: Path, head: Mapping[str, Any]) -> None:
         self._folder = folder
         self._head = dict(head)
-        self._files: dict[str, TextIO] = {}
+        self._files: dict[str, FileIO] = {}
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -44,9 +45,8 @@ class FolderJournal:
         began = time.strftime("%Y%m%dT%H%M%S", time.gmtime(epoch)) + f"{epoch % 1:.3f}"[1:]
         path = self._folder / f"{session}-{began}{SUFFIX}"
         try:
-            file = self._files[session] = path.open("w", encoding="utf-8")
-            file.write(json.dumps({"session": session, "epoch": epoch, **self._head}) + "\n")
-            file.flush()
+            file = self._files[session] = path.open("wb", buffering=0)
+            _write(file, json.dumps({"session": session, "epoch": epoch, **self._head}))
         except OSError as error:
             raise JournalError(f"the record {path}: {error.strerror}") from None
 
@@ -54,8 +54,7 @@ class FolderJournal:
         if (file := self._files.get(session)) is None:
             return
         try:
-            file.write(entry.line() + "\n")
-            file.flush()
+            _write(file, entry.line())
         except OSError as error:
             raise JournalError(f"the record {file.name}: {error.strerror}") from None
 
@@ -70,6 +69,20 @@ class FolderJournal:
     def close(self) -> None:
         for session in list(self._files):
             self.end(session)
+
+
+def _write(file: FileIO, line: str) -> None:
+    """The whole line or nothing of it: a disk may be full in the middle, and have room again later."""
+    begin = file.tell()
+    data = memoryview(f"{line}\n".encode())
+    try:
+        while data:
+            data = data[file.write(data) :]
+    except OSError:
+        with contextlib.suppress(OSError):
+            file.seek(begin)
+            file.truncate()
+        raise
 
 
 # Settings that change what is seen and heard.
