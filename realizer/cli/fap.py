@@ -125,6 +125,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     """
     import numpy as np
 
+    from bml_schema.documents import MOST_BYTES
     from realizer.behaviours.fap_compound import shown
     from realizer.behaviours.fap_document import document_of
     from realizer.errors import RealizerError
@@ -141,6 +142,12 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
         document = document_of(clip, "fap")
     except RealizerError as error:
         raise _refused(file, error) from None
+    room = MOST_BYTES * len(clip.values) // len(document)
+    if room < len(clip.values):
+        raise click.ClickException(
+            f"{file}: wanted at most about {room} frames of these FAPs to play, got {len(clip.values)}; "
+            "`realizer fap convert --fps` makes fewer of them"
+        )
     fps = asked["fps"] if asked["fps"] is not None else min(clip.fps, FASTEST)
     return perform(context, lambda: [document.encode()], **asked | {"fps": fps})
 

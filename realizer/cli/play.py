@@ -185,6 +185,11 @@ def perform(
             writer.write(realization, Path(output), drawing)
         except OSError as error:
             raise click.UsageError(f"{output}: {error.strerror or error}") from None
+        first, *others = (name or "the unnamed character" for name in realization.characters)
+        if others and not writer.everybody:
+            left = ", ".join(others)
+            words = f"{output}: shows {first}, not {left}: it has room for the face of one character"
+            click.echo(words, err=True)
         if not context.obj["quiet"]:
             words = (
                 f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {chosen.fps:g} fps"

@@ -29,4 +29,8 @@ def write_json(realization: Realization, path: Path, drawing: Drawing) -> None:
     write_text(path, encode_json(realization))
 
 
-OUTPUTS = (Output(".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", write_json),)
+OUTPUTS = (
+    Output(
+        ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", write_json, everybody=True
+    ),
+)

@@ -60,6 +60,7 @@ class Output:
         write: (realization, path, drawing) -> None; `path` may be any place that can be written.
         needs: the extras to install; () if it always works.
         draws: width and height of its pictures, and whether they may be transparent; None: there are none.
+        everybody: whether it holds what all characters do; others hold the face of the first.
     """
 
     suffix: str
@@ -68,6 +69,7 @@ class Output:
     write: Callable[[Realization, Path, Drawing], None]
     needs: tuple[str, ...] = ()
     draws: Callable[[Drawing], tuple[tuple[int, int], bool]] | None = None
+    everybody: bool = False
 
     def begin(self, drawing: Drawing, face: str, deformer: str | None = None) -> Drawing:
         """The drawing to hand to `write`; what draws starts now, and gets ready while the rest is planned.

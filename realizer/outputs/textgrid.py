@@ -107,5 +107,11 @@ def _quoted(text: str) -> str:
 
 
 OUTPUTS = (
-    Output(".textgrid", "text/x-textgrid", "words, phonemes and sync points for Praat", write_textgrid),
+    Output(
+        ".textgrid",
+        "text/x-textgrid",
+        "words, phonemes and sync points for Praat",
+        write_textgrid,
+        everybody=True,
+    ),
 )

@@ -66,4 +66,6 @@ def _clock(seconds: float) -> str:
     return f"{minutes // 60:02}:{minutes % 60:02}:{milliseconds // 1000:02}.{milliseconds % 1000:03}"
 
 
-OUTPUTS = (Output(".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", write_vtt),)
+OUTPUTS = (
+    Output(".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", write_vtt, everybody=True),
+)

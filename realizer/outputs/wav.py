@@ -34,4 +34,4 @@ def write_wav(realization: Realization, path: Path, drawing: Drawing) -> None:
     write_bytes(path, encode_wav(realization.sound(RATE), RATE))
 
 
-OUTPUTS = (Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", write_wav),)
+OUTPUTS = (Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", write_wav, everybody=True),)

@@ -164,3 +164,13 @@ def test_wrong_usage_is_said(actor: Path, args: list[str], says: str) -> None:
     done = run("convert", str(actor), *args)
     assert done.exit_code == 2
     assert says in done.output
+
+
+def test_a_file_too_long_for_one_document_is_refused_in_frames(tmp_path: Path) -> None:
+    mask = " ".join("01"[fap > 2] for fap in range(1, 69))
+    frames = "".join(f"{mask}\n{frame} {'1000 ' * 66}\n" for frame in range(4_000))
+    done = run("play", "-", "-o", str(tmp_path / "long.csv"), input=f"2.1 long 25 4000\n{frames}".encode())
+    assert done.exit_code == 1
+    assert "wanted at most about" in done.stderr
+    assert "got 4000; `realizer fap convert --fps`" in done.stderr
+    assert not (tmp_path / "long.csv").exists()

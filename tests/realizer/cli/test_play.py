@@ -99,6 +99,14 @@ def test_where_nothing_was_accepted_nothing_is_written(tmp_path: Path, text: str
     assert out.read_bytes() == b"of before"
 
 
+@pytest.mark.parametrize(("suffix", "told"), [(".fap", True), (".vtt", False)])
+def test_what_holds_one_face_says_whose_it_is_not(tmp_path: Path, suffix: str, told: bool) -> None:
+    two = "".join(f'<bml id="{who}" characterId="{who}"><wait id="w" duration="1"/></bml>' for who in "ab")
+    done = CliRunner().invoke(cli, ["-q", "realize", "-", "-o", str(tmp_path / f"x{suffix}")], input=two)
+    assert done.exit_code == 0
+    assert ("shows a, not b" in done.stderr) is told
+
+
 def test_a_block_that_a_later_one_replaces_keeps_the_times_it_was_planned_with() -> None:
     text = TALK + '<bml id="c" composition="REPLACE"><wait id="w" duration="1"/></bml>'
     first, second = times(text)
