@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.sax.saxutils import escape
@@ -11,7 +12,7 @@ import numpy as np
 from realizer.arrays import Int16
 from realizer.speech.merged import bare, cuts, is_vowel
 from realizer.speech.prosody import PLAIN
-from realizer.speech.ssml import Break, Mark, Script, Tag, write_tag
+from realizer.speech.ssml import Break, Mark, Part, Script, Tag, write_tag
 from realizer.speech.utterance import Phoneme, Word
 from realizer.speech.words import PlacedMark, words_in
 
@@ -24,6 +25,7 @@ LEAST_CLOSURE = 0.01  # s
 # Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
 OCTAVES = 0.72
 MOST_PITCH = 198.0  # %; its setting ends there
+STOPS = re.compile(r"\.+(?!\w)")
 KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
 
 Event = tuple[int, int, int, str]
@@ -66,7 +68,7 @@ def write_document(script: Script) -> Document:
     text = "<speak>"
     words: list[tuple[str, int]] = []
     marks: list[PlacedMark] = []
-    for part in script.parts:
+    for part in _stops_first(script.parts):
         if isinstance(part, str):
             words += [(word, len(text) + len(escape(part[:at])) + 1) for word, at in words_in(part)]
             text += escape(part)
@@ -79,6 +81,24 @@ def write_document(script: Script) -> Document:
         else:
             text += write_tag(_in_its_units(part))
     return Document(text + "</speak>", tuple(words), tuple(marks))
+
+
+def _stops_first(parts: Sequence[Part]) -> list[Part]:
+    """The parts, full stops that stand behind a mark before it: alone there espeak-ng says "dot"."""
+    moved: list[Part] = []
+    for part in parts:
+        stops = STOPS.match(part) if isinstance(part, str) else None
+        at = len(moved)
+        while at and isinstance(moved[at - 1], Mark):
+            at -= 1
+        said = moved[at - 1] if at else None
+        if stops is None or at == len(moved) or not isinstance(said, str) or said[-1].isspace():
+            moved.append(part)
+            continue
+        moved[at - 1] = said + stops[0]
+        if rest := str(part)[stops.end() :]:
+            moved.append(rest)
+    return moved
 
 
 def _in_its_units(tag: Tag) -> Tag:

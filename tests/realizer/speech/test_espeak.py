@@ -535,3 +535,13 @@ def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
 
     asked = pitch(f'<prosody pitch="{semitones:+d}st">{text}</prosody>')
     assert 12 * np.log2(asked / pitch(text)) == pytest.approx(semitones, abs=1.0)
+
+
+@pytest.mark.parametrize("end", ['there<mark name="m"/>.', 'there<mark name="k"/><mark name="m"/>.'])
+def test_a_mark_before_a_full_stop_is_the_end_of_its_word_and_no_dot_is_said(
+    voice: EspeakVoice, end: str
+) -> None:
+    plain, said = voice.say(Say("Hello there.")), voice.say(Say(f"Hello {end}"))
+    assert [p.ipa for p in said.phonemes] == [p.ipa for p in plain.phonemes]
+    assert said.marks["m"] == pytest.approx(plain.words[-1].end, abs=0.01)
+    assert voice.say(Say('It is 3<mark name="m"/>.5.')).words[-1].text != "3."
