@@ -316,7 +316,11 @@ def test_the_feedback_is_filtered_by_kind_and_words(page) -> None:  # type: igno
     page.check("#points")
     page.fill("#filter", "f attack")
     assert page.locator("#log li:visible span").all_text_contents() == ["f attackPeak"]
+    assert page.get_attribute("#log", "class") == ""
+    page.fill("#filter", "no such word")
+    assert page.get_attribute("#log", "class") == "none"
     page.fill("#filter", "")
+    assert page.get_attribute("#log", "class") == ""
 
 
 def test_a_film_is_recorded_and_saved(page) -> None:  # type: ignore[no-untyped-def]

@@ -56,5 +56,6 @@ export class Log {
   sift(items = this.list.children) {
     const words = this.filter.value.trim().toLowerCase();
     for (const item of items) item.hidden = !`${item.className} ${item.textContent}`.toLowerCase().includes(words);
+    this.list.classList.toggle("none", words !== "" && [...this.list.children, ...items].every((item) => item.hidden));
   }
 }
