@@ -239,6 +239,12 @@ def _mesh_of(session: Session, index: int) -> dict[str, Any]:
 
 def _character(session: Session, message: CharacterMessage) -> None:
     if message.face is not None:
+        from realizer.face import face_name, list_faces
+
+        known = [info.name for info in list_faces()]
+        if face_name(message.face) not in known:
+            # Where the folders lie is no client's business.
+            raise FaceError(f"wanted one of {', '.join(known)}, got {message.face!r}")
         session.load_face(message.face)
         mapping_of(message.face, session.settings.mapping)
     if message.voice is not None:

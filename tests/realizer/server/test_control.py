@@ -163,3 +163,11 @@ def test_an_emotion_that_is_none_is_refused_and_nothing_is_set(face, asked, wher
     (error,) = face.driver.clients[1].of("error")
     assert error["where"] == where
     assert max(face.after(1).values()) == 0
+
+
+@pytest.mark.parametrize("name", ["nobody", "../ada", "", "/etc"])
+def test_an_unknown_face_is_told_by_the_known_ones_and_no_folders(face, name: str) -> None:
+    face.driver.send({"type": "character", "face": name})
+    (error,) = face.driver.clients[1].of("error")
+    assert (error["code"], error["where"]) == ("face", "character.face")
+    assert error["message"] == f"wanted one of ada, ben, ida, got {name!r}"
