@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -200,7 +201,13 @@ class Session:
             control = parse_control(message.lstrip("\ufeff \t\r\n"))
             if isinstance(control, ErrorMessage):
                 self.reply(connection, control)
-            elif isinstance(control, PASSING) or (kept := self._keep(t, "text", connection, message)):
+            elif isinstance(control, PASSING):
+                known = self.player.characters
+                follow(self, self._connections[connection], control, t)
+                for name in self.player.characters:
+                    if name not in known:  # who is named first is who moves where nobody is named
+                        self._tell(t, "text", connection, json.dumps({"type": "character", "id": name}))
+            elif kept := self._keep(t, "text", connection, message):
                 follow(self, self._connections[connection], control, t)
         else:
             kept = self._keep(t, "text", connection, message)
@@ -280,6 +287,11 @@ class Session:
         """Do what is due: feedback, sound and frames first, then read or plan one document at most."""
         if not self.closed and self._work(now - self.opened):
             self._tell(now - self.opened, "tick")
+
+    def pass_time(self, t: float) -> None:
+        """Tell what comes due before `t` on the session clock, each at its own time; for who replays it."""
+        while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
+            self._publish(due)
 
     def _work(self, t: float) -> bool:
         """What `tick` does; False where nothing came of it but what plays."""

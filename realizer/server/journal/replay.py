@@ -27,6 +27,7 @@ def replay(
     """
     owed: dict[int, Speak] = {}
     for entry in entries:
+        session.pass_time(entry.at)
         match entry.kind:
             case "join":
                 session.connect(entry.number, entry.at)
