@@ -42,8 +42,8 @@ __all__ = ["Realization", "realize", "schedule", "speak"]
 WINDOW = 10.0  # s
 # More is a mistake (four hours at 25 fps) and would not fit into memory as JSON or film.
 MOST_FRAMES = 360_000
-# Cut-off speech fades this long, so that it does not click.
-CUT = 0.05  # s
+# Cut-off speech fades this long, so that it does not click, and is over in 50 ms with a packet cut in two.
+CUT = 0.04  # s
 
 
 @dataclass(frozen=True, eq=False)

@@ -206,13 +206,13 @@ def test_stop_by_name_leaves_the_others() -> None:
     assert "b:end" not in client.ids
 
 
-def test_a_voice_that_fails_is_replaced_by_silence_and_told_in_state_alone() -> None:
+def test_a_voice_that_fails_is_replaced_by_silence_and_told_in_one_warning_and_in_state() -> None:
     driver = Driver(mute=True)
     driver.send(TALK.format("b"))
     driver.say(driver.spoken[0].id, VoiceError("no engine"))
     client = driver.run(10)
     assert "b:end" in client.ids
-    assert not warnings(client)
+    assert [(w.id, "no engine" in w.text) for w in warnings(client)] == [("b:s", True)]
     driver.send({"type": "state"})
     assert client.of("state")[0]["voice"]["fault"] == "no engine"
 
