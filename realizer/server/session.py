@@ -132,6 +132,7 @@ class Session:
         self._inbox = Inbox(settings.max_document)
         self.log = FeedbackLog(LOG if history < float("inf") else None, epoch)
         self._effects: list[Effect] = []
+        self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
 
     # connections --------------------------------------------------------------------------------
 
@@ -154,6 +155,7 @@ class Session:
         if self._connections.pop(connection, None) is not None:
             self._tell(now - self.opened, "leave", connection)
         self.speeches.leave(connection)
+        self._unsettled = True
         if not self._connections:
             self.empty_since = now
             if not self.named:
@@ -295,6 +297,7 @@ class Session:
 
     def _work(self, t: float) -> bool:
         """What `tick` does; False where nothing came of it but what plays."""
+        self._unsettled = False
         self._publish(t)
         self._effects += self.broadcast.due(self._connections.values(), t)
         if self.preparation.waiting:
@@ -311,7 +314,7 @@ class Session:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
         if self.closed:
             return None
-        if self._inbox or self.speeches.has_next or self.preparation.has_ready:
+        if self._inbox or self._unsettled or self.speeches.has_next or self.preparation.has_ready:
             return float("-inf")
         deadlines = [
             self.player.next_deadline(),

@@ -713,6 +713,18 @@ def test_in_any_order_of_events_frames_rise_and_feedback_is_whole(actions) -> No
             assert running <= 1
 
 
+def test_the_speech_of_one_who_leaves_ends_though_nothing_else_is_due() -> None:
+    driver = Driver(named=True)
+    viewer = driver.join(2)
+    driver.send({"type": "speech", "id": "turn", "append": "All that there is. "})
+    driver.run(30)
+    assert "turn.1:end" in viewer.ids
+    assert "turn:end" not in viewer.ids
+    driver.leave(1)
+    driver.run(31)
+    assert "turn:end" in viewer.ids
+
+
 def test_a_feedback_stream_can_be_narrowed_to_some_elements(driver) -> None:
     viewer = driver.join(2)
     asked = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
