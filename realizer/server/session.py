@@ -143,9 +143,9 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
+        self._connections[connection] = Connection(connection, self.log.newest + 1)
         if not self._tell(now - self.opened, "join", connection):
             return
-        self._connections[connection] = Connection(connection, self.log.newest + 1)
         self.empty_since = None
         if seen is not None:
             self.resume(connection, seen)

@@ -11,7 +11,11 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.errors import RenderError, VoiceError
+from realizer.server.effects import Close
 from realizer.server.feedback_log import FeedbackLog
+from realizer.server.journal.entry import Entry, Lost
+from realizer.server.journal.local import LocalJournal
+from realizer.server.journal.notes import Notes
 from realizer.server.wire import FrameKind
 from realizer.speech.utterance import Phoneme, Utterance, Word
 
@@ -711,6 +715,17 @@ def test_in_any_order_of_events_frames_rise_and_feedback_is_whole(actions) -> No
         for id in progress:
             running = running + 1 if id.endswith("start") else max(0, running - 1)
             assert running <= 1
+
+
+def test_one_who_joins_a_session_that_another_process_has_is_sent_there_with_all_others() -> None:
+    class Taken(LocalJournal):
+        def add(self, session: str, entry: Entry) -> None:
+            raise Lost("another process has it")
+
+    driver = Driver(named=True)
+    driver.session.notes = Notes("test", [Taken(":memory:")])
+    driver.join(2)
+    assert driver.closed == [Close(k, 1012, "another process has it") for k in (1, 2)]
 
 
 def test_the_speech_of_one_who_leaves_ends_though_nothing_else_is_due() -> None:
