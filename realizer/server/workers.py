@@ -181,7 +181,6 @@ class Workers:
                     except BlockingIOError:
                         await asyncio.sleep(STEP)
 
-
     def _number(self, line: str) -> int:
         """The worker of a request: that of its session, the one it names (`?worker=1`), or the next."""
         query, count = parse_qs(line.partition("?")[2].partition(" ")[0]), len(self._children)

@@ -269,7 +269,8 @@ def test_what_looks_like_a_slip_is_advice_and_no_fault(case: str, tmp_path: Path
     "text",
     [
         '<head id="h" lexeme="NOD" xmlns:o="urn:o" o:amont="1" start="60"/>',
-        '<gaze id="g" target="cup" xmlns:a="http://www.asap-project.org/bmla" a:x="1"/><speech id="s"><text>Hello</text></speech>',
+        '<gaze id="g" target="cup" xmlns:a="http://www.asap-project.org/bmla" a:x="1"/>'
+        '<speech id="s"><text>Hello</text></speech>',
         '<head id="h" lexeme="NOD" stroke="1"/><face id="f" start="0" end="4"><faceFacs au="1"/></face>',
     ],
 )

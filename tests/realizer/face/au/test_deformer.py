@@ -87,7 +87,7 @@ def test_a_turned_head_carries_what_units_do(face: Face) -> None:
 
 
 def test_lashes_and_brows_stay_on_the_skin_they_grow_on(face: Face) -> None:
-    """Half closed and closed, raised and lowered, nothing comes loose by more than a millimetre and a half."""
+    """Half closed and closed, raised and lowered, nothing comes loose by more than 1.5 millimetres."""
     from scipy.spatial import cKDTree
 
     skin = part(face, face.vertices, "skin")
