@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     )
     from realizer.face import load_face
     from realizer.face.model import Face
-    from realizer.pipeline import Realization, realize, schedule
+    from realizer.pipeline import realize, schedule
     from realizer.player import Player
+    from realizer.realization import Realization
     from realizer.scheduling.timing import Schedule
     from realizer.server.serve import serve
     from realizer.settings import Settings
@@ -38,7 +39,7 @@ _HOMES = {
     "FaceError": "realizer.errors",
     "Player": "realizer.player",
     "RealizerError": "realizer.errors",
-    "Realization": "realizer.pipeline",
+    "Realization": "realizer.realization",
     "RenderError": "realizer.errors",
     "Schedule": "realizer.scheduling.timing",
     "ScheduleError": "realizer.errors",

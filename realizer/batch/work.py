@@ -14,7 +14,8 @@ from typing import Any
 from realizer.batch.task import Options, Task, fingerprint
 from realizer.errors import RealizerError, VoiceError
 from realizer.outputs import OUTPUTS, Drawing
-from realizer.pipeline import Realization, realize
+from realizer.pipeline import realize
+from realizer.realization import Realization
 from realizer.render import Renderer
 from realizer.speech.utterance import Say, Utterance, Voice
 

@@ -14,7 +14,7 @@ from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["COLUMNS", "OUTPUTS", "encode_arkit_csv", "write_arkit_csv"]
 

@@ -13,7 +13,7 @@ from realizer.outputs.output import Drawing, Output
 from realizer.tables import faps
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_csv", "write_csv"]
 

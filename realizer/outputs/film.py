@@ -20,7 +20,7 @@ from realizer.outputs.output import Drawing, Output
 from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["FORMATS", "OUTPUTS", "Format", "encode_film", "write_film"]
 

@@ -16,7 +16,7 @@ from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_glb", "quaternions", "write_glb"]
 

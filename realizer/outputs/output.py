@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
     from realizer.render import Renderer
 
 __all__ = ["Drawing", "Output"]

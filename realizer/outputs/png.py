@@ -14,7 +14,7 @@ from realizer.outputs.files import write_bytes
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "Moment", "encode_png", "moments", "row_at", "write_png"]
 

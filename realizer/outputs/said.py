@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from realizer.composition.playing import Speaking
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 
 __all__ = ["Span", "phonemes", "points", "words"]

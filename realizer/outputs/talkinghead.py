@@ -21,7 +21,7 @@ from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
     from realizer.composition.playing import Speaking
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_talkinghead", "write_talkinghead"]
 

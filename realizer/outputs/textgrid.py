@@ -13,7 +13,7 @@ from realizer.outputs.output import Drawing, Output
 from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_textgrid", "write_textgrid"]
 

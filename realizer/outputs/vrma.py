@@ -20,7 +20,7 @@ from realizer.tables import read_toml, text_of
 from realizer.tables.lexemes import face_lexemes
 
 if TYPE_CHECKING:
-    from realizer.pipeline import Realization
+    from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_vrma", "expressions", "write_vrma"]
 

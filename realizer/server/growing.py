@@ -10,8 +10,8 @@ from xml.sax.saxutils import unescape
 import numpy as np
 
 from realizer.arrays import Int16
-from realizer.pipeline import resample
 from realizer.server.clauses import TAG, Clauses, whole
+from realizer.sound import resample
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 

@@ -87,7 +87,7 @@ class Shell:
         if self.settings.journal is not None:
             self._journal = journal_at(self.settings.journal)
         if self.settings.scene is not None:
-            from realizer.pipeline import parse_scene
+            from realizer.scene import parse_scene
 
             self._scene = parse_scene(self.settings.scene.read_text("utf-8"))
         if self.settings.record is not None:

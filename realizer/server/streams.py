@@ -16,9 +16,9 @@ from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
 from realizer.arrays import Float32, Float64, Int16, Int32
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
-from realizer.pipeline import CUT, heard
 from realizer.player import Player, Speaking
 from realizer.server.wire import FrameKind, json_frame, pack
+from realizer.sound import CUT, heard
 
 if TYPE_CHECKING:
     from realizer.face.model import Face

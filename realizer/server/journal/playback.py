@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from realizer.pipeline import Realization, seen
+from realizer.realization import Realization, seen
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.folder import Record
 from realizer.server.journal.replay import replay

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.pipeline import Realization, realize
+from realizer.pipeline import realize
+from realizer.realization import Realization
 from realizer.speech import SilentVoice
 
 NAMESPACES = " ".join(

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from bml_schema import parse
-from realizer.pipeline import Realization, heard, realize
+from realizer.pipeline import realize
 from realizer.player import Player
+from realizer.realization import Realization
+from realizer.sound import heard
 from realizer.speech import SilentVoice
 
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.pipeline import heard
 from realizer.server.streams import Sound
+from realizer.sound import heard
 from realizer.speech.utterance import Utterance
 
 from .conftest import RATE, Driver

@@ -11,10 +11,10 @@ import pytest
 
 import realizer
 from bml_schema import Speech
+from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import World
 from realizer.behaviours.speech import say
 from realizer.errors import RealizerError, VoiceError
-from realizer.pipeline import VOCABULARY
 from realizer.scheduling.timing import Schedule
 from realizer.server.effects import Speak
 from realizer.server.studio import Studio

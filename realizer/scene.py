@@ -1,0 +1,35 @@
+"""The text of a scene in, where its targets are out."""
+
+from __future__ import annotations
+
+import re
+
+from realizer.behaviours.kind import Position
+
+__all__ = ["parse_scene"]
+
+
+def parse_scene(text: str) -> dict[str, Position]:
+    """A scene from JSON `{"cup": [x, y, z], ...}` or lines `cup x y z`; metres, origin between the eyes.
+
+    Raises:
+        ValueError: says which entry and what was wanted.
+    """
+    import json
+
+    if text.lstrip().startswith("{"):
+        entries = json.loads(text)
+        items = [(str(k), v.values() if isinstance(v, dict) else v) for k, v in entries.items()]
+    else:
+        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        items = [(parts[0], parts[1:]) for parts in (re.split(r"[\s,]+", line.strip()) for line in lines)]
+    scene: dict[str, Position] = {}
+    for name, numbers in items:
+        try:
+            x, y, z = (float(v) for v in numbers)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name}: wanted three numbers x y z in metres, got {list(numbers)}") from None
+        if not all(abs(v) <= 1e4 for v in (x, y, z)):
+            raise ValueError(f"{name}: wanted metres within 10 km, got {x:g} {y:g} {z:g}")
+        scene[name] = (x, y, z)
+    return scene
