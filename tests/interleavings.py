@@ -357,7 +357,7 @@ class Interleaving:
         self._until(self.now + 100)
         for session in self._hub.sessions.values():
             if not self._full:
-                assert not session._inbox, session.id
+                assert not session.intake.inbox, session.id
                 self._again(session)
 
     def _leave_one(self, one: int) -> None:

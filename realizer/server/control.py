@@ -89,8 +89,8 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
                 _say(session, connection, message, t)
             case Stop():
                 wanted = None if message.blocks is None else set(message.blocks)
-                waiting = session.preparation.waiting
-                session.withdraw([w for w in waiting if wanted is None or w.block.id in wanted], t)
+                waiting = session.intake.preparation.waiting
+                session.intake.withdraw([w for w in waiting if wanted is None or w.block.id in wanted], t)
                 session.player.stop(t, wanted)
             case StateQuery():
                 session.reply(connection.id, _state(session, connection, t))
@@ -117,7 +117,7 @@ def _say(session: Session, connection: Connection, message: SpeechMessage, t: fl
     if message.clip is not None and message.clip not in session.clips.recordings:
         raise Wrong("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
     index_of(session, message.character)
-    session.speeches.hear(message, connection.id, t)
+    session.intake.speeches.hear(message, connection.id, t)
 
 
 def _tells(message: SpeechMessage) -> bool:
@@ -256,7 +256,7 @@ def _character(session: Session, message: CharacterMessage) -> None:
         session.faces[index] = message.face
         session.broadcast.face_changed(index)
     if message.voice is not None:
-        session.voices[index] = message.voice
+        session.intake.voices[index] = message.voice
 
 
 def _set(session: Session, message: SetMessage, t: float) -> None:
@@ -305,10 +305,10 @@ def _state(session: Session, connection: Connection, t: float) -> StateMessage:
     state = session.player.state(t)
     preparing = [
         BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
-        for w in session.preparation.waiting
+        for w in session.intake.preparation.waiting
     ]
     faces = [
-        CharacterState(face=session.face_name(index), voice=session.voices.get(index), **face)
+        CharacterState(face=session.face_name(index), voice=session.intake.voices.get(index), **face)
         for index, face in enumerate(state["characters"])
     ]
     return StateMessage(
@@ -316,7 +316,7 @@ def _state(session: Session, connection: Connection, t: float) -> StateMessage:
         time=t,
         blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
         characters=faces,
-        voice=VoiceState(name=session.settings.voice, fault=session.orders.fault),
+        voice=VoiceState(name=session.settings.voice, fault=session.intake.orders.fault),
         connections=len(session.connections),
         dropped=connection.dropped,
     )

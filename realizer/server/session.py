@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from bml_schema import Block
 from realizer.animation.mapping import FapMapping
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError
 from realizer.mapping import mapping_of
-from realizer.pipeline import as_it_is, warped
 from realizer.player import HISTORY, Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
@@ -23,11 +20,12 @@ from realizer.server.connection import STUCK, Connection
 from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.feedback_log import FeedbackLog
-from realizer.server.inbox import Inbox, name_of
+from realizer.server.inbox import name_of
+from realizer.server.intake import Intake
 from realizer.server.journal import JournalError, Lost
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.notes import Notes
-from realizer.server.limits import MAX_CHARACTERS, beyond
+from realizer.server.limits import MAX_CHARACTERS
 from realizer.server.messages import (
     MAX_CONTROL,
     MAX_FPS,
@@ -45,13 +43,10 @@ from realizer.server.messages import (
     Welcome,
     parse_control,
 )
-from realizer.server.orders import Orders
-from realizer.server.preparation import Preparation, Waiting
-from realizer.server.speeches import Speeches
 from realizer.server.streams import EPSILON
 from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import Utterance
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
@@ -102,7 +97,6 @@ class Session:
         self.opened = now
         self.named = named
         self.closed = False
-        self.ending = False  # the service ends: no new documents
         self.empty_since: float | None = now
         self.notes = Notes(id)
         self.clips = Clips()
@@ -123,13 +117,9 @@ class Session:
         self.load_face = load_face or (lambda name: _load_face(name, settings.deformer))
         self.capabilities = dict(capabilities or {})
         self.faces: dict[int, str] = {}
-        self.voices: dict[int, str] = {}
         self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
-        self.preparation = Preparation()
-        self.speeches = Speeches(self.player)
-        self.orders = Orders(self.player, self.preparation)
+        self.intake = Intake(id, settings, self.player, self._owe)
         self._connections: dict[int, Connection] = {}
-        self._inbox = Inbox(settings.max_document)
         self.log = FeedbackLog(LOG if history < float("inf") else None, epoch)
         self._effects: list[Effect] = []
         self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
@@ -154,7 +144,7 @@ class Session:
         """A client is gone. A session nobody named ends with it."""
         if self._connections.pop(connection, None) is not None:
             self._tell(now - self.opened, "leave", connection)
-        self.speeches.leave(connection)
+        self.intake.speeches.leave(connection)
         self._unsettled = True
         if not self._connections:
             self.empty_since = now
@@ -174,7 +164,7 @@ class Session:
         """End: nothing is done and nothing is sent after it."""
         self.closed = True
         self._connections.clear()
-        self._inbox.clear()
+        self.intake.inbox.clear()
         self._effects.clear()
 
     def backlog(self, connection: int, waiting: int) -> None:
@@ -211,10 +201,8 @@ class Session:
                         self._tell(t, "text", connection, json.dumps({"type": "character", "id": name}))
             elif kept := self._keep(t, "text", connection, message):
                 follow(self, self._connections[connection], control, t)
-        else:
-            kept = self._keep(t, "text", connection, message)
-            if kept and (refused := self._inbox.put(message)) is not None:
-                self._refuse(refused, t)
+        elif kept := self._keep(t, "text", connection, message):
+            self.intake.put(message, t)
         if not self.closed and self._work(t) and not kept:
             self._tell(t, "tick")
 
@@ -229,7 +217,7 @@ class Session:
             log.error("session %s: %s", self.id, error)
             words = f"this could not be kept, so it is not taken: {error}"
             if isinstance(message, str) and message.lstrip("\ufeff \t\r\n").startswith("<"):
-                self._refuse(Warning(name_of(message), "CANNOT_CREATE_BEHAVIOR", words), t)
+                self.intake.refuse(Warning(name_of(message), "CANNOT_CREATE_BEHAVIOR", words), t)
             else:
                 self.reply(connection, ErrorMessage(code="journal", message=words))
             return False
@@ -266,7 +254,7 @@ class Session:
         t = now - self.opened
         self._publish(t)
         if self._tell(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
-            self._effects += self.orders.answer(speak, result, t)
+            self._effects += self.intake.orders.answer(speak, result, t)
             self._work(t)
 
     def drawn(self, draw: int, result: bytes | RealizerError, now: float) -> None:
@@ -300,12 +288,12 @@ class Session:
         self._unsettled = False
         self._publish(t)
         self._effects += self.broadcast.due(self._connections.values(), t)
-        if self.preparation.waiting:
-            self._effects += self.orders.overdue(t + EPSILON)
+        if self.intake.preparation.waiting:
+            self._effects += self.intake.orders.overdue(t + EPSILON)
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
-        done = self._submit_ready(t) or self._read_one(t)
-        if self.speeches.settle(t) or done:
+        done = self.intake.submit_ready(t) or self.intake.read_one(t)
+        if self.intake.speeches.settle(t) or done:
             self._publish(t)
             return True
         return False
@@ -314,12 +302,12 @@ class Session:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
         if self.closed:
             return None
-        if self._inbox or self._unsettled or self.speeches.has_next or self.preparation.has_ready:
+        if self._unsettled or self.intake.ready:
             return float("-inf")
         deadlines = [
             self.player.next_deadline(),
             self.broadcast.next_deadline(self._connections.values()),
-            self.orders.deadline(),
+            self.intake.orders.deadline(),
         ]
         known = [d for d in deadlines if d is not None]
         return min(known) + self.opened if known else None
@@ -327,105 +315,17 @@ class Session:
     @property
     def busy(self) -> bool:
         """A block plays, waits or is being prepared."""
-        return bool(self._inbox or len(self.preparation) or self.player.next_deadline() is not None)
+        return bool(
+            self.intake.inbox or len(self.intake.preparation) or self.player.next_deadline() is not None
+        )
+
+    def _owe(self, effects: Iterable[Effect]) -> None:
+        self._effects += effects
 
     def outgoing(self) -> list[Effect]:
         """What the shell has to do, in order; each is told once."""
         effects, self._effects = self._effects, []
         return effects
-
-    # documents ----------------------------------------------------------------------------------
-
-    def _read_one(self, t: float) -> bool:
-        """Prepare what comes next in a speech, or in the inbox; False where there is nothing."""
-        item = self.speeches.next() or self._inbox.next()
-        if isinstance(item, Warning):
-            self._refuse(item, t)
-        elif item is not None:
-            self._prepare(item, t)
-        return item is not None
-
-    def _prepare(self, block: Block, t: float) -> None:
-        """Ask for the block's voice and acknowledge it; it is planned when nothing is missing."""
-        if (fault := self._beyond_limits(block)) is not None:
-            self._refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
-            return
-        try:
-            block = self.speeches.placed(block)
-            wants = self.player.wants(block)
-            character = self.player.character_index(block.character_id)
-            waiting = self.preparation.add(block, character, {}, t)
-            waiting.lacks, waiting.flows = self.speeches.lacks, self.speeches.flows(block)
-            self.player.announce(block, t)
-        except Exception:
-            self._internal(block, t)
-            return
-        self._speak(waiting, wants)
-
-    def _submit_ready(self, t: float) -> bool:
-        """Plan the first block that waits for nothing; False where all wait."""
-        waiting = self.preparation.ready()
-        if waiting is None:
-            return False
-        try:
-            waiting.block = self.speeches.placed(waiting.block)
-            schedule = self.player.submit(waiting.block, t, waiting.utterances)
-            if schedule.lengths and waiting.final:
-                # Time has passed while the voice spoke, and it never comes exactly: what is left is little.
-                waiting.utterances = warped(waiting.utterances, schedule.lengths)
-                schedule = self.player.submit(waiting.block, t, waiting.utterances)
-        except Exception:
-            self.preparation.remove([waiting])
-            self._internal(waiting.block, t)
-            return True
-        if schedule.lengths:
-            self._speak_again(waiting, schedule.lengths, t)
-            return True
-        self.preparation.remove([waiting])
-        if schedule.failed:
-            self.speeches.refused(waiting.block.id)
-        else:
-            self.speeches.planned(waiting.block.id)
-        if waiting.block.composition == "REPLACE" and not schedule.failed:
-            self.withdraw(self.preparation.replaced_by(waiting), t)
-        return True
-
-    def _speak_again(self, waiting: Waiting, lengths: Mapping[str, Mapping[str, float]], t: float) -> None:
-        """More of the block fits if its speech lasts so long; what comes back is taken as it is."""
-        wants = self.player.wants(waiting.block)
-        again = {b: wants[b] for b in self.orders.unfinished(waiting)}
-        again |= {b: replace(wants[b], seconds=times["end"]) for b, times in lengths.items()}
-        waiting.utterances = {b: as_it_is(u) for b, u in waiting.utterances.items()}
-        waiting.since, waiting.final = t, True
-        self._speak(waiting, again)
-
-    def _speak(self, waiting: Waiting, wants: Mapping[str, Say]) -> None:
-        """Order what a voice has to say."""
-        voice = self.voices.get(waiting.character) or self.settings.voice
-        chosen = {b: replace(say, voice=say.voice or voice) for b, say in wants.items()}
-        self._effects += self.orders.place(waiting, chosen)
-
-    def withdraw(self, gone: list[Waiting], t: float) -> None:
-        for waiting in gone:
-            self.player.withdraw(waiting.block, t)
-            self.speeches.refused(waiting.block.id)
-        self.preparation.remove(gone)
-
-    def _beyond_limits(self, block: Block) -> str | None:
-        if self.ending:
-            return "the service is ending and takes no more documents"
-        busy = len(self.preparation) + self.player.alive
-        return beyond(block, self.settings, busy, self.player.characters)
-
-    def _internal(self, block: Block, t: float) -> None:
-        """A bug: the traceback is ours, the client gets the block's id."""
-        log.exception("session %s: block %s failed", self.id, block.id)
-        text = "internal error while planning this block"
-        self._refuse(Warning(block.id, "EXECUTION_EXCEPTION", text), t, block.character_id)
-
-    def _refuse(self, warning: Warning, t: float, character: str | None = None) -> None:
-        self.player.refuse(warning, t, character)
-        self.speeches.refused(warning.id)
 
     # feedback -----------------------------------------------------------------------------------
 
@@ -433,10 +333,11 @@ class Session:
         """Number what is due, keep it, and send it to every connection that has not switched it off."""
         while due := self.player.due(t + EPSILON):
             for feedback in due:
-                told, ends = self.speeches.told(feedback)
+                told, ends = self.intake.speeches.told(feedback)
                 self.log.add(told)
                 if ends:
-                    self.withdraw([w for w in self.preparation.waiting if w.block.id in ends], t)
+                    waiting = self.intake.preparation.waiting
+                    self.intake.withdraw([w for w in waiting if w.block.id in ends], t)
                     self.player.stop(t, ends)
         for connection in self._connections.values():
             if connection.place <= self.log.newest:

@@ -107,7 +107,7 @@ class Shell:
         """Sessions take no more documents from now on."""
         self._ending = True
         for session in self._hub.sessions.values():
-            session.ending = True
+            session.intake.ending = True
 
     @property
     def busy(self) -> bool:
@@ -140,7 +140,7 @@ class Shell:
             {
                 "sessions": len(sessions),
                 "connections": len(self._clients),
-                "blocks_waiting": sum(len(session.preparation) for session in sessions),
+                "blocks_waiting": sum(len(session.intake.preparation) for session in sessions),
                 "blocks_playing": sum(session.player.alive for session in sessions),
                 "unsent_bytes": sum(client.waiting for client in self._clients.values()),
             },
@@ -253,7 +253,7 @@ class Shell:
             capabilities=self._capabilities,
             epoch=epoch,
         )
-        session.ending = self._ending
+        session.intake.ending = self._ending
         return session
 
     def _pump(self, session: Session) -> None:

@@ -146,7 +146,7 @@ def test_binary_in_is_answered_with_an_error(driver) -> None:
 
 
 def test_no_documents_are_taken_while_the_service_ends(driver) -> None:
-    driver.session.ending = True
+    driver.session.intake.ending = True
     (warning,) = warnings(driver.send(NOD.format("b")))
     assert "ending" in warning.text
 
