@@ -132,7 +132,8 @@ class WebSocketDoor:
         if self._socket is not None:
             self._socket.close(close_connections=False)
             for one in list(self._opened):
-                if one.state is State.CONNECTING:  # it may never say what it wants
+                # It may never say what it wants. Before TLS is agreed on it has no transport, and ends by itself.
+                if one.state is State.CONNECTING and hasattr(one, "transport"):
                     one.transport.abort()
             for socket in list(self._socket.connections):
                 # After a drain the door is closed already; its connections are closed one by one.
