@@ -132,7 +132,7 @@ class WebSocketDoor:
         if self._socket is not None:
             self._socket.close(close_connections=False)
             for one in list(self._opened):
-                # It may never say what it wants. Before TLS is agreed on it has no transport and goes by itself.
+                # It may never say what it wants. Before TLS is agreed on it has no transport and goes alone.
                 if one.state is State.CONNECTING and hasattr(one, "transport"):
                     one.transport.abort()
             for socket in list(self._socket.connections):
