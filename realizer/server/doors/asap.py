@@ -11,13 +11,13 @@ import asyncio
 import contextlib
 import logging
 import re
-import socket
 from collections import deque
 from collections.abc import Callable
 from typing import cast
 
 from bml_schema import WarningFeedback
 from realizer.server.doors.assembler import Assembler, Fault
+from realizer.server.doors.listener import Listener, session_of
 from realizer.server.hub import HubError
 from realizer.server.shell import Shell
 from realizer.settings import Settings
@@ -48,59 +48,37 @@ class AsapDoor:
 
     def __init__(self, shell: Shell, settings: Settings) -> None:
         assert settings.asap_ports is not None
-        self.port, self._feedback_port = settings.asap_ports
-        self._host = settings.host
+        port, self._feedback_port = settings.asap_ports
+        self._listener = Listener("asap", settings.host, port, self._talk)
         self._limit = settings.max_document
         self._shell = shell
-        self._server: asyncio.Server | None = None
-        self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
     @property
     def lines(self) -> tuple[str, ...]:
-        host = f"[{self._host}]" if ":" in self._host else self._host
         back = f"feedback to port {self._feedback_port} of the client"
-        return (f"asap: BML at {host}:{self.port}, {back}, session asap-ADDRESS",)
+        return (f"asap: BML at {self._listener.where}, {back}, session asap-ADDRESS",)
+
+    @property
+    def port(self) -> int:
+        """The one that is open after `start`."""
+        return self._listener.port
 
     async def start(self) -> None:
-        self._server = await asyncio.start_server(self._serve, self._host, self.port)
-        self.port = self._server.sockets[0].getsockname()[1]
+        await self._listener.start()
 
     async def ready(self) -> None:
         return
 
     def shut(self) -> None:
-        if self._server is not None:
-            self._server.close()
+        self._listener.shut()
 
     async def close(self) -> None:
-        self.shut()
-        for writer in self._clients.values():
-            writer.transport.abort()
-        await asyncio.gather(*self._clients, return_exceptions=True)
-
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One BML connection, from its opening to its end."""
-        task = asyncio.current_task()
-        assert task is not None
-        self._clients[task] = writer
-        peer = writer.get_extra_info("peername")
-        try:
-            if peer is not None:  # otherwise it has gone again
-                # Nobody says good-bye, least of all a machine that loses its power.
-                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-                await self._talk(peer[0].removeprefix("::ffff:"), reader, writer)
-        except OSError:
-            pass  # it is gone
-        except Exception:
-            log.exception("asap: %s is let go of: its connection failed", peer[0])
-        finally:
-            writer.transport.abort()
-            del self._clients[task]
+        await self._listener.close()
 
     async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         link = CallBack(host, self._feedback_port, writer.transport.abort)
         try:
-            number = self._shell.join(link, "asap-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host)[:59])
+            number = self._shell.join(link, session_of("asap", host))
         except HubError as error:
             log.warning("asap: %s is not let in: %s", host, error)
             return

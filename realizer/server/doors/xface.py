@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import re
-import socket
 from collections.abc import Iterable
 
 from realizer.errors import RealizerError
 from realizer.server.doors.dialect import Leave, ToSession
+from realizer.server.doors.listener import Listener, session_of
 from realizer.server.doors.xface_brought import Brought, prepare
 from realizer.server.doors.xface_reader import Content, Fault, TaskReader
 from realizer.server.doors.xface_tasks import ERROR, Answer, Desk
@@ -43,64 +42,41 @@ class XfaceDoor:
 
     def __init__(self, shell: Shell, settings: Settings) -> None:
         assert settings.xface_port is not None
-        self.port = settings.xface_port
-        self._host = settings.host
+        self._listener = Listener("xface", settings.host, settings.xface_port, self._talk)
         self._media = settings.media
         # A block has more to it than its keys.
         self._most = settings.max_document - 2**10
         self._shell = shell
-        self._server: asyncio.Server | None = None
-        self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self._count = 0
 
     @property
     def lines(self) -> tuple[str, ...]:
-        host = f"[{self._host}]" if ":" in self._host else self._host
-        return (f"xface: tasks at {host}:{self.port}, session xface-ADDRESS",)
+        return (f"xface: tasks at {self._listener.where}, session xface-ADDRESS",)
+
+    @property
+    def port(self) -> int:
+        """The one that is open after `start`."""
+        return self._listener.port
 
     async def start(self) -> None:
-        self._server = await asyncio.start_server(self._serve, self._host, self.port)
-        self.port = self._server.sockets[0].getsockname()[1]
+        await self._listener.start()
 
     async def ready(self) -> None:
         return
 
     def shut(self) -> None:
-        if self._server is not None:
-            self._server.close()
+        self._listener.shut()
 
     async def close(self) -> None:
-        self.shut()
-        for writer in self._clients.values():
-            writer.transport.abort()
-        await asyncio.gather(*self._clients, return_exceptions=True)
-
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One client, from its opening to its end."""
-        task = asyncio.current_task()
-        assert task is not None
-        self._clients[task] = writer
-        peer = writer.get_extra_info("peername")
-        try:
-            if peer is not None:  # otherwise it has gone again
-                # Nobody says good-bye, least of all a machine that loses its power.
-                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-                await self._talk(peer[0].removeprefix("::ffff:"), reader, writer)
-        except OSError:
-            pass  # it is gone
-        except Exception:
-            log.exception("xface: %s is let go of: its connection failed", peer[0])
-        finally:
-            writer.transport.abort()
-            del self._clients[task]
+        await self._listener.close()
 
     async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._count += 1
         seat = _Seat(self._shell, Desk(self._count), writer)
         try:
-            if len(self._clients) > MOST_CLIENTS:
+            if len(self._listener) > MOST_CLIENTS:
                 raise HubError(503, f"{MOST_CLIENTS} clients are connected: wanted fewer")
-            number = self._shell.join(seat, "xface-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host)[:58])
+            number = self._shell.join(seat, session_of("xface", host))
         except HubError as error:
             log.warning("xface: %s is not let in: %s", host, error)
             writer.write(ERROR)
