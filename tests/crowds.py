@@ -12,6 +12,8 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.told import numbers
+
 __all__ = ["at_once", "come_and_go", "files_open", "greet", "half_closed", "joined", "masked", "well_told"]
 
 HELLO = (
@@ -20,7 +22,6 @@ HELLO = (
 )
 DOCUMENT = '<bml id="{}"><head id="n" lexeme="NOD" end="0.6"/><wait id="w" duration="0.3"/></bml>'
 GOODBYE = b"\x88\x80" + bytes(4)
-SEQ = re.compile(r'seq="(\d+)"')
 
 
 def files_open(process: int) -> int:
@@ -142,8 +143,7 @@ async def at_once(port: int, sessions: int, documents: int) -> list[list[str]]:
 
 def well_told(told: list[str], blocks: int) -> None:
     """The feedback of one session is there, each message once and in order."""
-    numbers = [int(found[1]) for text in told if (found := SEQ.search(text)) is not None]
-    assert numbers == list(range(1, len(told) + 1))
+    assert numbers(told) == list(range(1, len(told) + 1))
     ends = [text for text in told if re.search(r'blockProgress.* id="b\d+:end"', text)]
     assert len(ends) == blocks
     assert all('status="DONE"' in text for text in ends)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -37,7 +36,6 @@ EPOCH = 1.7e9
 # What is due at one instant: far more than any block has points.
 MOST_TICKS = 20_000
 RATE = 8000
-SEQ = re.compile(r'seq="(\d+)"')
 NAMES = ("a", "b", "c")
 BODIES = (
     '<head id="n" lexeme="NOD"/>',

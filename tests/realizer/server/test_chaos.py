@@ -32,11 +32,11 @@ from realizer.server.wire import FrameKind, unpack
 from realizer.settings import Settings
 from realizer.speech.espeak import EspeakVoice
 from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, masked, well_told
+from tests.told import numbers
 
 LIMIT = 60  # s; a hung test ends
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
 TALK = '<bml id="{}"><speech id="s"><text>{}</text></speech></bml>'
-SEQ = re.compile(r'seq="(\d+)"')
 
 
 def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
@@ -63,10 +63,6 @@ async def plays(client: ClientConnection, block: str) -> None:
     """The client's next block is played to its end."""
     await client.send(WAIT.format(block, 0.05))
     await until(client, f'id="{block}:end"')
-
-
-def numbers(told: list[str]) -> list[int]:
-    return [int(found[1]) for text in told if (found := SEQ.search(text)) is not None]
 
 
 # engines ----------------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import re
 import shutil
 import signal
 import socket
@@ -20,14 +19,14 @@ from pathlib import Path
 from typing import IO
 
 import pytest
-from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
 
 from bml_schema.feedback import parse_feedback
+from tests.told import feedback, numbers
 
 CONFIGURATION = Path(__file__).parents[4] / "docker" / "haproxy.cfg"
 LIMIT = 60  # s; a hung test ends
-SEQ = re.compile(r'seq="(\d+)"')
 FIRST = """<bml id="a"><head id="n" lexeme="NOD" start="0.6"/>
 <speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
@@ -88,20 +87,6 @@ def nodes(redis_url: str) -> Iterator[tuple[Node, Node]]:
         yield one, other
 
 
-async def feedback(client: ClientConnection, last: str) -> list[str]:
-    """Feedback up to the progress `last`, or to the end of the connection."""
-    told = []
-    try:
-        async for message in client:
-            if isinstance(message, str) and message.startswith("<"):
-                told.append(message)
-                if f'id="{last}"' in message:
-                    break
-    except ConnectionClosed:
-        pass
-    return told
-
-
 def test_a_client_that_comes_back_through_the_proxy_has_all_feedback_once_and_in_order(
     nodes: tuple[Node, Node], tmp_path: Path
 ) -> None:
@@ -118,7 +103,7 @@ def test_a_client_that_comes_back_through_the_proxy_has_all_feedback_once_and_in
                 assert (owner.sessions(), survivor.sessions()) == (1, 0)
                 owner.kill()
                 first += await feedback(client, "never")
-            seen = int(SEQ.search(first[-1])[1])  # type: ignore[index]
+            seen = numbers(first)[-1]
             async with connect(f"{url}&seen={seen}") as client:  # the proxy has not found out yet
                 rest = await feedback(client, "b:end")
             assert survivor.sessions() == 1
@@ -129,8 +114,8 @@ def test_a_client_that_comes_back_through_the_proxy_has_all_feedback_once_and_in
             told = asyncio.run(test(at))
         log.seek(0)
         written = log.read()
-    numbers = [int(SEQ.search(text)[1]) for text in told]  # type: ignore[index]
-    assert numbers == list(range(1, len(numbers) + 1))
+    seqs = numbers(told)
+    assert seqs == list(range(1, len(seqs) + 1))
     assert any('id="a:end"' in text for text in told)
     for text in told:
         parse_feedback(text)

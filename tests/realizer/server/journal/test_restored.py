@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,9 +14,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
+from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends
-SEQ = re.compile(r'seq="(\d+)"')
 FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
 <head id="n" lexeme="NOD" start="0.6"/>
 <speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
@@ -36,20 +35,6 @@ def serving(where: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
             yield service.stdout.readline().split()[2], service
         finally:
             service.kill()
-
-
-async def feedback(client: ClientConnection, last: str) -> list[str]:
-    """Feedback up to the block progress `last`, or to the end of the connection."""
-    told = []
-    try:
-        async for message in client:
-            if isinstance(message, str) and message.startswith("<"):
-                told.append(message)
-                if f'id="{last}"' in message:
-                    break
-    except ConnectionClosed:
-        pass
-    return told
 
 
 def points(told: list[str]) -> list[str]:
@@ -84,11 +69,11 @@ def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(w
 
     with serving(where) as (url, service):
         first = asyncio.run(before(url, service))
-    seen = int(SEQ.search(first[-1])[1])  # type: ignore[index]
+    seen = numbers(first)[-1]
     with serving(where) as (url, _):
         rest = asyncio.run(after(url, seen))
-    numbers = [int(SEQ.search(text)[1]) for text in first + rest]  # type: ignore[index]
-    assert numbers == list(range(1, len(numbers) + 1))
+    seqs = numbers(first + rest)
+    assert seqs == list(range(1, len(seqs) + 1))
     assert any('id="a:end"' in text for text in rest)
     for text in first + rest:
         parse_feedback(text)
@@ -129,7 +114,7 @@ def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_
 
     async def after(url: str) -> None:
         async def one(k: int) -> None:
-            seen = int(SEQ.search(told[k][-1])[1])  # type: ignore[index]
+            seen = numbers(told[k])[-1]
             async with connect(f"{url}?session=one-{k}&seen={seen}") as client:
                 told[k] += await feedback(client, "b:end")
 
@@ -142,8 +127,8 @@ def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_
     with serving(where) as (url, _):
         asyncio.run(after(url))
     for texts in told.values():
-        numbers = [int(SEQ.search(text)[1]) for text in texts]  # type: ignore[index]
-        assert numbers == list(range(1, len(numbers) + 1))
+        seqs = numbers(texts)
+        assert seqs == list(range(1, len(seqs) + 1))
         assert points(texts) == ["b:start", *(f"b:n:{point}" for point in POINTS), "b:end"]
 
 
