@@ -228,6 +228,12 @@ class Player:
         """When `due` will next have something; None when nothing plays or waits. In the past: at once."""
         return self._blocks.next_deadline()
 
+    def next_change(self) -> float:
+        """When a call of `due` will next do something: then, or when it can forget; infinite where neither."""
+        first = self._blocks.next_deadline()
+        forgets = self._blocks.cast.first_gone + self.history + RELAX + AFTERMATH
+        return forgets if first is None else min(first, forgets)
+
     # faces out ----------------------------------------------------------------------------------
 
     @property

@@ -19,7 +19,8 @@ from realizer.server.connection import (
 )
 from realizer.server.effects import Draw, Effect, Look, Send
 from realizer.server.plans import Plans, message
-from realizer.server.streams import AHEAD, EPSILON, PACKET, Sound, Timeline, encode, first_at, last_at
+from realizer.server.sound import AHEAD, PACKET, Sound
+from realizer.server.streams import EPSILON, Timeline, first_at, last_at
 from realizer.server.wire import FrameKind, pack
 
 if TYPE_CHECKING:
@@ -33,6 +34,41 @@ LATE = 0.5  # s
 DRAW_DEADLINE = 10.0  # s
 # How long after a client was too slow for what is planned it is tried again.
 RETRY = 0.1  # s
+
+
+class Lane:
+    """The frames of one timeline and all who get them.
+
+    Attributes:
+        members: who, with what of them.
+    """
+
+    def __init__(self, timeline: Timeline) -> None:
+        self.timeline = timeline
+        self.members: list[tuple[Connection, FrameSubscription]] = []
+
+    @property
+    def next(self) -> int:
+        """The first frame that somebody has not got."""
+        members = self.members
+        return members[0][1].next if len(members) == 1 else min(s.next for _, s in members)
+
+    def send(self, now: float, effects: list[Effect]) -> None:
+        """All that is due, to everybody who has not got it."""
+        timeline = self.timeline
+        newest, oldest = last_at(now, timeline.fps), first_at(now - LATE, timeline.fps)
+        window = timeline.window(max(self.next, oldest), newest)
+        for connection, s in self.members:
+            if s.next < oldest:
+                connection.dropped += oldest - s.next
+                s.next = oldest
+            if connection.slow:
+                connection.dropped += max(0, newest + 1 - s.next)
+            else:
+                for number in range(s.next, newest + 1):
+                    effects.append(Send(connection.id, window.message(s, number)))
+            s.next = max(s.next, newest + 1)
+        window.settle()
 
 
 class Broadcast:
@@ -61,6 +97,10 @@ class Broadcast:
         self._views: dict[tuple[object, ...], View] = {}
         self._plans = Plans(player.cast)
         self._draws = 0
+        self._lanes: list[Lane] = []
+        self._sound_takers: list[tuple[Connection, SoundSubscription]] = []
+        self._plan_takers: list[tuple[Connection, PlanSubscription]] = []
+        self._picture_takers: list[PictureSubscription] = []
 
     def timeline(self, index: int, fps: float) -> Timeline:
         """The frames of one character at one rate."""
@@ -100,53 +140,54 @@ class Broadcast:
             if view.index == index:
                 view.face = self._face_name(index)
 
-    def due(self, connections: Iterable[Connection], now: float) -> list[Effect]:
-        """Every frame, packet and drawing whose time has come."""
-        plans: list[tuple[Connection, PlanSubscription]] = []
-        sounds: list[tuple[Connection, SoundSubscription]] = []
-        frames: list[tuple[Connection, FrameSubscription]] = []
-        pictures: list[PictureSubscription] = []
+    def gets(self, connections: Iterable[Connection]) -> None:
+        """Who gets what from now on."""
+        lanes: dict[Timeline, Lane] = {}
+        self._plan_takers, self._sound_takers, self._picture_takers = [], [], []
         for connection in connections:
             for s in connection.subscriptions.values():
                 if isinstance(s, FrameSubscription):
-                    frames.append((connection, s))
+                    lanes.setdefault(s.timeline, Lane(s.timeline)).members.append((connection, s))
                 elif isinstance(s, SoundSubscription):
-                    sounds.append((connection, s))
+                    self._sound_takers.append((connection, s))
                 elif isinstance(s, PlanSubscription):
-                    plans.append((connection, s))
+                    self._plan_takers.append((connection, s))
                 else:
-                    pictures.append(s)
-        effects: list[Effect] = []
-        self._send_plans(plans, now, effects)
-        for connection, sound in sounds:
-            self._send_packets(connection, sound, now, effects)
-        if frames:
-            self._send_frames(frames, now, effects)
-        self._draw(pictures, now, effects)
-        return effects
+                    self._picture_takers.append(s)
+        self._lanes = list(lanes.values())
 
-    def next_deadline(self, connections: Iterable[Connection]) -> float | None:
-        """When `due` will next have something; None where nobody gets anything."""
-        first = math.inf
-        plans: list[PlanSubscription] = []
-        for connection in connections:
-            for s in connection.subscriptions.values():
-                if isinstance(s, FrameSubscription):
-                    first = min(first, s.next / s.timeline.fps)
-                elif isinstance(s, SoundSubscription):
-                    first = min(first, self._sound_deadline(s))
-                elif isinstance(s, PlanSubscription):
-                    plans.append(s)
-                else:
-                    view = s.view
-                    waits = (
-                        view.begun + DRAW_DEADLINE if view.busy is not None else view.next / view.timeline.fps
-                    )
-                    first = min(first, waits)
-        if plans:
+    def due(self, now: float, effects: list[Effect]) -> None:
+        """Every frame, packet and drawing whose time has come, to those of the last `gets`."""
+        self._send_plans(self._plan_takers, now, effects)
+        for connection, sound in self._sound_takers:
+            self._send_packets(connection, sound, now, effects)
+        self.frames_due(now, effects)
+        self._draw(self._picture_takers, now, effects)
+
+    def frames_due(self, now: float, effects: list[Effect]) -> None:
+        """Every frame of fap, au, arkit and mesh whose time has come."""
+        for lane in self._lanes:
+            if lane.next <= last_at(now, lane.timeline.fps):
+                lane.send(now, effects)
+
+    @property
+    def next_frame(self) -> float:
+        """When `frames_due` will next have something; infinite where nobody gets frames."""
+        return min([lane.next / lane.timeline.fps for lane in self._lanes], default=math.inf)
+
+    @property
+    def next_other(self) -> float:
+        """When `due` will next have something that is no such frame."""
+        first = [self._sound_deadline(s) for _, s in self._sound_takers]
+        for s in self._picture_takers:
+            view = s.view
+            first.append(
+                view.begun + DRAW_DEADLINE if view.busy is not None else view.next / view.timeline.fps
+            )
+        if self._plan_takers:
             changed = self._plans.have_changed()
-            first = min([first, *(s.again for s in plans if s.behind or changed)])
-        return None if first == math.inf else first
+            first += [s.again for _, s in self._plan_takers if s.behind or changed]
+        return min(first, default=math.inf)
 
     def drawn(
         self, draw: int, picture: bytes | None, connections: Iterable[Connection]
@@ -197,35 +238,6 @@ class Broadcast:
                 effects.append(Send(connection.id, text))
             elif news:
                 effects.append(Send(connection.id, message(now, ",".join(news), s.name, whole=False)))
-
-    def _send_frames(
-        self, wanted: list[tuple[Connection, FrameSubscription]], now: float, effects: list[Effect]
-    ) -> None:
-        groups: dict[Timeline, list[tuple[Connection, FrameSubscription]]] = {}
-        for connection, s in wanted:
-            fps = s.timeline.fps
-            oldest = first_at(now - LATE, fps)
-            if s.next < oldest:
-                connection.dropped += oldest - s.next
-                s.next = oldest
-            if s.next <= last_at(now, fps):
-                groups.setdefault(s.timeline, []).append((connection, s))
-        for timeline, group in groups.items():
-            newest = last_at(now, timeline.fps)
-            window = timeline.window(min(s.next for _, s in group), newest)
-            messages: dict[tuple[str, str, str | None, bool, int], str | bytes] = {}
-            for connection, s in group:
-                if connection.slow:
-                    connection.dropped += newest + 1 - s.next
-                    s.next = newest + 1
-                    continue
-                for number in range(s.next, newest + 1):
-                    key = (s.stream, s.encoding, s.name, s.asked, number)
-                    if key not in messages:
-                        messages[key] = encode(window, s, number)
-                    effects.append(Send(connection.id, messages[key]))
-                s.next = newest + 1
-            window.settle()
 
     def _send_packets(
         self, connection: Connection, subscription: SoundSubscription, now: float, effects: list[Effect]

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from bml_schema import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.server.effects import Look
-from realizer.server.streams import Sound, Timeline
+from realizer.server.sound import Sound
+from realizer.server.streams import Timeline
 
 __all__: list[str] = []
 

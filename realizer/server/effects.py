@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from realizer.arrays import Float32
 from realizer.speech.utterance import Say
@@ -10,8 +11,7 @@ from realizer.speech.utterance import Say
 __all__: list[str] = []
 
 
-@dataclass(frozen=True, slots=True)
-class Send:
+class Send(NamedTuple):
     """One WebSocket message to one connection."""
 
     connection: int

@@ -123,6 +123,8 @@ class Session:
         self.log = FeedbackLog(LOG if history < float("inf") else None, epoch)
         self._effects: list[Effect] = []
         self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
+        # Until then nothing is due but frames, on its own clock; None where that is not known.
+        self._calm: float | None = None
 
     # connections --------------------------------------------------------------------------------
 
@@ -133,6 +135,7 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
+        self._calm = None
         self._connections[connection] = Connection(connection, self.log.newest + 1)
         if not self._tell(now - self.opened, "join", connection):
             return
@@ -145,7 +148,7 @@ class Session:
         if self._connections.pop(connection, None) is not None:
             self._tell(now - self.opened, "leave", connection)
         self.intake.speeches.leave(connection)
-        self._unsettled = True
+        self._unsettled, self._calm = True, None
         if not self._connections:
             self.empty_since = now
             if not self.named:
@@ -261,6 +264,7 @@ class Session:
         """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
         if self.closed:
             return
+        self._calm = None
         picture = result if isinstance(result, bytes) else None
         effects, lookers = self.broadcast.drawn(draw, picture, self._connections.values())
         self._effects += effects
@@ -273,44 +277,64 @@ class Session:
 
     # time ---------------------------------------------------------------------------------------
 
-    def tick(self, now: float) -> None:
-        """Do what is due: feedback, sound and frames first, then read or plan one document at most."""
-        if not self.closed and self._work(now - self.opened):
-            self._tell(now - self.opened, "tick")
+    def tick(self, now: float, *, reads: bool = True) -> None:
+        """Do what is due: feedback, sound and frames first, then read or plan one document at most.
+
+        Args:
+            reads: or leave documents for another time.
+        """
+        t = now - self.opened
+        if self.closed:
+            return
+        if self._calm is not None and t + EPSILON < self._calm:
+            self.broadcast.frames_due(t, self._effects)
+        elif self._work(t, reads):
+            self._tell(t, "tick")
 
     def pass_time(self, t: float) -> None:
         """Tell what comes due before `t` on the session clock, each at its own time; for who replays it."""
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
             self._publish(due)
 
-    def _work(self, t: float) -> bool:
+    def _work(self, t: float, reads: bool = True) -> bool:
         """What `tick` does; False where nothing came of it but what plays."""
-        self._unsettled = False
+        self._unsettled, self._calm = False, None
         self._publish(t)
-        self._effects += self.broadcast.due(self._connections.values(), t)
+        self.broadcast.gets(self._connections.values())
+        self.broadcast.due(t, self._effects)
         if self.intake.preparation.waiting:
             self._effects += self.intake.orders.overdue(t + EPSILON)
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
-        done = self.intake.submit_ready(t) or self.intake.read_one(t)
+        done = reads and (self.intake.submit_ready(t) or self.intake.read_one(t))
         if self.intake.speeches.settle(t) or done:
             self._publish(t)
             return True
         return False
 
+    @property
+    def reads(self) -> bool:
+        """A document can be read or planned at once."""
+        return not self.closed and (self._unsettled or self.intake.ready)
+
     def next_deadline(self) -> float | None:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
+        return float("-inf") if self.reads else self.next_due()
+
+    def next_due(self) -> float | None:
+        """When something is due that is no document; None where nothing is."""
         if self.closed:
             return None
-        if self._unsettled or self.intake.ready:
-            return float("-inf")
-        deadlines = [
-            self.player.next_deadline(),
-            self.broadcast.next_deadline(self._connections.values()),
-            self.intake.orders.deadline(),
-        ]
-        known = [d for d in deadlines if d is not None]
-        return min(known) + self.opened if known else None
+        other = self._calm
+        if other is None:
+            asked = self.intake.orders.deadline()
+            self.broadcast.gets(self._connections.values())
+            due = [self.player.next_change(), self.broadcast.next_other]
+            other = min(due if asked is None else [*due, asked])
+            if not self.intake.speeches.lasting:  # which are looked at with every frame
+                self._calm = other
+        first = min(other, self.broadcast.next_frame)
+        return None if first == float("inf") else first + self.opened
 
     @property
     def busy(self) -> bool:

@@ -236,6 +236,11 @@ class Speeches:
         words = [word for piece in speech.ahead for word in self._words(piece, feedback.global_time)]
         return replace(feedback, said=" ".join([*speech.said, *words])), left
 
+    @property
+    def lasting(self) -> bool:
+        """Whether `settle` may have something to do as time passes."""
+        return any(not speech.over for speech in self._speeches.values())
+
     def settle(self, t: float) -> bool:
         """Let the block of each speech end with its last piece; True where one ends at another time."""
         moved = False

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from realizer.arrays import Float32, Int16, Int32
+from realizer.arrays import Float32, Float64, Int16, Int32
 from realizer.errors import RealizerError
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "json_frame",
     "pack",
     "pack_clip",
+    "pack_frames",
     "unpack",
     "unpack_clip",
 ]
@@ -111,6 +112,33 @@ def pack(
 ) -> bytes:
     """One binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
     return HEADER.pack(kind, VERSION, (character & 0xFF) | (FORGET if forget else 0), frame, time) + payload
+
+
+def pack_frames(
+    kind: FrameKind, first: int, times: Float64, rows: Int32 | Float32, *, character: int = 0
+) -> tuple[bytes, int]:
+    """What `pack` says of each of many frames, one behind the other, and the length of one.
+
+    Args:
+        first: number of the first; the others follow it.
+        times: (n,) seconds.
+        rows: (n, k) their payloads.
+    """
+    whole = np.empty(
+        len(rows),
+        [
+            ("kind", "u1"),
+            ("version", "u1"),
+            ("flags", "<u2"),
+            ("frame", "<u4"),
+            ("time", "<f8"),
+            ("payload", rows.dtype.newbyteorder("<"), rows.shape[1:]),
+        ],
+    )
+    whole["kind"], whole["version"], whole["flags"] = kind, VERSION, character & 0xFF
+    whole["frame"] = np.arange(first, first + len(rows))
+    whole["time"], whole["payload"] = times, rows
+    return whole.tobytes(), whole.dtype.itemsize
 
 
 def unpack(message: bytes) -> WireFrame:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.server.streams import Sound
+from realizer.server.sound import Sound
 from realizer.sound import heard
 from realizer.speech.utterance import Utterance
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
-from realizer.server.streams import TURNS, Sound, Timeline
+from realizer.server.sound import Sound
+from realizer.server.streams import TURNS, Timeline
 from realizer.server.wire import FrameKind
 
 TURN = '<bml id="b"><head id="h" lexeme="SHAKE" start="0"/><faceLexeme id="f" lexeme="SMILE" end="2"/></bml>'
