@@ -197,7 +197,7 @@ def _block(
         raise BMLSyntaxError(stretch.fault, line=line, block=id)
     data = _encoded(text[stretch.start : stretch.end], line, id)
     if len(data) > most_bytes:
-        raise BMLError(
+        raise BMLSizeError(
             f"wanted at most {most_bytes} bytes in a document, got {len(data)}", line=line, block=id
         )
     root = element(data, lines_before=line - 1, block=id)

@@ -1,6 +1,7 @@
 """What can be wrong with a document: an error when no block came of it, a problem when only a part went.
 
 BMLError               no block: too big, no usable id, not a <bml>
+├── BMLSizeError       more in it than is read
 └── BMLSyntaxError     not well-formed XML, or XML we refuse to read (DTD, entities)
 """
 
@@ -15,7 +16,7 @@ from typing import NamedTuple
 
 from lxml.etree import _Element
 
-__all__ = ["BMLError", "BMLSyntaxError", "Place", "Problem"]
+__all__ = ["BMLError", "BMLSizeError", "BMLSyntaxError", "Place", "Problem"]
 
 # Warning types of the standard, in its (American) spelling.
 PARSING_FAILURE = "PARSING_FAILURE"
@@ -67,6 +68,10 @@ class BMLError(Exception):
 
 def _again(kind: type[BMLError], text: str, line: int | None, path: str, block: str | None) -> BMLError:
     return kind(text, line=line, path=path, block=block)
+
+
+class BMLSizeError(BMLError):
+    """There are more bytes or behaviours in it than are read."""
 
 
 class BMLSyntaxError(BMLError):

@@ -17,7 +17,7 @@ from bml_schema.asap import FaceKeyframe
 from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
-from bml_schema.escape import escape, escape_value, legal
+from bml_schema.escape import escape, legal, legal_value
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
 from bml_schema.shape import local
@@ -66,12 +66,13 @@ class BlockProgress:
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; `seq` and `epoch` as the module says."""
-        return _xml(
-            "blockProgress",
-            {"id": self.id, "globalTime": self.global_time, "characterId": self.character_id},
-            seq=self.seq if seq is None else seq,
-            bmla={"posixTime": _posix(self.global_time, epoch, self.posix_time), "status": self.status},
-            own={"said": self.said, "lastWord": self.last_word},
+        posix = _posix("bmla:posixTime", self.global_time, epoch, self.posix_time)
+        said = _given("realizer:said", self.said) + _given("realizer:lastWord", self.last_word)
+        return (
+            f'<blockProgress{_CORE} id="{legal_value(self.id)}" globalTime="{_seconds(self.global_time)}"'
+            f"{_given('characterId', self.character_id)}"
+            f"{_bmla(posix + _given('bmla:status', self.status))}"
+            f"{_ours(said + _number(self.seq if seq is None else seq))}/>"
         )
 
 
@@ -94,16 +95,11 @@ class SyncPointProgress:
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; `seq` and `epoch` as the module says."""
-        return _xml(
-            "syncPointProgress",
-            {
-                "id": self.id,
-                "time": self.time,
-                "globalTime": self.global_time,
-                "characterId": self.character_id,
-            },
-            seq=self.seq if seq is None else seq,
-            bmla={"posixTime": _posix(self.global_time, epoch, self.posix_time)},
+        return (
+            f'<syncPointProgress{_CORE} id="{legal_value(self.id)}" time="{_seconds(self.time)}"'
+            f' globalTime="{_seconds(self.global_time)}"{_given("characterId", self.character_id)}'
+            f"{_bmla(_posix('bmla:posixTime', self.global_time, epoch, self.posix_time))}"
+            f"{_ours(_number(self.seq if seq is None else seq))}/>"
         )
 
 
@@ -125,12 +121,11 @@ class WarningFeedback:
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; no CDATA and no elements inside, clients refuse both."""
-        return _xml(
-            "warningFeedback",
-            {"id": self.id, "type": self.type, "characterId": self.character_id},
-            escape(legal(self.text)),
-            seq=self.seq if seq is None else seq,
+        start = (
+            f'<warningFeedback{_CORE} id="{legal_value(self.id)}" type="{legal_value(self.type)}"'
+            f"{_given('characterId', self.character_id)}{_ours(_number(self.seq if seq is None else seq))}"
         )
+        return f"{start}>{escape(legal(self.text))}</warningFeedback>" if self.text else f"{start}/>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,22 +164,25 @@ class PredictionFeedback:
         writer = Writer()
         inner: list[str] = []
         for block in self.blocks:
-            times = {"id": block.id, "globalStart": block.global_start, "globalEnd": block.global_end}
-            told = {
-                "posixStartTime": _posix(block.global_start, epoch, block.posix_start),
-                "posixEndTime": _posix(block.global_end, epoch, block.posix_end),
-                "status": block.status,
-            }
-            named = {writer.name(bmla(name)): value for name, value in told.items() if value is not None}
-            inner.append(f"<bml{_attributes({**times, **named})}/>")
+            start, end = block.global_start, block.global_end
+            told = (
+                _posix("bmla:posixStartTime", start, epoch, block.posix_start)
+                + _posix("bmla:posixEndTime", end, epoch, block.posix_end)
+                + _given("bmla:status", block.status)
+            )
+            if told:
+                writer.name(bmla("status"))  # which declares the prefix
+            times = "" if start is None else f' globalStart="{_seconds(start)}"'
+            if end is not None:
+                times += f' globalEnd="{_seconds(end)}"'
+            inner.append(f'<bml id="{legal_value(block.id)}"{times}{told}/>')
         inner.extend(writer.behaviour(b) for b in self.behaviours)
-        return _xml(
-            "predictionFeedback",
-            {"characterId": self.character_id},
-            "\n" + "\n".join(inner) + "\n" if inner else "",
-            seq=self.seq if seq is None else seq,
-            declarations=writer.declarations(),
+        declared = writer.declarations()
+        tag = (
+            f"<predictionFeedback{_CORE}{declared}{_given('characterId', self.character_id)}"
+            f"{_ours(_number(self.seq if seq is None else seq), declared)}"
         )
+        return "\n".join((f"{tag}>", *inner, "</predictionFeedback>")) if inner else f"{tag}/>"
 
 
 Feedback = BlockProgress | SyncPointProgress | WarningFeedback | PredictionFeedback
@@ -305,39 +303,36 @@ def _whole(value: str) -> int | None:
     return int(value) if value.isdecimal() and len(value) < 20 else None
 
 
-def _posix(time: float | None, epoch: float | None, read: int | None) -> str | None:
-    """Whole milliseconds since 1970 of a time on the session clock; without an epoch, what was read."""
-    if time is None or epoch is None:
-        return None if read is None else str(read)
-    return str(round((epoch + time) * 1000))
+_CORE = f' xmlns="{CORE}"'
+_OURS = f' xmlns:realizer="{OWN}"'
 
 
-def _attributes(values: Mapping[str, str | float | None]) -> str:
-    out = ""
-    for name, value in values.items():
-        if value is not None:
-            text = value if isinstance(value, str) else decimal(round(value, 6))
-            out += f' {name}="{escape_value(legal(text))}"'
-    return out
+def _seconds(time: float) -> str:
+    """To the microsecond, and never with an exponent."""
+    return decimal(round(time, 6))
 
 
-def _xml(
-    name: str,
-    values: Mapping[str, str | float | None],
-    inside: str = "",
-    *,
-    seq: int | None,
-    bmla: Mapping[str, str | None] | None = None,
-    own: Mapping[str, str | None] | None = None,
-    declarations: str = "",
-) -> str:
-    """One element in the core namespace; times to the microsecond, and never with an exponent."""
-    start = f'<{name} xmlns="{CORE}"{declarations}{_attributes(values)}'
-    if told := {f"bmla:{name}": value for name, value in (bmla or {}).items() if value is not None}:
-        start += f' xmlns:bmla="{BMLA}"{_attributes(told)}'
-    said = {**(own or {}), "seq": None if seq is None else str(seq)}
-    if ours := {f"realizer:{name}": value for name, value in said.items() if value is not None}:
-        declared = f'xmlns:realizer="{OWN}"'
-        # A predicted behaviour of ours has declared it already.
-        start += ("" if declared in declarations else f" {declared}") + _attributes(ours)
-    return f"{start}>{inside}</{name}>" if inside else f"{start}/>"
+def _given(name: str, value: str | None) -> str:
+    """An attribute; "" where there is no value."""
+    return "" if value is None else f' {name}="{legal_value(value)}"'
+
+
+def _posix(name: str, time: float | None, epoch: float | None, read: int | None) -> str:
+    """A time on the session clock as whole milliseconds since 1970; without an epoch, what was read."""
+    if time is not None and epoch is not None:
+        read = round((epoch + time) * 1000)
+    return "" if read is None else f' {name}="{read}"'
+
+
+def _number(seq: int | None) -> str:
+    return "" if seq is None else f' realizer:seq="{seq}"'
+
+
+def _bmla(attributes: str) -> str:
+    """Attributes of BMLA with their namespace."""
+    return f' xmlns:bmla="{BMLA}"{attributes}' if attributes else ""
+
+
+def _ours(attributes: str, declared: str = "") -> str:
+    """Attributes of ours with our namespace, unless a predicted behaviour of ours has declared it."""
+    return attributes if not attributes or _OURS in declared else _OURS + attributes

@@ -80,7 +80,7 @@ def read_block(
     entries = flat(tree)
     if len(entries) > most_behaviours:
         said = f"wanted at most {most_behaviours} behaviours and constraints in a block, got {len(entries)}"
-        raise BMLError(said, line=line, path="/bml", block=names.block)
+        raise BMLSizeError(said, line=line, path="/bml", block=names.block)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
     if stray := elements.stray(shape_of(Block), root, values["foreign"], False):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from bml_schema.escape import escape, escape_value, legal
+from bml_schema.escape import escape, escape_value, legal, legal_value
 from tests.strategies import xml_text
 
 
@@ -28,3 +28,8 @@ def test_what_xml_cannot_hold_is_refused_or_replaced(bad: str) -> None:
 @given(st.text())
 def test_legal_text_can_always_be_written(text: str) -> None:
     assert etree.fromstring(f"<a>{escape(legal(text))}</a>".encode()) is not None
+
+
+@given(st.text() | st.text("ab \"&<>'\t\n\r~\x7f", max_size=3))
+def test_a_legal_value_reads_back_as_the_legal_text(text: str) -> None:
+    assert etree.fromstring(f'<a b="{legal_value(text)}"/>'.encode()).get("b") == legal(text)
