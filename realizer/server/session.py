@@ -25,7 +25,7 @@ from realizer.server.intake import Intake
 from realizer.server.journal import JournalError, Lost
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.notes import Notes
-from realizer.server.limits import MAX_CHARACTERS
+from realizer.server.limits import MAX_CHARACTERS, too_long
 from realizer.server.messages import (
     MAX_CONTROL,
     MAX_FPS,
@@ -113,6 +113,7 @@ class Session:
             cooccurrence=settings.cooccurrence,
             prosody=settings.prosody,
             takes=lambda index: self.face(index).takes,
+            refuses=lambda block, schedule: too_long(block, schedule, settings),
         )
         self.load_face = load_face or (lambda name: _load_face(name, settings.deformer))
         self.capabilities = dict(capabilities or {})
@@ -286,7 +287,7 @@ class Session:
         t = now - self.opened
         if self.closed:
             return
-        if self._calm is not None and t + EPSILON < self._calm:
+        if self._calm is not None and t + EPSILON < self._calm and not (reads and self.reads):
             self.broadcast.frames_due(t, self._effects)
         elif self._work(t, reads):
             self._tell(t, "tick")
@@ -306,7 +307,9 @@ class Session:
             self._effects += self.intake.orders.overdue(t + EPSILON)
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
-        done = reads and (self.intake.submit_ready(t) or self.intake.read_one(t))
+        if not reads:
+            return False
+        done = self.intake.submit_ready(t) or self.intake.read_one(t)
         if self.intake.speeches.settle(t) or done:
             self._publish(t)
             return True

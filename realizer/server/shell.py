@@ -8,11 +8,12 @@ import itertools
 import logging
 import time
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from realizer.behaviours.kind import Position
 from realizer.expressions import library_of
 from realizer.mapping import mapping_of
+from realizer.server.alarms import Alarms
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import Hub, HubError
@@ -32,13 +33,6 @@ log = logging.getLogger(__name__)
 
 # How often sessions that nobody visits are looked for.
 SWEEP = 5.0  # s
-
-
-class _Timer(NamedTuple):
-    """When a session is woken. Not every loop's handles say that: uvloop's for what is due at once do not."""
-
-    when: float
-    handle: asyncio.TimerHandle
 
 
 class Shell:
@@ -63,7 +57,7 @@ class Shell:
         self._studio = Studio(settings.deformer)
         self.metrics = Metrics(worker)
         self._clients: dict[int, Client] = {}
-        self._timers: dict[Session, _Timer] = {}
+        self._reading: dict[Session, None] = {}  # those with documents to read or plan, in turn
         self._numbers = itertools.count(1)
         self._sweeper: asyncio.TimerHandle | None = None
         self._scene: Mapping[str, Position] | None = None
@@ -84,6 +78,7 @@ class Shell:
             JournalError: a journal that cannot be had.
         """
         self._loop = asyncio.get_running_loop()
+        self._alarms = Alarms(self._loop, self._tick)
         if self.settings.journal is not None:
             self._journal = journal_at(self.settings.journal)
         if self.settings.scene is not None:
@@ -117,10 +112,10 @@ class Shell:
     async def close(self) -> None:
         """End every session and every engine."""
         self._closed = True
-        for timer in (*(t.handle for t in self._timers.values()), self._sweeper):
-            if timer is not None:
-                timer.cancel()
-        self._timers.clear()
+        self._alarms.close()
+        self._reading.clear()
+        if self._sweeper is not None:
+            self._sweeper.cancel()
         for session in self._hub.sessions.values():
             session.close()
         for journal in (self._journal, self._record):
@@ -263,31 +258,41 @@ class Shell:
         self._arm(session)
 
     def _arm(self, session: Session) -> None:
-        """One timer a session."""
-        deadline = session.next_deadline()
-        if (armed := self._timers.get(session)) is not None:
-            # One that is due is left alone: messages in quick succession must not put it off for ever.
-            if deadline is not None and armed.when <= max(deadline, self._loop.time()):
-                return
-            armed.handle.cancel()
-            del self._timers[session]
-        if deadline is not None and not self._closed:
-            when = max(deadline, self._loop.time())
-            self._timers[session] = _Timer(when, self._loop.call_at(when, self._tick, session))
+        """Wake it when something is due; what it has to read waits for its turn."""
+        if self._closed:
+            return
+        self._alarms.set(session, session.next_due())
+        if session.reads:
+            if not self._reading:
+                self._loop.call_soon(self._read)
+            self._reading.setdefault(session)
 
-    def _tick(self, session: Session) -> None:
-        began = self._loop.time()
-        if (timer := self._timers.pop(session, None)) is not None:
-            self.metrics.late.observe(max(0.0, began - timer.when))
-        plans = session.player.revision
+    def _tick(self, session: Session, when: float) -> None:
+        """Frames, feedback and whatever else is due."""
+        now = self._loop.time()
+        self.metrics.late.observe(now - when)
+        self._work(session, now, reads=False)
+
+    def _read(self) -> None:
+        """Read or plan one document of one session; whatever is due in others comes before the next."""
+        if not self._reading:
+            return
+        session = next(iter(self._reading))
+        del self._reading[session]
+        if self._reading:
+            self._loop.call_soon(self._read)
+        began, plans = self._loop.time(), session.player.revision
+        self._work(session, began, reads=True)
+        if session.player.revision != plans:
+            self.metrics.planning.observe(self._loop.time() - began)
+
+    def _work(self, session: Session, now: float, *, reads: bool) -> None:
         for number in session.connections:
             session.backlog(number, self._clients[number].waiting)
         try:
-            session.tick(self._loop.time())
+            session.tick(now, reads=reads)
         except Exception:
             self._fail(session)
-        if session.player.revision != plans:
-            self.metrics.planning.observe(self._loop.time() - began)
         self._pump(session)
 
     def _fail(self, session: Session) -> None:

@@ -11,15 +11,17 @@ import socket
 import tempfile
 from collections import Counter
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 from weakref import WeakSet
 
 from websockets.asyncio.server import Server as SocketServer
-from websockets.asyncio.server import ServerConnection, broadcast
+from websockets.asyncio.server import ServerConnection
 from websockets.asyncio.server import serve as listen
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import Frame, Opcode
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
@@ -293,9 +295,11 @@ class _Client:
         return 0 if transport is None else transport.get_write_buffer_size()
 
     def send(self, data: str | bytes) -> None:
-        # To one, but without a task that wakes for every frame; a socket that closes is left out.
-        if self._end is None:
-            broadcast((self._socket,), data)
+        # Without a task that wakes for every frame; a socket that closes is left out.
+        if self._end is None and self._socket.protocol.state is State.OPEN:
+            text = isinstance(data, str)
+            payload = data.encode() if isinstance(data, str) else data
+            self._socket.transport.write(_head(text, len(payload)) + payload)
 
     def end(self, code: int, reason: str) -> None:
         if self._end is None:
@@ -308,6 +312,13 @@ class _Client:
                 await self._socket.close(code, reason)
         except TimeoutError:
             self._socket.transport.abort()
+
+
+@lru_cache(maxsize=1024)
+def _head(text: bool, length: int) -> bytes:
+    """What goes before a message of so many bytes."""
+    whole = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
+    return whole[: len(whole) - length]
 
 
 def _address(socket: ServerConnection) -> str:
