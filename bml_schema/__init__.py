@@ -32,7 +32,7 @@ from bml_schema.behaviours import (
     Wait,
 )
 from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS, parse, read
-from bml_schema.errors import BMLError, BMLSyntaxError, Place, Problem
+from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
 from bml_schema.feedback import (
     BlockPrediction,
     BlockProgress,
@@ -82,6 +82,7 @@ __all__ = [
     "After",
     "AudioFile",
     "BMLError",
+    "BMLSizeError",
     "BMLSyntaxError",
     "Before",
     "Behaviour",

@@ -10,7 +10,7 @@ from itertools import count
 
 from lxml import etree
 
-from bml_schema.errors import BMLError, BMLSyntaxError, shown
+from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, shown
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MOST_BEHAVIOURS, read_block
 from bml_schema.shape import local
@@ -54,7 +54,8 @@ def parse(
         The block. What was dropped from it is in its `problems`.
 
     Raises:
-        BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big, not one document.
+        BMLError: no block: not well-formed (BMLSyntaxError), no usable id, too big
+            (BMLSizeError), not one document.
     """
     first: Block | BMLError | None = None
     for found in read(text, vocabulary, most_bytes=most_bytes, most_behaviours=most_behaviours):

@@ -22,6 +22,7 @@ from bml_schema.errors import (
     CUSTOM_ATTRIBUTE_NOT_SUPPORTED,
     CUSTOM_BEHAVIOR_NOT_SUPPORTED,
     BMLError,
+    BMLSizeError,
     Fault,
     Place,
     Problem,

@@ -57,6 +57,7 @@ class Player:
         cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
         prosody: nods, brows, blinks and looks that go with what is said; part of what is idle.
         takes: index of a character -> what moves its face (`Face.takes`); None: that is not known.
+        refuses: (block, what was planned) -> why it is not to be played; None where it is.
 
     Attributes:
         revision: rises whenever frames change that were already computed.
@@ -77,6 +78,7 @@ class Player:
         cooccurrence: str = "on",
         prosody: bool = True,
         takes: Callable[[int], Sequence[str]] | None = None,
+        refuses: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
         self.kinds = kinds
         self._takes = takes
@@ -94,7 +96,7 @@ class Player:
         self.history = history
         self.rules = chosen(cooccurrence)
         self._characters: list[Character] = [Character(None)]
-        self._blocks = Ensemble(kinds, self._characters)
+        self._blocks = Ensemble(kinds, self._characters, refuses)
 
     @property
     def revision(self) -> int:

@@ -233,11 +233,22 @@ class Settings:
     keep: float = _setting(60.0, _number(float, 0, 1e9), "seconds a named session outlives its connections")
     drain: float = _setting(5.0, _number(float, 0, 3600), "seconds given to what plays when the service ends")
     max_message: int = _setting(16 * 2**20, _number(int, 1, 2**31), "bytes of one WebSocket message")
-    max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of one document")
+    max_document: int = _setting(2**20, _number(int, 1, 2**31), "bytes of BML in one message")
+    max_elements: int = _setting(100_000, _number(int, 1, 10**7), "XML elements in one message")
     max_behaviours: int = _setting(10_000, _number(int, 1, 10**6), "behaviours in one block")
-    max_blocks: int = _setting(1_000, _number(int, 1, 10**6), "blocks playing or waiting in one session")
-    max_connections: int = _setting(2_000, _number(int, 1, 10**6), "WebSockets open from one address")
+    max_duration: float = _setting(
+        1_800.0, _number(float, 1, 1e9), "seconds that one block is planned to last, from its start"
+    )
+    max_blocks: int = _setting(
+        1_000, _number(int, 1, 10**6), "blocks playing or waiting in one session, and messages with more"
+    )
+    max_connections: int = _setting(
+        2_000, _number(int, 1, 10**6), "connections open from one address, at each door"
+    )
     max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service")
+    max_address_sessions: int = _setting(
+        2_000, _number(int, 1, 10**6), "sessions that one address has opened and that still live"
+    )
     max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
     max_pixels: float = _setting(
         125e6, _number(float, 256, 1e12), "pixels a second of one stream of pictures: 1920x1080 at 60"
@@ -247,7 +258,9 @@ class Settings:
         500.0, _number(float, 0.1, 1e6), "messages a second that are read from one connection"
     )
     max_memory: int | None = _setting(
-        None, _optional(_number(int, 64, 10**7)), "MB above which nobody is let in any more; none: no limit"
+        None,
+        _optional(_number(int, 64, 10**7)),
+        "MB of the process above which no session is opened any more; none: no limit",
     )
 
     def __post_init__(self) -> None:

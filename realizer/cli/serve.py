@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import click
 
 from realizer.cli import options
+from realizer.settings import Settings
 
 __all__: list[str] = []
+
+# What a service takes is told as its settings tell it.
+LIMITS = [f for f in fields(Settings) if f.name.startswith("max_") or f.name in ("keep", "drain")]
+
+
+def limits(command: Callable[..., None]) -> Callable[..., None]:
+    """A flag for each limit; the settings read its value, as they read a variable's."""
+    for one in reversed(LIMITS):
+        default = "none" if one.default is None else str(one.default).removesuffix(".0")
+        says = one.metadata["says"].partition("; none:")[0]
+        flag = f"--{one.name.replace('_', '-')}"
+        command = click.option(flag, metavar="N", help=f"{says[0].upper()}{says[1:]}.  [default: {default}]")(
+            command
+        )
+    return command
 
 
 @click.command()
@@ -87,6 +105,7 @@ __all__: list[str] = []
 @options.prosody
 @options.cooccurrence
 @options.mapping
+@limits
 @click.option(
     "--config", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="A TOML file of settings."
 )
@@ -98,7 +117,7 @@ def serve(config: Path | None, **flags: Any) -> None:
     """
     from realizer.server.serve import run
     from realizer.server.serve import serve as start
-    from realizer.settings import Settings, SettingsError
+    from realizer.settings import SettingsError
     from realizer.speech import find_voice
 
     try:

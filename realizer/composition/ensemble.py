@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from bml_schema import Block, Feedback
@@ -37,6 +37,7 @@ class Ensemble:
     Args:
         kinds: tag -> Kind.
         characters: whose base states the blocks shift; shared with who made them.
+        refuses: (block, what was planned) -> why it is not to be played; None where it is.
 
     Attributes:
         course: when the accepted ones play.
@@ -44,8 +45,14 @@ class Ensemble:
         reports: the feedback that is owed.
     """
 
-    def __init__(self, kinds: Mapping[str, Kind], characters: Sequence[Character]) -> None:
+    def __init__(
+        self,
+        kinds: Mapping[str, Kind],
+        characters: Sequence[Character],
+        refuses: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
+    ) -> None:
         self.kinds = kinds
+        self._refuses = refuses
         self.course = Course(kinds, characters)
         self.cast = self.course.cast
         self.reports = self.course.reports
@@ -91,6 +98,8 @@ class Ensemble:
         self._expected.arrive(block)
         if planned.schedule.failed:
             return self._refuse(block, planned.schedule.warnings[0], now)
+        if (words := self._refuses(block, planned.schedule)) is not None:
+            return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
         for earlier in ended:
             self.course.stop(earlier, now)
         for name in block.interrupt:

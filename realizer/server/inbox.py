@@ -6,32 +6,27 @@ import logging
 import re
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
-from bml_schema import Block, BMLError, read
+from bml_schema import Block, BMLError, BMLSizeError, read
 from realizer.behaviours import VOCABULARY
 from realizer.pipeline import warning_of
 from realizer.scheduling.timing import Warning
-from realizer.settings import raises
+from realizer.server.limits import too_large
+from realizer.settings import Settings, raises
 
 __all__: list[str] = []
 
 log = logging.getLogger(__name__)
 
-# Messages that may wait to be read; a client that sends faster is told.
-MOST = 1_000
-
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})[\"']")
 
 
 class Inbox:
-    """Documents that have come and are not prepared yet.
+    """Documents that have come and are not prepared yet: no more messages than blocks may wait."""
 
-    Args:
-        longest: bytes of BML in a message.
-    """
-
-    def __init__(self, longest: int) -> None:
-        self._longest = longest
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
         self._unread: deque[Iterator[Block | BMLError]] = deque()
 
     def __bool__(self) -> bool:
@@ -39,16 +34,15 @@ class Inbox:
 
     def put(self, text: str) -> Warning | None:
         """Take a message; or say why it is not taken."""
-        size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
-        if len(self._unread) >= MOST:
-            words = f"{MOST} messages wait to be read: wanted fewer at a time"
-        elif size > self._longest:
-            words = f"wanted at most {self._longest} bytes of BML in a message, got {size}"
-            words = f"{words} {raises('max_document')}"
-        else:
-            self._unread.append(read(text, VOCABULARY))
-            return None
-        return Warning(name_of(text), "PARSING_FAILURE", words)
+        limits = self._settings
+        if len(self._unread) >= limits.max_blocks:
+            words = f"{limits.max_blocks} messages wait to be read: wanted fewer at a time"
+            return Warning(name_of(text), "PARSING_FAILURE", f"{words} {raises('max_blocks')}")
+        if (beyond := too_large(text, limits)) is not None:
+            return Warning(name_of(text), "PARSING_FAILURE", beyond)
+        found = read(text, VOCABULARY, most_bytes=limits.max_document, most_behaviours=limits.max_behaviours)
+        self._unread.append(found)
+        return None
 
     def next(self) -> Block | Warning | None:
         """The next block, or why there is none; None where all is read."""
@@ -59,8 +53,13 @@ class Inbox:
                 log.exception("a document could not be read")
                 self._unread.popleft()
                 return Warning("<no id>", "PARSING_FAILURE", "internal error while reading")
+            if isinstance(item, Block):
+                return item
             if item is not None:
-                return item if isinstance(item, Block) else warning_of(item)
+                refused = warning_of(item)
+                if isinstance(item, BMLSizeError):  # of behaviours: the bytes were counted before
+                    refused = replace(refused, text=f"{refused.text} {raises('max_behaviours')}")
+                return refused
             self._unread.popleft()
         return None
 

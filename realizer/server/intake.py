@@ -44,7 +44,7 @@ class Intake:
         self.preparation = Preparation()
         self.speeches = Speeches(player)
         self.orders = Orders(player, self.preparation)
-        self.inbox = Inbox(settings.max_document)
+        self.inbox = Inbox(settings)
         self._name = name
         self._settings = settings
         self._player = player

@@ -1,16 +1,37 @@
-"""A block or a stream in, which limit of the service it is beyond, and where that is set, out."""
+"""A text, block, plan or stream in, which limit of the service it is beyond, and where that is set, out."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Collection
+from pathlib import Path
 
 from bml_schema import Block, Speech
+from realizer.composition.retiming import anticipated
+from realizer.scheduling.timing import Schedule
 from realizer.settings import Settings, raises
 
-__all__ = ["MAX_CHARACTERS", "beyond", "too_many_pixels"]
+__all__ = ["MAX_CHARACTERS", "beyond", "too_large", "too_long", "too_many_pixels", "used_up"]
+
+MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
 
 # The index of a character is one byte on the wire; sixteen faces in one session are a crowd.
 MAX_CHARACTERS = 16
+
+
+def too_large(text: str, settings: Settings) -> str | None:
+    """Why documents in one message are not read; None where they are."""
+    size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
+    if size > settings.max_document:
+        words = f"wanted at most {settings.max_document} bytes of BML in a message, got {size}"
+        return f"{words} {raises('max_document')}"
+    # Whatever else begins so is counted with them: nobody's comments are that many.
+    count = text.count("<") - text.count("</")
+    if count > settings.max_elements:
+        words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
+        return f"{words} {raises('max_elements')}"
+    return None
 
 
 def beyond(block: Block, settings: Settings, busy: int, characters: Collection[str | None]) -> str | None:
@@ -20,10 +41,7 @@ def beyond(block: Block, settings: Settings, busy: int, characters: Collection[s
         busy: how many blocks play or wait there.
         characters: those it has.
     """
-    count, longest = len(block.behaviours), _longest(block)
-    if count > settings.max_behaviours:
-        words = f"wanted at most {settings.max_behaviours} behaviours in a block, got {count}"
-        return f"{words} {raises('max_behaviours')}"
+    longest = _longest(block)
     if longest > settings.max_speech:
         words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
         return f"{words} {raises('max_speech')}"
@@ -35,6 +53,17 @@ def beyond(block: Block, settings: Settings, busy: int, characters: Collection[s
     return None
 
 
+def too_long(block: Block, schedule: Schedule, settings: Settings) -> str | None:
+    """Why what was planned is not played; None where it is.
+
+    A block that is tied to what a client anticipates lasts until the client says.
+    """
+    if schedule.duration <= settings.max_duration or anticipated(block):
+        return None
+    words = f"wanted a block of at most {settings.max_duration:g} s, got {schedule.duration:.1f}"
+    return f"{words} {raises('max_duration')}"
+
+
 def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings) -> str | None:
     """Why pictures of that size are not drawn at that rate; None where they are."""
     pixels = size[0] * size[1] * fps
@@ -42,6 +71,27 @@ def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings) -> st
         return None
     words = f"wanted at most {settings.max_pixels:g} pixels a second, got {pixels:g}"
     return f"{words}, {size[0]}x{size[1]} at {fps:g} fps {raises('max_pixels')}"
+
+
+def used_up(settings: Settings) -> str | None:
+    """Why there is no memory for one more session; None where there is."""
+    if settings.max_memory is None or (used := _memory()) <= settings.max_memory:
+        return None
+    return f"the service uses {used:.0f} MB: wanted at most {settings.max_memory} {raises('max_memory')}"
+
+
+def _memory() -> float:
+    """Megabytes of this process in memory; the most there ever were, or 0, where the system says no more."""
+    try:
+        return int(MEMORY.read_text("ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    except (OSError, ValueError, IndexError):
+        pass
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0.0
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most / 1e6 if sys.platform == "darwin" else most * 1024 / 1e6
 
 
 def _longest(block: Block) -> int:

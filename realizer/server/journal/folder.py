@@ -85,10 +85,11 @@ def _write(file: FileIO, line: str) -> None:
         raise
 
 
-# Settings that change what is seen and heard.
+# Settings that change what is seen and heard, or what is taken at all.
 SHOWN = (
     *("face", "deformer", "voice", "language", "fps", "seed", "idle", "prosody", "cooccurrence"),
     *("mapping", "media", "expressions"),
+    *("max_document", "max_elements", "max_behaviours", "max_duration", "max_blocks", "max_speech"),
 )
 
 

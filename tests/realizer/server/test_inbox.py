@@ -8,6 +8,7 @@ from bml_schema import Block
 from realizer.scheduling.timing import Warning
 from realizer.server import inbox
 from realizer.server.inbox import Inbox
+from realizer.settings import Settings
 
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'
 
@@ -20,7 +21,7 @@ def read(box: Inbox) -> list[Block | Warning]:
 
 
 def test_documents_come_out_in_order_with_faults_where_they_stand() -> None:
-    box = Inbox(1000)
+    box = Inbox(Settings())
     assert box.put(WAIT.format("a") + "<bml id='x'><oops" + WAIT.format("b")) is None
     assert box.put(WAIT.format("c")) is None
     items = read(box)
@@ -30,7 +31,7 @@ def test_documents_come_out_in_order_with_faults_where_they_stand() -> None:
 
 
 def test_a_message_that_is_too_long_is_refused_by_name() -> None:
-    box = Inbox(40)
+    box = Inbox(Settings(max_document=40))
     refused = box.put(WAIT.format("a"))
     assert refused is not None
     assert (refused.id, refused.type) == ("a", "PARSING_FAILURE")
@@ -38,19 +39,42 @@ def test_a_message_that_is_too_long_is_refused_by_name() -> None:
     assert not box
 
 
-def test_too_many_messages_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inbox, "MOST", 1)
-    box = Inbox(1000)
+def test_too_many_messages_are_refused() -> None:
+    box = Inbox(Settings(max_blocks=1))
     assert box.put(WAIT.format("a")) is None
-    assert "wanted fewer" in str(getattr(box.put(WAIT.format("b")), "text", ""))
+    refused = box.put(WAIT.format("b"))
+    assert refused is not None
+    assert "wanted fewer at a time (REALIZER_MAX_BLOCKS sets it)" in refused.text
     box.clear()
     assert read(box) == []
 
 
-def test_a_bug_of_the_reader_costs_one_message(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
-    box = Inbox(1000)
+def test_too_many_behaviours_are_refused_where_they_stand_and_reading_goes_on() -> None:
+    box = Inbox(Settings(max_behaviours=1))
+    two = '<bml id="two"><wait id="a"/><wait id="b"/></bml>'
+    assert box.put(two + WAIT.format("one")) is None
+    refused, read_on = read(box)
+    assert isinstance(refused, Warning)
+    assert refused.id == "two"
+    assert "wanted at most 1 behaviours" in refused.text
+    assert refused.text.endswith("got 2 (REALIZER_MAX_BEHAVIOURS sets it)")
+    assert isinstance(read_on, Block)
 
-    def broken(*_):
+
+def test_what_the_limits_let_in_is_read_however_large() -> None:
+    waits = "".join(f'<wait id="w{k}"/>' for k in range(10_001))
+    text = f'<bml id="b"><!--{"x" * 2**20}-->{waits}</bml>'
+    box = Inbox(Settings(max_document=2 * 2**20, max_behaviours=20_000))
+    assert box.put(text) is None
+    (block,) = read(box)
+    assert isinstance(block, Block)
+    assert len(block.behaviours) == 10_001
+
+
+def test_a_bug_of_the_reader_costs_one_message(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
+    box = Inbox(Settings())
+
+    def broken(*_, **__):
         raise RuntimeError("a bug")
         yield
 

@@ -127,6 +127,45 @@ def test_a_block_with_too_many_behaviours_is_refused() -> None:
     assert (warning.id, "at most 2" in warning.text) == ("b", True)
 
 
+def test_a_block_that_would_last_too_long_is_refused_and_ends_nobody() -> None:
+    driver = Driver(max_duration=60)
+    driver.send('<bml id="a"><wait id="w" duration="50"/></bml>')
+    client = driver.send('<bml id="b" composition="REPLACE"><wait id="w" duration="60.1"/></bml>')
+    (warning,) = warnings(client)
+    assert (warning.id, warning.type) == ("b", "CANNOT_CREATE_BEHAVIOR")
+    assert "REALIZER_MAX_DURATION" in warning.text
+    assert "a:end" not in client.ids
+    driver.send('<bml id="b"><wait id="w" duration="60"/></bml>')  # whose id is free
+    driver.run(61.0)
+    assert {"a:end", "b:end"} <= set(client.ids)
+
+
+@pytest.mark.parametrize(
+    "holds",
+    [
+        '<faceShift id="f" end="1"><lexeme lexeme="SMILE"/></faceShift>',
+        '<gazeShift id="g" target="left" end="1"/>',
+        '<realizer:mood xmlns:realizer="urn:bml-realizer:1" id="m" name="joy"/>',
+    ],
+)
+def test_a_base_state_holds_for_longer_than_any_block_may_last(holds: str) -> None:
+    driver = Driver(max_duration=2)
+    client = driver.send(f'<bml id="b">{holds}</bml>')
+    driver.run(10.0)
+    assert "b:end" in client.ids
+    assert not [w for w in warnings(client) if "MAX_DURATION" in w.text]
+
+
+def test_a_speech_that_is_left_open_is_no_block_that_lasts_too_long() -> None:
+    driver = Driver(max_duration=2)
+    client = driver.send({"type": "speech", "id": "turn", "append": "Hello. "})
+    driver.run(10.0)
+    driver.send({"type": "speech", "id": "turn", "append": "There. ", "close": True})
+    driver.run(20.0)
+    assert not warnings(client)
+    assert "turn:end" in client.ids
+
+
 def test_too_many_blocks_at_a_time_are_refused() -> None:
     driver = Driver(max_blocks=2)
     for name in "abc":
@@ -723,7 +762,7 @@ def test_one_who_joins_a_session_that_another_process_has_is_sent_there_with_all
             raise Lost("another process has it")
 
     driver = Driver(named=True)
-    driver.session.notes = Notes("test", [Taken(":memory:")])
+    driver.session.notes = Notes("test", Taken(":memory:"))
     driver.join(2)
     assert driver.closed == [Close(k, 1012, "another process has it") for k in (1, 2)]
 

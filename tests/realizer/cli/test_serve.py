@@ -1,0 +1,43 @@
+"""What `serve` is told on the command line: every limit, and who may come in."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from realizer.cli import cli
+from realizer.server import serve
+from realizer.settings import Settings
+
+
+def told(monkeypatch: pytest.MonkeyPatch, *args: str) -> Settings:
+    """The settings that a service would be started with."""
+    got: list[Any] = []
+    monkeypatch.setattr(serve, "serve", got.append)
+    monkeypatch.setattr(serve, "run", lambda service: None)
+    done = CliRunner().invoke(cli, ["serve", "--voice", "silent", *args], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    (settings,) = got
+    return settings
+
+
+LIMITS = [f for f in fields(Settings) if f.name.startswith("max_")]
+
+
+@pytest.mark.parametrize("limit", LIMITS, ids=lambda f: f.name)
+def test_every_limit_has_a_flag(limit: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = told(monkeypatch, f"--{limit.name.replace('_', '-')}", "321")
+    assert getattr(settings, limit.name) == 321
+    assert told(monkeypatch) == Settings(voice="silent")
+
+
+@pytest.mark.parametrize("limit", LIMITS, ids=lambda f: f.name)
+def test_a_wrong_limit_is_told_with_what_was_wanted(limit: Any) -> None:
+    flag = f"--{limit.name.replace('_', '-')}"
+    done = CliRunner().invoke(cli, ["serve", flag, "much"])
+    assert done.exit_code == 2
+    assert f"setting {limit.name}: wanted a" in done.stderr
+    assert "got 'much'" in done.stderr
