@@ -6,9 +6,10 @@
     line out         {"bytes": n, "last": whether the process ends now, ...} and n bytes; or {"error": text}
 
 The engine's file has `load(arguments)`, which gives an object with `hello()`, `operations` (name -> function
-of the request, giving head and body) and `drifts`: whether what it says depends on what it said before. One
-that drifts is made ready once and each request is served by a fork of that (or, where there is no fork, by a
-fresh process). Nothing of the realizer is imported, so that it starts at once and no licence spreads.
+of the request, giving head and the pieces of the body) and `drifts`: whether what it says depends on what it
+said before. One that drifts is made ready once and each request is served by a fork of that (or, where there
+is no fork, by a fresh process). Nothing of the realizer is imported, so that it starts at once and no licence
+spreads.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import os
 import select
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,14 +37,16 @@ def answer(engine: Any, line: bytes, out: int, last: bool = False) -> None:
         request = json.loads(line)
         head, body = engine.operations[request["op"]](request)
     except Exception as error:
-        head, body = {"error": str(error) or type(error).__name__}, b""
-    write(out, {"bytes": len(body), **head, "last": last}, body)
+        head, body = {"error": str(error) or type(error).__name__}, []
+    write(out, {"bytes": sum(map(len, body)), **head, "last": last}, body)
 
 
-def write(out: int, head: dict[str, Any], body: bytes = b"") -> None:
-    data = memoryview(json.dumps(head).encode() + b"\n" + body)
-    while data:
-        data = data[os.write(out, data) :]
+def write(out: int, head: dict[str, Any], body: Sequence[bytes] = ()) -> None:
+    # Not joined: a fork pays for each page of memory that it is the first to write.
+    for part in (json.dumps(head).encode() + b"\n", *body):
+        data = memoryview(part)
+        while data:
+            data = data[os.write(out, data) :]
 
 
 def requests() -> Iterator[bytes]:

@@ -11,9 +11,7 @@ loaded in a process of its own.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import ctypes
-import ctypes.util
 import os
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,6 +19,7 @@ from typing import Any, ClassVar
 __all__: list[str] = []
 
 LONGEST_PATH = 140  # bytes; espeak-ng keeps its data path in a buffer of 160 with names appended
+PIECE = 500  # ms of sound that we are called with at once
 LONGEST_SOUND = 1800  # s; a text that lasts longer is refused
 SYNCHRONOUS, PHONEME_EVENTS, PHONEME_IPA, DONT_EXIT = 2, 1, 2, 0x8000
 UTF8, SSML, END_PAUSE = 1, 0x10, 0x1000
@@ -77,7 +76,7 @@ class Engine:
 
     drifts = True
     # Spoken before any request, always the same: a fork of an engine that has spoken takes half the time.
-    first: ClassVar[dict[str, Any]] = {"text": "<speak>One, two.</speak>", "voice": "en-us", "wpm": 175}
+    first: ClassVar[dict[str, Any]] = {"text": "<speak>One, two.</speak>", "wpm": 175}
 
     def __init__(self, data: str | None) -> None:
         path, own_data = find_library()
@@ -102,18 +101,22 @@ class Engine:
                 os.chdir(data)
                 data = "."
         flags = PHONEME_EVENTS | PHONEME_IPA | DONT_EXIT
-        self.rate = lib.espeak_Initialize(SYNCHRONOUS, 0, None if data is None else os.fsencode(data), flags)
+        folder = None if data is None else os.fsencode(data)
+        self.rate = lib.espeak_Initialize(SYNCHRONOUS, PIECE, folder, flags)
         if self.rate <= 0:
             raise RuntimeError(f"espeak-ng found no data in {data!r}")
 
-        with contextlib.suppress(RuntimeError):  # an installation without English
-            self.say(self.first)
+        self.voice = ""
+        self.voices = self._voices()
+        for voice in self.voices:
+            if any(tag == "en-us" for _, tag in voice["languages"]):  # the voice that is asked for most
+                self.say({**self.first, "voice": voice["id"]})
         self.operations = {"say": self.say, "phonemes": self.phonemes}
 
     def hello(self) -> dict[str, Any]:
-        return {"rate": self.rate, "voices": self.voices(), "variants": self.variants}
+        return {"rate": self.rate, "voices": self.voices, "variants": self.variants}
 
-    def voices(self) -> list[dict[str, Any]]:
+    def _voices(self) -> list[dict[str, Any]]:
         found = []
         entries = self.lib.espeak_ListVoices(None)
         index = 0
@@ -129,7 +132,7 @@ class Engine:
             index += 1
         return found
 
-    def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+    def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         sound: list[bytes] = []
         events: list[tuple[int, int, int, str]] = []
         heard = 0
@@ -155,9 +158,9 @@ class Engine:
         self.lib.espeak_Synth(document, len(document), 0, 1, 0, UTF8 | SSML | END_PAUSE, None, None)
         if heard > LONGEST_SOUND * self.rate:
             raise RuntimeError(f"the text lasts longer than {LONGEST_SOUND} s")
-        return {"events": events}, b"".join(sound)
+        return {"events": events}, sound
 
-    def phonemes(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+    def phonemes(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         self._choose(request["voice"])
         answers = []
         for word in request["words"]:
@@ -170,11 +173,14 @@ class Engine:
                 )
                 ipa += "_" + text(clause or b"")
             answers.append([part for part in ipa.replace(" ", "_").split("_") if part])
-        return {"phonemes": answers}, b""
+        return {"phonemes": answers}, []
 
     def _choose(self, voice: str) -> None:
+        if voice == self.voice:  # reading it again takes a tenth of what a sentence does
+            return
         if self.lib.espeak_SetVoiceByName(voice.encode()) != 0:
             raise RuntimeError(f"espeak-ng has no voice {voice!r}")
+        self.voice = voice
 
 
 def find_library() -> tuple[str, str | None]:
@@ -182,6 +188,8 @@ def find_library() -> tuple[str, str | None]:
     try:
         import espeakng_loader
     except ImportError:
+        import ctypes.util  # brings so much along that a fork took half as long again
+
         path = ctypes.util.find_library("espeak-ng")
         if path is None:
             raise RuntimeError("espeak-ng is not installed") from None

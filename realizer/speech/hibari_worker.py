@@ -53,8 +53,8 @@ class Speaker:
         self.say({"phonemes": "hi", "speed": 1.0, "pitch": 1.0})
         return {"rate": self.hibari.sample_rate, "durations": self.has_durations}
 
-    def read(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-        return {"texts": [self.reading(text) for text in request["texts"]]}, b""
+    def read(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        return {"texts": [self.reading(text) for text in request["texts"]]}, []
 
     def reading(self, text: str) -> list[list[tuple[str, str, bool]]]:
         from hibari.g2p.normalize import normalize
@@ -66,7 +66,7 @@ class Speaker:
             sentences += split(words)
         return sentences
 
-    def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+    def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         import numpy as np
         from hibari import dsp
 
@@ -89,7 +89,7 @@ class Speaker:
             lead = next(lengths)
             each = [next(lengths) if sign in known else 0 for sign in request["phonemes"]]
             head = {"lead": lead, "signs": each, "tail": next(lengths)}
-        return head, sound.astype("<f4").tobytes()
+        return head, [sound.astype("<f4").tobytes()]
 
 
 def split(words: list[tuple[str, str, bool]]) -> list[list[tuple[str, str, bool]]]:
