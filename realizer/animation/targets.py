@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 from realizer import tables
 
@@ -50,6 +50,7 @@ def AU_NAMES() -> tuple[str, ...]:
     return _au_names()
 
 
+@lru_cache(maxsize=512)  # more than there are
 def au(number: int, side: str = "BOTH") -> tuple[Target, ...]:
     """The columns of one AU; side is LEFT, RIGHT or BOTH (the character's). A midline AU has one column.
 

@@ -272,7 +272,7 @@ class Playing:
     def _placed(self, behaviour: str, channels: Iterable[Channel]) -> tuple[Channel, ...]:
         """Channels of a behaviour on the session clock."""
         name = f"{self.block.id}:{behaviour}"
-        return tuple(c.shifted(self.start).named(name) for c in channels)
+        return tuple([c.shifted(self.start, name) for c in channels])
 
     def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
         """End behaviours at `now`: what is shown relaxes without a jump, what has not begun never comes.
