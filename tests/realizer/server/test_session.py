@@ -904,3 +904,48 @@ def test_time_that_passes_while_a_voice_speaks_again_is_made_up_for() -> None:
     times = {f.id: f.global_time for f in told.feedback if hasattr(f, "global_time")}
     assert times["b:s:end"] == pytest.approx(4.0)
     assert times["b:start"] == times["b:s:start"] == pytest.approx(0.6)
+
+
+CALM = """<bml id="{id}" composition="REPLACE"><head id="n" lexeme="NOD" start="0.3"/>
+<faceLexeme id="f" lexeme="SMILE" start="n:stroke" end="1.1"/><gaze id="g" target="cup" end="0.9"/></bml>"""
+
+
+def test_a_session_that_is_woken_at_its_deadlines_tells_what_one_does_that_always_looks(drive) -> None:
+    def play(step: float | None) -> list[str | bytes]:
+        driver = drive()
+        for message in (
+            {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}},
+            {"type": "subscribe", "stream": "fap", "fps": 30},
+            {"type": "subscribe", "stream": "au", "fps": 12.5, "encoding": "json"},
+        ):
+            driver.send(message)
+        for k, at in enumerate((0.2, 0.9, 4.0)):
+            while step is not None and driver.now + step < at:
+                driver.run(driver.now + step)
+                driver.session.tick(driver.opened + driver.now)
+                driver.collect()
+            driver.run(at)
+            driver.send(CALM.format(id=f"b{k}"))
+        driver.run(9.0)
+        return driver.clients[1].messages
+
+    assert play(None) == play(0.007)
+
+
+def test_frames_go_on_while_documents_wait_to_be_read(driver) -> None:
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 25})
+    now = driver.opened
+    for k in range(3):
+        driver.session.receive(1, CALM.format(id=f"b{k}"), now)
+    driver.collect()
+    assert driver.session.reads
+    for frame in range(1, 6):
+        assert driver.session.next_due() == pytest.approx(now + frame / 25)
+        driver.session.tick(now + frame / 25, reads=False)
+        driver.collect()
+    assert [frame.frame for frame in driver.clients[1].frames] == list(range(6))
+    assert driver.session.reads
+    driver.run(0.3)
+    assert not driver.session.reads
+    assert driver.clients[1].ids[-1] != "prediction"
+    assert {"b0:end", "b1:end", "b2:start"} <= set(driver.clients[1].ids)

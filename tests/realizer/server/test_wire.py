@@ -18,6 +18,7 @@ from realizer.server.wire import (
     json_frame,
     pack,
     pack_clip,
+    pack_frames,
     unpack,
     unpack_clip,
 )
@@ -35,6 +36,25 @@ def test_a_frame_comes_back_as_it_was(kind, frame, time, payload, character, for
     got = unpack(pack(kind, frame, time, payload, character=character, forget=forget))
     assert (got.kind, got.frame, got.time, got.payload) == (kind, frame, time, payload)
     assert (got.character, got.forget) == (character, forget)
+
+
+@given(
+    kind=st.sampled_from([FrameKind.FAP, FrameKind.AU]),
+    first=st.integers(0, 2**31),
+    count=st.integers(0, 5),
+    width=st.integers(1, 70),
+    character=st.integers(0, 255),
+)
+def test_frames_packed_together_are_those_packed_alone(kind, first, count, width, character) -> None:
+    dtype = "<i4" if kind is FrameKind.FAP else "<f4"
+    rows = np.arange(count * width).reshape(count, width).astype(dtype)
+    times = (first + np.arange(count)) / 25
+    whole, size = pack_frames(kind, first, times, rows, character=character)
+    alone = [
+        pack(kind, first + k, float(times[k]), rows[k].tobytes(), character=character) for k in range(count)
+    ]
+    assert [whole[k * size : (k + 1) * size] for k in range(count)] == alone
+    assert len(whole) == count * size
 
 
 def test_the_header_is_sixteen_bytes_little_endian() -> None:
