@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,11 +40,33 @@ OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
 PARAMETERS = {"intensity": "intensity", "amount": "intensity"}
 
 
+class Feeling(NamedTuple):
+    """What an element asks for: a word of one of the sets, in lower case, or a place."""
+
+    name: str | None
+    profiles: str
+    angle: float | None
+    activation: float | None
+    valence: float | None
+    arousal: float | None
+
+    @classmethod
+    def of(cls, node: Emotion | Mood) -> Feeling:
+        shown = node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
+        name = None if node.name is None else " ".join(node.name.split()).lower()
+        return cls(name, shown, node.angle, node.activation, node.valence, node.arousal)
+
+
 def timing(node: Emotion, world: World) -> Timing:
     """As its archetype's face lexeme; between two, as much of each as shows."""
+    return _timing(Feeling.of(node))
+
+
+@lru_cache(maxsize=1000)
+def _timing(feeling: Feeling) -> Timing:
     parts = [
         (share, preferred("faceLexeme", emotion_faces()[name].lexeme))
-        for name, share in _mix(node)[0].items()
+        for name, share in _mix(feeling)[0].items()
     ]
     if not parts:
         return preferred("faceLexeme")
@@ -68,21 +93,31 @@ def expand_mood(node: Mood, times: Float64, world: World) -> tuple[Channel, ...]
 
 def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
     """An unknown word, and one without a face, are fatal, an unknown profile is not."""
-    known = node.profile in (*OWN, *PUBLISHED)
     if node.name is not None:
         try:
-            profile_of(node.name, _set(node))
+            _has_profile(Feeling.of(node))
         except UnknownWordError as wrong:
             if node.name[-1:].isdecimal():
                 return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)
             return (poses.unknown("name", node.name, known_words()),)
         except ValueError as wrong:
             return (Fault("CANNOT_CREATE_BEHAVIOR", f"name: {wrong}"),)
-    if not known:
+    if node.profile not in (*OWN, *PUBLISHED):
         wanted = ", ".join(name for name in (*OWN, *PUBLISHED) if name)
         text = f"profile: wanted one of {wanted}, got {node.profile!r}; shown as usual"
         return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
     return ()
+
+
+@lru_cache(maxsize=1000)
+def _has_profile(feeling: Feeling) -> bool:
+    """True.
+
+    Raises:
+        UnknownWordError, ValueError: as `realizer.emotion.emotion`; those are not kept.
+    """
+    profile_of(feeling.name or "", feeling.profiles)
+    return True
 
 
 def claims_of_mood(node: Mood, world: World) -> frozenset[str]:
@@ -105,11 +140,7 @@ def values_of(node: Emotion | Mood) -> dict[Target, float]:
             found = profile_of(node.name or "", node.profile)
         frame = found.frame() if node.seed is None else found.draw(node.seed)
         return {fap(number): node.intensity * float(frame[number - 1]) for number in found.ranges}
-    parts, strength = _mix(node)
-    aus: dict[tuple[int, str], float] = {}
-    for name, share in parts.items():
-        for cell, value in emotion_faces()[name].aus.items():
-            aus[cell] = aus.get(cell, 0.0) + share * strength * value
+    aus = _aus(Feeling.of(node))
     return poses.columns(aus if node.seed is None else _drawn(aus, node.seed), node.intensity)
 
 
@@ -123,24 +154,30 @@ def _drawn(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, s
     return {cell: value * float(factors[cell[0]]) for cell, value in aus.items()}
 
 
-def _set(node: Emotion | Mood) -> str:
-    """The set of profiles that it is shown by."""
-    return node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
+@lru_cache(maxsize=1000)
+def _aus(feeling: Feeling) -> Mapping[tuple[int, str], float]:
+    """(AU, side) -> 0..1 at intensity 1, of what is no published profile."""
+    parts, strength = _mix(feeling)
+    aus: dict[tuple[int, str], float] = {}
+    for name, share in parts.items():
+        for cell, value in emotion_faces()[name].aus.items():
+            aus[cell] = aus.get(cell, 0.0) + share * strength * value
+    return MappingProxyType(aus)
 
 
-def _mix(node: Emotion | Mood) -> tuple[Mapping[str, float], float]:
+def _mix(feeling: Feeling) -> tuple[Mapping[str, float], float]:
     """{archetype: its share}, and how strongly they show: 1 as drawn; ({}, 0) for the neutral face.
 
     A place is as strong as its activation beside the rim's, or as it is far from the middle of valence and
     arousal. A word is a kind of face, as strong as `strength_of` has it; `intensity` is how much of it shows.
     """
-    if node.angle is not None:
-        return shares(node.angle), strength_at(node.activation)
-    if node.valence is not None and node.arousal is not None:
-        angle, away = place_of_affect(node.valence, node.arousal)
+    if feeling.angle is not None:
+        return shares(feeling.angle), strength_at(feeling.activation)
+    if feeling.valence is not None and feeling.arousal is not None:
+        angle, away = place_of_affect(feeling.valence, feeling.arousal)
         parts = shares(angle, "own", "affect")
         return {name: share for name, share in parts.items() if name in emotion_faces()}, away
-    place = place_of(node.name or "", _set(node))
+    place = place_of(feeling.name or "", feeling.profiles)
     if place is None:
         return {}, 0.0
     return shares(place.angle, "own", place.ring), strength_of(place)

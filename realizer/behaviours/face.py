@@ -85,16 +85,18 @@ def _rise_and_fall(
     asked: Mapping[Target, Mapping[float, float]], times: Float64, source: str
 ) -> tuple[Channel, ...]:
     """Channels of target -> {overshoot: value}; times (4,) of start, attackPeak, relax, end."""
-    start, peak, relax, end = times
+    start, peak, relax, end = times.tolist()
     settled = peak + min(SETTLE, (relax - peak) / 2)
+    settling = np.array([start, peak, settled, relax, end])
     channels = []
     for target, curves in asked.items():
         for overshoot, value in curves.items():
-            keys = [(start, 0.0), (peak, (1 + overshoot) * value), (relax, value), (end, 0.0)]
+            highest = (1 + overshoot) * value
             if overshoot and settled > peak:
-                keys.insert(2, (settled, value))
-            key_times, key_values = np.array(keys, np.float64).T
-            channels.append(Channel(target, key_times, key_values, source=source))
+                keys, values = settling, np.array([0.0, highest, value, value, 0.0])
+            else:
+                keys, values = times, np.array([0.0, highest, value, 0.0])
+            channels.append(Channel(target, keys, values, source=source))
     return tuple(channels)
 
 
@@ -107,7 +109,7 @@ def _targets(node: Part, world: World) -> dict[Target, float]:
 
 def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
     faults = []
-    known = tables.by_number(tables.action_units())
+    known = poses.units()
     for part in parts:
         if isinstance(part, FaceLexeme):
             if part.lexeme not in world.library:

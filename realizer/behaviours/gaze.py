@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 
 from bml_schema import Gaze, GazeShift
-from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au, presence
 from realizer.arrays import Float64
+from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
-from realizer.behaviours.scene import angles, facts, limits, target_faults, turn
+from realizer.behaviours.scene import Turn, angles, facts, limits, target_faults, turn, within
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]
@@ -32,22 +33,27 @@ DIRECTIONS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Aim:
+REST: Turn = (0.0, 0.0)
+# How far a gaze takes eyes and head, at its keys: start, the eyes there, ready, relax, the eyes back, end.
+EYES_TAKEN = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
+HEAD_TAKEN = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+
+
+class Aim(NamedTuple):
     """Where a gaze ends.
 
     Attributes:
-        eyes: (2,) degrees, yaw and pitch of the eyes in the head.
-        head: (2,) degrees.
-        first: (2,) degrees, as far as the eyes get before the head follows.
-        away: (2,) degrees, where the eyes are when they have turned back and the head has not yet.
+        eyes: in the head.
+        head: by as much it turns.
+        first: as far as the eyes get before the head follows.
+        away: where the eyes are when they have turned back and the head has not yet.
         inward: degrees that each eye turns in.
     """
 
-    eyes: Float64
-    head: Float64
-    first: Float64
-    away: Float64
+    eyes: Turn
+    head: Turn
+    first: Turn
+    away: Turn
     inward: float
 
 
@@ -56,24 +62,29 @@ def aim(node: Gaze | GazeShift, world: World) -> Aim:
     eyes the rest as far as they turn, and the head again what is left.
     """
     yaw, pitch, inward = angles(node.target, world)
-    offset = node.offset_angle * np.array(DIRECTIONS[node.offset_direction])
-    angle = np.array([yaw, pitch]) + offset
+    left, up = DIRECTIONS[node.offset_direction]
     # Behind is behind on the nearer side.
-    angle = np.array([(angle[0] + 180.0) % 360.0 - 180.0, np.clip(angle[1], -90.0, 90.0)])
+    yaw = (yaw + node.offset_angle * left + 180.0) % 360.0 - 180.0
+    pitch = max(-90.0, min(90.0, pitch + node.offset_angle * up))
     shares = facts()["influence"]
     part = shares.get((node.influence or "default").upper(), shares["default"])["head"]
-    eyes_most, head_most = limits("eyes"), limits("head") * (part > 0)
-    size = float(np.hypot(*angle))
-    head = angle * part * size / (size + facts()["head"]["small"])
-    head = np.where(np.abs(angle - head) > eyes_most, angle - np.sign(angle) * eyes_most, head)
-    head = np.clip(head, -head_most, head_most)
+    eyes_most, head_most = limits("eyes"), limits("head") if part > 0 else REST
+    size = math.hypot(yaw, pitch)
+    asked = _of_head(yaw, part, size, eyes_most[0]), _of_head(pitch, part, size, eyes_most[1])
+    head = within(asked, head_most)
     return Aim(
-        eyes=np.clip(angle - head, -eyes_most, eyes_most),
+        eyes=within((yaw - head[0], pitch - head[1]), eyes_most),
         head=head,
-        first=np.clip(angle, -eyes_most, eyes_most),
-        away=np.clip(-head, -eyes_most, eyes_most),
+        first=within((yaw, pitch), eyes_most),
+        away=within((-head[0], -head[1]), eyes_most),
         inward=inward,
     )
+
+
+def _of_head(angle: float, part: float, size: float, eyes: float) -> float:
+    """What the head turns of an angle: its part, and what is left where the eyes turn no farther."""
+    head = angle * part * size / (size + facts()["head"]["small"])
+    return angle - math.copysign(eyes, angle) if abs(angle - head) > eyes else head
 
 
 def timing(node: Gaze, world: World) -> Timing:
@@ -88,40 +99,35 @@ def expand(node: Gaze, times: Float64, world: World) -> tuple[Channel, ...]:
     """There from start to ready, held to relax, back at end. While it lasts it takes eyes and head from the
     base gaze; EYES takes the eyes only.
     """
-    start, ready, relax, end = times
+    start, ready, relax, end = times.tolist()
     to = aim(node, world)
     there, back = start + _lead(ready - start), relax + _lead(end - relax)
-    rest = np.zeros(2)
     keys = np.array([start, there, ready, relax, back, end])
-    eyes = np.stack([rest, to.first, to.eyes, to.eyes, to.away, rest])
-    head = np.stack([rest, rest, to.head, to.head, to.head, rest])
-    moving = [
+    eyes = [REST, to.first, to.eyes, to.eyes, to.away, REST]
+    head = [REST, REST, to.head, to.head, to.head, REST]
+    taken = {"eyes": EYES_TAKEN}
+    if (node.influence or "").upper() != "EYES":
+        taken["head"] = HEAD_TAKEN
+    return (
         *turn("eyes", keys, eyes, layer=Layer.GAZE, source=node.id),
         *turn("head", keys, head, layer=Layer.GAZE, source=node.id),
-        *_converge(keys, np.array([0, 1, 1, 1, 0, 0]) * to.inward, Layer.GAZE, node.id),
-    ]
-    taken = {"eyes": (0, 1, 1, 1, 0, 0)}
-    if (node.influence or "").upper() != "EYES":
-        taken["head"] = (0, 0, 1, 1, 1, 0)
-    for region, values in taken.items():
-        moving.append(
-            Channel(presence(region), keys, np.array(values, np.float64), layer=Layer.GAZE, source=node.id)
-        )
-    return tuple(moving)
+        *_converge(keys, to.inward * EYES_TAKEN, Layer.GAZE, node.id),
+        *(
+            Channel(presence(region), keys, values, layer=Layer.GAZE, source=node.id)
+            for region, values in taken.items()
+        ),
+    )
 
 
 def expand_shift(node: GazeShift, times: Float64, world: World) -> tuple[Channel, ...]:
     """There from start to end, and from then on."""
-    start, end = times
+    start, end = times.tolist()
     to = aim(node, world)
     keys = np.array([start, start + _lead(end - start), end])
-    rest = np.zeros(2)
     return (
-        *turn(
-            "eyes", keys, np.stack([rest, to.first, to.eyes]), layer=Layer.BASE, holds=True, source=node.id
-        ),
-        *turn("head", keys, np.stack([rest, rest, to.head]), layer=Layer.BASE, holds=True, source=node.id),
-        *_converge(keys, np.array([0, 1, 1]) * to.inward, Layer.BASE, node.id, holds=True),
+        *turn("eyes", keys, [REST, to.first, to.eyes], layer=Layer.BASE, holds=True, source=node.id),
+        *turn("head", keys, [REST, REST, to.head], layer=Layer.BASE, holds=True, source=node.id),
+        *_converge(keys, to.inward * EYES_TAKEN[:3], Layer.BASE, node.id, holds=True),
     )
 
 
@@ -140,7 +146,7 @@ def _converge(
     """AU66 for eyes that turn in by so many degrees each."""
     if not inward.any():
         return ()
-    most = tables.by_number(tables.action_units())[66].degrees
+    most = poses.units()[66].degrees
     values = np.minimum(inward / most, 1.0)
     return (Channel(au(66)[0], times, values, layer=layer, holds=holds, source=source),)
 

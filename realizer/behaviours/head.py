@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
 from bml_schema import Head, HeadDirectionShift
-from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
-from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.poses import units, unknown
 from realizer.behaviours.preferred import from_gaps, preferred
-from realizer.behaviours.scene import angles, limits, target_faults, turn
+from realizer.behaviours.scene import angles, limits, target_faults, turn, within
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
 from realizer.tables.timing import Gap, gaps
@@ -34,12 +33,17 @@ def timing(node: Head, world: World) -> Timing:
     """start ready strokeStart stroke strokeEnd relax end; with repetition n > 1 instead of the stroke
     stroke:1 .. stroke:n, and `stroke` with the last of them.
     """
-    row = gaps("head", node.lexeme)
-    if node.repetition <= 1 or row.strokes is None:
+    return _timing(node.lexeme, node.repetition)
+
+
+@lru_cache(maxsize=100)
+def _timing(lexeme: str, repetition: int) -> Timing:
+    row = gaps("head", lexeme)
+    if repetition <= 1 or row.strokes is None:
         return from_gaps(row.points, row.gaps)
     at = row.points.index("stroke")
-    numbered = tuple(f"stroke:{i}" for i in range(1, node.repetition + 1))
-    between = (row.strokes,) * (node.repetition - 1)
+    numbered = tuple(f"stroke:{i}" for i in range(1, repetition + 1))
+    between = (row.strokes,) * (repetition - 1)
     return from_gaps(
         (*row.points[:at], *numbered, *row.points[at:]),
         (*row.gaps[:at], *between, SAME, *row.gaps[at:]),
@@ -51,7 +55,7 @@ def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
     on whom they look at, as far as the lexeme says.
     """
     lexeme = head_lexemes()[node.lexeme.upper()]
-    start, ready, stroke_start, *strokes, stroke_end, relax, end = times
+    start, ready, stroke_start, *strokes, stroke_end, relax, end = times.tolist()
     if len(strokes) > 1:
         strokes = strokes[:-1]  # the last but one and the last are the same stroke
     keys = [start, ready, stroke_start]
@@ -66,22 +70,23 @@ def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
     keys += [stroke_end, relax, end]
     poses += [(lexeme.back, last), (lexeme.back, last), ({}, 1.0)]
     channels = []
-    for number in sorted({number for pose, _ in poses for number in pose}):
+    at = np.array(keys)
+    for number in sorted(set().union(lexeme.ready, lexeme.stroke, lexeme.back)):
         turned = node.amount * np.array([pose.get(number, 0.0) * size for pose, size in poses])
-        channels.append(_turned(number, keys, turned, node.id))
+        channels.append(_turned(number, at, turned, node.id))
         if lexeme.eyes and number in BACK:
-            channels.append(_turned(BACK[number], keys, turned * lexeme.eyes, node.id))
+            channels.append(_turned(BACK[number], at, turned * lexeme.eyes, node.id))
     return tuple(channels)
 
 
-def _turned(number: int, keys: list[float], turned: Float64, source: str) -> Channel:
-    values = turned / degrees()[number]
-    return Channel(au(number)[0], np.array(keys), values, layer=Layer.HEAD, source=source)
+def _turned(number: int, keys: Float64, turned: Float64, source: str) -> Channel:
+    values = turned / units()[number].degrees
+    return Channel(au(number)[0], keys, values, layer=Layer.HEAD, source=source)
 
 
 def check(node: Head, world: World) -> tuple[Fault, ...]:
     known = head_lexemes()
-    return () if node.lexeme.upper() in known else (poses.unknown("lexeme", node.lexeme, known),)
+    return () if node.lexeme.upper() in known else (unknown("lexeme", node.lexeme, known),)
 
 
 def timing_of_shift(node: HeadDirectionShift, world: World) -> Timing:
@@ -91,20 +96,12 @@ def timing_of_shift(node: HeadDirectionShift, world: World) -> Timing:
 def expand_shift(node: HeadDirectionShift, times: Float64, world: World) -> tuple[Channel, ...]:
     """From start to end the head turns to the target, as far as a head turns, and stays."""
     yaw, pitch, _ = angles(node.target, world)
-    most = limits("head")
-    aim = np.clip((yaw, pitch), -most, most)
-    keys = np.array([[0.0, 0.0], aim])
-    return turn("head", times, keys, layer=Layer.BASE, holds=True, source=node.id)
+    turns = [(0.0, 0.0), within((yaw, pitch), limits("head"))]
+    return turn("head", times, turns, layer=Layer.BASE, holds=True, source=node.id)
 
 
 def check_shift(node: HeadDirectionShift, world: World) -> tuple[Fault, ...]:
     return target_faults(node.target, world)
-
-
-@cache
-def degrees() -> Mapping[int, float]:
-    """AU -> its rotation at intensity 1, degrees."""
-    return {row.au: row.degrees for row in tables.action_units()}
 
 
 def claims_of_shift(node: HeadDirectionShift, world: World) -> frozenset[str]:

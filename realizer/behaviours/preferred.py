@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from realizer.scheduling.timing import Timing
@@ -16,11 +18,9 @@ def preferred(element: str, variant: str = "") -> Timing:
     return from_gaps(row.points, row.gaps)
 
 
+@lru_cache(maxsize=1000)
 def from_gaps(points: tuple[str, ...], gaps: tuple[Gap, ...]) -> Timing:
     """k points and the k-1 gaps between them."""
-    return Timing(
-        points,
-        np.array([gap.preferred for gap in gaps]),
-        np.array([gap.least for gap in gaps]),
-        np.array([gap.stiffness for gap in gaps]),
-    )
+    rows = np.array([(gap.preferred, gap.least, gap.stiffness) for gap in gaps]).T
+    rows.setflags(write=False)  # all behaviours of a kind share them
+    return Timing(points, *rows)

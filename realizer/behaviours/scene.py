@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -14,6 +15,7 @@ from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
+from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Position, World
 
 __all__: list[str] = []
@@ -21,6 +23,8 @@ __all__: list[str] = []
 FILE = "gaze.toml"
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
 POINT = re.compile(",".join([NUMBER] * 3))
+# Degrees of yaw, positive to the left, and of pitch, positive up.
+Turn = tuple[float, float]
 # Part -> the AUs of (yaw to the left, to the right), (pitch up, down).
 TURNS = {"eyes": ((61, 62), (63, 64)), "head": ((51, 52), (53, 54))}
 
@@ -31,9 +35,15 @@ def facts() -> dict[str, Any]:
     return tables.read_toml(tables.text_of(FILE), FILE)
 
 
-def limits(part: str) -> Float64:
-    """(2,) degrees of yaw and pitch that "eyes" or "head" turn at most."""
-    return np.array([facts()[part]["yaw"], facts()[part]["pitch"]])
+def limits(part: str) -> Turn:
+    """How far "eyes" or "head" turn at most."""
+    return facts()[part]["yaw"], facts()[part]["pitch"]
+
+
+def within(turn: Turn, most: Turn) -> Turn:
+    """As much of a turn as there can be."""
+    (yaw, pitch), (most_yaw, most_pitch) = turn, most
+    return max(-most_yaw, min(most_yaw, yaw)), max(-most_pitch, min(most_pitch, pitch))
 
 
 def position(target: str, world: World) -> Position | None:
@@ -79,22 +89,22 @@ def target_faults(target: str, world: World) -> tuple[Fault, ...]:
 def turn(
     part: str,
     times: Float64,
-    degrees: Float64,
+    turns: Sequence[Turn],
     *,
     layer: Layer,
     source: str,
     holds: bool = False,
 ) -> tuple[Channel, ...]:
-    """Channels that turn "eyes" or "head" by degrees (k, 2) of yaw and pitch at times (k,).
+    """Channels that turn "eyes" or "head" by k turns at times (k,).
 
     An angle is the difference of two AUs; between keys they add up to one smooth course.
     """
-    known = tables.by_number(tables.action_units())
     channels = []
-    for column, sides in enumerate(TURNS[part]):
+    for degrees, sides in zip(zip(*turns, strict=True), TURNS[part], strict=True):
         for number, sign in zip(sides, (1.0, -1.0), strict=True):
-            values = np.maximum(sign * degrees[:, column], 0.0) / known[number].degrees
-            if values.any():
+            turned = [max(0.0, sign * angle) for angle in degrees]
+            if any(turned):
+                values = np.array(turned) / poses.units()[number].degrees
                 target = au(number)[0]
                 channels.append(Channel(target, times, values, layer=layer, holds=holds, source=source))
     return tuple(channels)
