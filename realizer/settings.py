@@ -17,6 +17,7 @@ __all__ = ["Settings", "SettingsError", "raises"]
 
 T = TypeVar("T")
 PREFIX = "REALIZER_"
+SECRET = 32  # characters; HS256 is as strong as that (RFC 7518, 3.2)
 
 
 class SettingsError(RealizerError):
@@ -133,6 +134,28 @@ def _token(value: Any) -> str | None:
     return None if value is None else _text(value)
 
 
+def _key(value: Any) -> str | None:
+    """A key itself, or what is in a file of it: a public one in PEM, or a secret that nobody guesses."""
+    if value is None:
+        return None
+    wanted = f"a PEM file that is there, or a secret of at least {SECRET} characters"
+    if not isinstance(value, str | Path) or not str(value).strip():
+        raise ValueError(wanted)
+    text = str(value)
+    try:
+        if "-----BEGIN" not in text and Path(text).is_file():
+            text = Path(text).read_text("utf-8")
+    except OSError:
+        pass  # a secret may be longer than any name
+    except UnicodeDecodeError:
+        raise ValueError(wanted) from None
+    text = text.strip()
+    # A file whose name was written wrong must not become a secret that can be guessed.
+    if "-----BEGIN" not in text and (len(text) < SECRET or text.endswith((".pem", ".key", ".pub"))):
+        raise ValueError(wanted)
+    return text
+
+
 def _word_of(*words: str) -> Callable[[Any], str]:
     def read(value: Any) -> str:
         if value not in words:
@@ -165,6 +188,15 @@ class Settings:
     workers: int = _setting(1, _number(int, 1, 64), "processes that serve the port, each its sessions")
     token: str | None = _setting(
         None, _token, "what clients of the WebSocket must bring; none: all may come", secret=True
+    )
+    jwt_key: str | None = _setting(
+        None,
+        _key,
+        "a PEM file of a public key, or a secret: clients may bring a JWT that is signed with it; none: no",
+        secret=True,
+    )
+    jwt_audience: str | None = _setting(
+        None, _optional(_text), "what a JWT must be for, its claim aud; none: it must have none"
     )
     origins: tuple[str, ...] = _setting(
         (), _origins, "addresses of pages elsewhere that may open a WebSocket; * is any"
@@ -279,7 +311,9 @@ class Settings:
                 "several workers reads their first line; let a proxy in front speak TLS"
             )
         open_doors = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
-        if self.token is not None and open_doors and self.host not in ("127.0.0.1", "localhost", "::1"):
+        if self.jwt_audience is not None and self.jwt_key is None:
+            raise SettingsError("setting jwt_audience: wanted jwt_key too, got none")
+        if (self.token or self.jwt_key) and open_doors and self.host not in ("127.0.0.1", "localhost", "::1"):
             raise SettingsError(
                 f"setting {open_doors[0]}: wanted none, or host 127.0.0.1: its clients cannot bring the token"
             )

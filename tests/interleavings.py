@@ -145,7 +145,7 @@ class Interleaving:
         self.now = OPENED
         self._full = full
         self._journal = Kept(lambda: self.random.random() < self._full)
-        self._hub = Hub(self._make, most=1000)
+        self._hub = Hub(self._make, self._settings)
         self._settings = Settings(max_blocks=50, keep=5)
         self._broken = mutants(documents, 10**9, seed) if documents else None
         self._views: dict[int, View] = {}

@@ -193,6 +193,8 @@ DOORS = {
     "redis": ("realizer.server.journal.shared",),
     "pocketsphinx": ("realizer.speech.align.sphinx",),
     "stomp": ("realizer.server.doors.broker",),
+    "jwt": ("realizer.server.passes",),
+    "cryptography": ("realizer.server.passes",),
 }
 
 

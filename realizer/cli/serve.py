@@ -42,6 +42,12 @@ def limits(command: Callable[..., None]) -> Callable[..., None]:
     help="What clients of the WebSocket must bring; REALIZER_TOKEN is not seen by who lists processes.",
 )
 @click.option(
+    "--jwt-key",
+    metavar="FILE|SECRET",
+    help="Beside or instead of --token: a public key in PEM, or a secret, by which clients' JWTs are signed.",
+)
+@click.option("--jwt-audience", metavar="WORD", help="What these must be for, their claim aud.")
+@click.option(
     "--origin",
     "origins",
     multiple=True,

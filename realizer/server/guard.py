@@ -6,15 +6,16 @@ import hashlib
 import hmac
 import json
 import logging
-import os
 import ssl
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
-from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from realizer.server.hub import HubError
-from realizer.settings import Settings, raises
+from realizer.server.limits import used_up
+from realizer.server.messages import MAX_CONTROL
+from realizer.server.passes import Pass, PassError, Passes
+from realizer.settings import Settings
 
 __all__ = ["Guard", "Pace"]
 
@@ -22,7 +23,8 @@ __all__ = ["Guard", "Pace"]
 LOOPBACK = {"localhost", "127.0.0.1", "::1"}
 # A client that brings its token in `hello` must have said it by then.
 PATIENCE = 10.0  # s
-MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
+# Where nobody is asked, and of who has the service's token.
+ANYTHING = Pass()
 
 
 class Guard:
@@ -30,6 +32,7 @@ class Guard:
 
     A token may come as `Authorization: Bearer TOKEN`, as `?token=TOKEN` (browsers can send no header with a
     WebSocket), or in a `hello` that is the first message. It is compared in constant time and never logged.
+    A JWT that `settings.jwt_key` has signed may come in its place.
 
     A browser says which page opens a WebSocket. Pages of this machine may where the service listens to this
     machine alone; elsewhere pages of the service's own address may; and those of `settings.origins`.
@@ -38,23 +41,39 @@ class Guard:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._token = None if settings.token is None else _digest(settings.token)
-        if self._token is not None:
+        self._passes = None if settings.jwt_key is None else Passes(settings.jwt_key, settings.jwt_audience)
+        if self.asks:
             # At its finest the library logs whole requests, with what is in them.
             logging.getLogger("websockets.server").setLevel(logging.WARNING)
 
     @property
     def asks(self) -> bool:
         """Whether a token is wanted."""
-        return self._token is not None
+        return self._token is not None or self._passes is not None
 
-    def knows(self, token: str | None) -> bool:
-        """Whether this is the token; anything is where none is wanted."""
-        if self._token is None:
-            return True
-        return token is not None and hmac.compare_digest(_digest(token), self._token)
+    def _admit(self, token: str | None) -> Pass:
+        """What a token lets its bearer do; all where none is wanted.
 
-    def request(self, target: str, headers: Mapping[str, str], *, later: bool = False) -> bool:
-        """Whether a request has brought the token; where it may not bring it `later`, it must have.
+        Raises:
+            HubError: 401, no token or a wrong one.
+        """
+        if not self.asks:
+            return ANYTHING
+        got = "none" if token is None else "another one"
+        if token is not None:
+            if self._token is not None and hmac.compare_digest(_digest(token), self._token):
+                return ANYTHING
+            try:
+                if self._passes is not None:
+                    return self._passes.read(token)
+            except PassError as error:
+                got = str(error)
+        wanted = ["that of this service (REALIZER_TOKEN)"] if self._token is not None else []
+        wanted += ["a JWT of its key (REALIZER_JWT_KEY)"] if self._passes is not None else []
+        raise HubError(HTTPStatus.UNAUTHORIZED, f"token: wanted {' or '.join(wanted)}, got {got}")
+
+    def request(self, target: str, headers: Mapping[str, str], *, later: bool = False) -> Pass | None:
+        """What the token of a request lets it do; None where it has none and may bring it `later`.
 
         Args:
             target: the request's path and query.
@@ -67,25 +86,23 @@ class Guard:
         scheme, _, credentials = headers.get("authorization", "").partition(" ")
         query = parse_qs(target.partition("?")[2]).get("token", [None])[-1]
         token = credentials.strip() if scheme.lower() == "bearer" else query
-        if self.knows(token):
-            return True
-        if token is not None or not later:
-            got = "none" if token is None else "another one"
-            raise HubError(
-                HTTPStatus.UNAUTHORIZED, f"token: wanted that of this service (REALIZER_TOKEN), got {got}"
-            )
-        return False
+        return None if token is None and self.asks and later else self._admit(token)
 
-    def greets(self, message: str | bytes) -> bool:
-        """Whether a first message is a `hello` with the token."""
+    def greets(self, message: str | bytes) -> Pass:
+        """What the token of a first message lets it do, which is a `hello`.
+
+        Raises:
+            HubError: 401, it is none, or has no token or a wrong one.
+        """
         try:
-            hello = json.loads(message) if isinstance(message, str) else None
-        except ValueError:
-            return False
+            hello = json.loads(message) if isinstance(message, str) and len(message) < MAX_CONTROL else None
+        except (ValueError, RecursionError):
+            hello = None
         if not isinstance(hello, dict) or hello.get("type") != "hello":
-            return False
+            words = "token: wanted one in the address, a header or a first hello, got none"
+            raise HubError(HTTPStatus.UNAUTHORIZED, words)
         token = hello.get("token")
-        return isinstance(token, str) and self.knows(token)
+        return self._admit(token if isinstance(token, str) else None)
 
     def room(self) -> None:
         """Whether there is memory for more.
@@ -93,12 +110,8 @@ class Guard:
         Raises:
             HubError: 503, there is none.
         """
-        most = self._settings.max_memory
-        if most is not None and (used := _memory()) > most:
-            raise HubError(
-                HTTPStatus.SERVICE_UNAVAILABLE,
-                f"the service uses {used:.0f} MB: wanted at most {most} {raises('max_memory')}",
-            )
+        if (words := used_up(self._settings)) is not None:
+            raise HubError(HTTPStatus.SERVICE_UNAVAILABLE, words)
 
     def tls(self) -> ssl.SSLContext | None:
         """What speaks TLS with the service's certificate; None where it has none.
@@ -158,12 +171,3 @@ def _digest(token: str) -> bytes:
 
 def _same(origin: str, known: Iterable[str]) -> bool:
     return origin.rstrip("/").lower() in {one.rstrip("/").lower() for one in known}
-
-
-def _memory() -> float:
-    """Megabytes of this process that are in memory; 0 where the system does not say."""
-    try:
-        pages = int(MEMORY.read_text("ascii").split()[1])
-    except (OSError, ValueError, IndexError):
-        return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -16,7 +16,7 @@ from realizer.mapping import mapping_of
 from realizer.server.alarms import Alarms
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
-from realizer.server.hub import Hub, HubError
+from realizer.server.hub import ANYBODY, Hub, HubError, Visitor
 from realizer.server.journal import Journal, JournalError, journal_at
 from realizer.server.journal.folder import FolderJournal, head
 from realizer.server.journal.notes import Notes
@@ -53,7 +53,7 @@ class Shell:
                 return False  # another process may have it: only `restore` asks, before somebody joins
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
-        self._hub = Hub(self._make, settings.max_sessions, ours)
+        self._hub = Hub(self._make, settings, ours)
         self._studio = Studio(settings.deformer)
         self.metrics = Metrics(worker)
         self._clients: dict[int, Client] = {}
@@ -144,13 +144,13 @@ class Shell:
 
     # connections --------------------------------------------------------------------------------
 
-    def check(self, name: str | None) -> None:
+    def check(self, name: str | None, visitor: Visitor = ANYBODY) -> None:
         """Whether a client could join.
 
         Raises:
-            HubError: a bad name, or too many sessions.
+            HubError: a bad name, one that is not for it, or too many sessions.
         """
-        self._hub.check(name)
+        self._hub.check(name, visitor)
 
     async def restore(self, name: str | None, seen: int | None = None) -> None:
         """Go on with a session that another process has had, before somebody joins it.
@@ -188,14 +188,20 @@ class Shell:
         finally:
             del self._restoring[name]
 
-    def join(self, client: Client, name: str | None = None, seen: int | None = None) -> int:
+    def join(
+        self,
+        client: Client,
+        name: str | None = None,
+        seen: int | None = None,
+        visitor: Visitor = ANYBODY,
+    ) -> int:
         """Let a client into the session of that name, or into one of its own; its number from now on.
 
         Raises:
             HubError: as `check`.
         """
         number = next(self._numbers)
-        session = self._hub.open(number, name, self._loop.time(), seen)
+        session = self._hub.open(number, name, self._loop.time(), seen, visitor)
         self._clients[number] = client
         self._pump(session)
         return number
@@ -302,7 +308,7 @@ class Shell:
         for number in session.connections:
             self._do(session, Close(number, 1011, "internal error"))
         session.close()
-        self._hub.sessions.pop(session.id, None)
+        self._hub.forget(session)
 
     def _do(self, session: Session, effect: Effect) -> None:
         match effect:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,12 +89,38 @@ def test_a_token_that_was_left_empty_is_refused_and_no_token_is_ever_shown() -> 
     assert "opensesame" not in repr(Settings(token="opensesame", stomp_password="opensesame"))
 
 
+def test_a_key_is_a_file_or_the_key_itself(tmp_path: Path) -> None:
+    pem = "-----BEGIN PUBLIC KEY-----\nMCow\n-----END PUBLIC KEY-----"
+    secret = "x" * 32
+    for text in (pem, secret):
+        file = tmp_path / "key"
+        file.write_text(text + "\n")
+        assert Settings.read(environment={"REALIZER_JWT_KEY": str(file)}).jwt_key == text
+        assert replace(Settings(jwt_key=text)).jwt_key == text  # as a worker reads it again
+    assert Settings(jwt_key="y" * 5000).jwt_key == "y" * 5000  # longer than any name
+    assert Settings().jwt_key is None
+
+
+@pytest.mark.parametrize(
+    "key", ["", " ", "opensesame", "x" * 31, f"/run/secrets/{'x' * 40}.pem", f"{'x' * 40}.key"]
+)
+def test_a_key_that_is_short_or_not_there_is_refused_and_not_shown(key: str, tmp_path: Path) -> None:
+    short = tmp_path / "short"
+    short.write_text(key)
+    for value in (key, str(short)):
+        with pytest.raises(SettingsError, match=r"jwt_key: wanted a PEM file that is there, or") as refused:
+            Settings.read(environment={"REALIZER_JWT_KEY": value})
+        assert "got something else" in str(refused.value)
+
+
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
         ({"tls_key": Path(__file__)}, "setting tls_key: wanted tls_cert too"),
         ({"tls_cert": Path(__file__), "workers": 2}, "setting tls_cert: wanted workers = 1, got 2"),
         ({"token": "x", "host": "0.0.0.0", "xface_port": 0}, "its clients cannot bring the token"),
+        ({"jwt_key": "x" * 32, "host": "0.0.0.0", "xface_port": 0}, "its clients cannot bring the token"),
+        ({"jwt_audience": "faces"}, "setting jwt_audience: wanted jwt_key too"),
         ({"token": "x", "host": "::", "asap_ports": (0, 1)}, "setting asap_ports: wanted none, or host 127"),
     ],
 )

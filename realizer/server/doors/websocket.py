@@ -28,10 +28,11 @@ from websockets.server import ServerProtocol
 
 from realizer.server import guard
 from realizer.server.guard import Guard, Pace
-from realizer.server.hub import HubError
+from realizer.server.hub import HubError, Visitor
 from realizer.server.journal import JournalError
 from realizer.server.messages import ErrorMessage
 from realizer.server.metrics import MEDIA_TYPE
+from realizer.server.passes import Pass
 from realizer.server.shell import Shell
 from realizer.server.site import Answer, Site
 from realizer.settings import Settings, raises
@@ -148,11 +149,12 @@ class WebSocketDoor:
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
             try:
-                self._guard.request(request.path, _headers(request), later=path == "/ws")
-                self._guard.room()
+                allowed = self._guard.request(request.path, _headers(request), later=path == "/ws")
                 self._room(connection)
-                if path == "/ws":
-                    self._shell.check(_query(request)[0])
+                if path == "/check":
+                    self._guard.room()
+                else:
+                    self._shell.check(_query(request)[0], _visitor(connection, allowed))
             except HubError as error:
                 return self._refused(connection, error)
             return None
@@ -162,7 +164,9 @@ class WebSocketDoor:
             return _response(Answer(426 if not upgrade else 404, "text/plain; charset=utf-8", words.encode()))
         if path == "/metrics":
             try:
-                self._guard.request(request.path, _headers(request))
+                allowed = self._guard.request(request.path, _headers(request))
+                if allowed is None or allowed.sessions is not None:
+                    raise HubError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
             except HubError as error:
                 return self._refused(connection, error)
             return _response(Answer(200, MEDIA_TYPE, self._shell.measured().encode()))
@@ -212,14 +216,19 @@ class WebSocketDoor:
     async def _join(self, socket: ServerConnection, request: Request) -> None:
         client = _Client(socket)
         greeting = None
-        if not self._guard.request(request.path, _headers(request), later=True):
-            greeting = await self._greeting(socket)
-            if greeting is None:
-                return
         try:
-            await self._shell.restore(*_query(request))
-            number = self._shell.join(client, *_query(request))
-        except (HubError, JournalError) as error:
+            allowed = self._guard.request(request.path, _headers(request), later=True)
+            if allowed is None:
+                greeting, allowed = await self._greeting(socket)
+            visitor = _visitor(socket, allowed)
+            name, seen = _query(request)
+            self._shell.check(name, visitor)  # who greets is known only now
+            await self._shell.restore(name, seen)
+            number = self._shell.join(client, name, seen, visitor)
+        except HubError as error:
+            await self._turn_away(socket, error)
+            return
+        except JournalError as error:
             await socket.close(1013, str(error)[:120])
             return
         told = {"connection": number, "session": _query(request)[0], "address": _address(socket)}
@@ -227,9 +236,12 @@ class WebSocketDoor:
         try:
             if greeting is not None:
                 self._shell.receive(number, greeting)
-            await self._read(socket, number, client)
+            async with asyncio.timeout(allowed.left):
+                await self._read(socket, number, client)
         except ConnectionClosed:
             pass
+        except TimeoutError:
+            await client._close(1008, "token: it has expired")
         finally:
             self._shell.leave(number)
             log.info("left", extra={**told, "code": socket.close_code})
@@ -252,19 +264,28 @@ class WebSocketDoor:
             held = bool(pause)
             await asyncio.sleep(pause)
 
-    async def _greeting(self, socket: ServerConnection) -> str | bytes | None:
-        """The first message of a client that has not brought the token yet; None where it is not that."""
+    async def _greeting(self, socket: ServerConnection) -> tuple[str | bytes, Pass]:
+        """The first message of a client that has not brought a token yet, and what its token lets it do.
+
+        Raises:
+            HubError: 401, it has said nothing, or something else.
+        """
+        message: str | bytes = ""
         with contextlib.suppress(ConnectionClosed, TimeoutError):
             async with asyncio.timeout(guard.PATIENCE):
                 message = await socket.recv()
-            if self._guard.greets(message):
-                return message
+        return message, self._guard.greets(message)
+
+    async def _turn_away(self, socket: ServerConnection, error: HubError) -> None:
+        """Say why one who is here already may not stay."""
         self._shell.metrics.counts["refused"] += 1
-        words = "token: wanted that of this service in the address, a header or a first hello"
-        with contextlib.suppress(ConnectionClosed):
-            await socket.send(ErrorMessage(code="token", message=words, where="hello.token").text())
-        await socket.close(1008, words)
-        return None
+        unknown = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
+        if unknown:
+            where = "hello.token" if error.status == http.HTTPStatus.UNAUTHORIZED else "hello.session"
+            told = ErrorMessage(code="token", message=str(error), where=where)
+            with contextlib.suppress(ConnectionClosed):
+                await socket.send(told.text())
+        await socket.close(1008 if unknown else 1013, str(error)[:120])
 
     async def _check(self, socket: ServerConnection) -> None:
         """An editor's own WebSocket: a text in, its faults out, one after the other."""
@@ -358,12 +379,25 @@ def _headers(request: Request) -> dict[str, str]:
     return {name.lower(): value for name, value in request.headers.raw_items()}
 
 
+def _visitor(socket: ServerConnection, allowed: Pass | None) -> Visitor:
+    """Who comes; as far as is known where no token has come yet."""
+    return Visitor(_address(socket), None if allowed is None else allowed.sessions)
+
+
 def _query(request: Request) -> tuple[str | None, int | None]:
-    """`?session=ID&seen=N`; a `seen` that is no number is none."""
+    """`?session=ID&seen=N`.
+
+    Raises:
+        HubError: 400, `seen` is no number.
+    """
     query = parse_qs(urlsplit(request.path).query)
     session = query.get("session", [None])[-1]
-    seen = query.get("seen", [""])[-1]
-    return session, int(seen) if seen.isascii() and seen.isdigit() and len(seen) < 16 else None
+    seen = query.get("seen", [None])[-1]
+    if seen is None:
+        return session, None
+    if not (seen.isascii() and seen.isdigit() and len(seen) < 16):
+        raise HubError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
+    return session, int(seen)
 
 
 def _response(answer: Answer) -> Response:

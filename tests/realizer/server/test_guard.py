@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 import logging
 
+import jwt
 import pytest
 
 from realizer.server.guard import Guard, Pace
 from realizer.server.hub import HubError
+from realizer.server.messages import MAX_CONTROL
+from realizer.server.passes import Pass
 from realizer.settings import Settings, SettingsError
 
 TOKEN = "Xk-secret-7"
+SECRET = "a secret that is long enough to be one"
 
 
 def guard(**settings) -> Guard:
@@ -52,8 +56,8 @@ def test_a_wrong_token_is_refused_at_once_and_not_repeated(
 
 def test_without_a_token_a_client_may_still_greet_with_it() -> None:
     g = guard(token=TOKEN)
-    assert not g.request("/ws", {}, later=True)
-    assert g.greets(json.dumps({"type": "hello", "token": TOKEN}))
+    assert g.request("/ws", {}, later=True) is None
+    assert g.greets(json.dumps({"type": "hello", "token": TOKEN})) == Pass()
     with pytest.raises(HubError, match="got none"):
         g.request("/metrics", {})
 
@@ -73,7 +77,42 @@ def test_without_a_token_a_client_may_still_greet_with_it() -> None:
     ],
 )
 def test_any_other_first_message_is_no_greeting(message: str | bytes) -> None:
-    assert not guard(token=TOKEN).greets(message)
+    with pytest.raises(HubError, match="token: wanted") as refused:
+        guard(token=TOKEN).greets(message)
+    assert refused.value.status == 401
+    assert TOKEN not in str(refused.value)
+
+
+def test_a_first_message_that_is_large_is_not_even_read() -> None:
+    large = json.dumps({"type": "hello", "token": TOKEN, "session": "x" * MAX_CONTROL})
+    with pytest.raises(HubError, match="a first hello"):
+        guard(token=TOKEN).greets(large)
+
+
+@pytest.mark.parametrize("both", [{}, {"token": TOKEN}])
+def test_a_signed_token_comes_in_the_same_places(both: dict[str, str]) -> None:
+    g = guard(jwt_key=SECRET, **both)
+    signed = jwt.encode({"session": "show"}, SECRET, "HS256")
+    bound = Pass(frozenset({"show"}))
+    assert g.request(f"/ws?session=show&token={signed}", {}) == bound
+    assert g.request("/ws", {"authorization": f"Bearer {signed}"}) == bound
+    assert g.request("/ws", {}, later=True) is None
+    assert g.greets(json.dumps({"type": "hello", "token": signed})) == bound
+
+
+def test_beside_a_key_the_token_of_the_service_opens_everything() -> None:
+    g = guard(jwt_key=SECRET, token=TOKEN)
+    assert g.request(f"/ws?token={TOKEN}", {}) == Pass()
+    with pytest.raises(HubError, match="that of this service .* or a JWT of its key .*, got another one"):
+        g.request("/ws?token=another", {})
+
+
+def test_a_refusal_says_why_a_signed_token_is_not_taken() -> None:
+    old = jwt.encode({"exp": 1}, SECRET, "HS256")
+    with pytest.raises(HubError, match=r"REALIZER_JWT_KEY\), got one that has expired") as refused:
+        guard(jwt_key=SECRET).request(f"/ws?token={old}", {}, later=True)
+    assert refused.value.status == 401
+    assert old not in str(refused.value)
 
 
 def test_without_a_token_in_the_settings_nobody_is_asked() -> None:
@@ -122,8 +161,11 @@ def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
 
 
 def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
-    settings = Settings(token=TOKEN, stomp_password=TOKEN)
+    settings = Settings(token=TOKEN, stomp_password=TOKEN, jwt_key=SECRET)
     assert TOKEN not in repr(settings)
+    assert SECRET not in repr(settings)
+    with pytest.raises(SettingsError, match=r"jwt_key: wanted a PEM file .*, got something else"):
+        Settings(jwt_key=SECRET[:31])
     with pytest.raises(SettingsError, match="setting token: wanted a word, got something else"):
         Settings(token=[TOKEN])  # type: ignore[arg-type]
 

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from realizer.server import limits
 from realizer.server.effects import Close
-from realizer.server.hub import Hub, HubError
+from realizer.server.hub import Hub, HubError, Visitor
 from realizer.server.session import Session
 from realizer.settings import Settings
 
 
 @pytest.fixture
 def hub() -> Hub:
-    settings = Settings(keep=60.0)
-    return Hub(lambda id, now, named: Session(id, settings, now, named=named), 3)
+    return limited(max_sessions=3)
+
+
+def limited(**most: int) -> Hub:
+    settings = Settings(keep=60.0, **most)
+    return Hub(lambda id, now, named: Session(id, settings, now, named=named), settings)
 
 
 def test_a_name_is_shared_and_no_name_is_ones_own(hub) -> None:
@@ -110,8 +117,115 @@ def test_hello_into_a_session_that_cannot_be_kept_ends_the_connection_with_words
             raise HubError(503, "the journal has no room")
         return Session(id, settings, now, named=named)
 
-    hub = Hub(make, 3)
+    hub = Hub(make, settings)
     here = hub.open(1, "here", 0.0)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
     assert hub.effects(here, 0.5) == [Close(1, 1013, "the journal has no room")]
     assert hub.session_of(1) is None
+
+
+HERE, THERE = Visitor("10.0.0.1"), Visitor("10.0.0.2")
+
+
+def test_one_address_opens_no_more_than_its_share_and_others_still_come() -> None:
+    hub = limited(max_address_sessions=2)
+    for k in range(2):
+        hub.open(k, f"s{k}", 0.0, visitor=HERE)
+    for name in ("more", None):
+        with pytest.raises(
+            HubError, match=r"2 sessions .* 10\.0\.0\.1 .*REALIZER_MAX_ADDRESS_SESSIONS"
+        ) as caught:
+            hub.check(name, HERE)
+        assert caught.value.status == 429
+    hub.open(5, "s0", 0.0, visitor=HERE)  # joining is not opening
+    hub.open(6, "more", 0.0, visitor=THERE)
+    hub.open(7, "more", 0.0, visitor=HERE)
+
+
+def test_one_who_opens_sessions_and_leaves_ends_its_own_and_nobody_elses() -> None:
+    hub = limited(max_address_sessions=2, max_sessions=4)
+    hub.open(100, "yours", 0.0, visitor=THERE)
+    hub.leave(100, 0.0)
+    for k in range(50):
+        hub.open(k, f"s{k}", k + 1.0, visitor=HERE)
+        hub.leave(k, k + 1.5)
+    assert set(hub.sessions) == {"yours", "s48", "s49"}
+    hub.open(101, "yours", 60.0, visitor=THERE)
+    hub.open(102, "new", 60.0, visitor=THERE)
+
+
+def test_a_session_that_ended_counts_no_more() -> None:
+    hub = limited(max_address_sessions=1)
+    for k in range(3):
+        hub.open(k, None, 0.0, visitor=HERE)
+        hub.leave(k, 1.0)
+    failed = hub.open(3, "show", 2.0, visitor=HERE)
+    failed.close()
+    hub.forget(failed)
+    kept = hub.open(4, "show", 3.0, visitor=HERE)
+    hub.leave(4, 4.0)
+    hub.sweep(4.0 + 60.0)
+    assert kept.closed
+    hub.open(5, "show", 70.0, visitor=HERE)
+
+
+def test_what_doors_of_our_own_open_is_no_addresss_share() -> None:
+    hub = limited(max_address_sessions=1)
+    for k in range(3):
+        hub.open(k, f"s{k}", 0.0)
+
+
+def test_a_session_that_was_brought_back_is_opened_by_who_comes_to_it() -> None:
+    hub = limited(max_address_sessions=1)
+    hub.open(1, "one", 0.0, visitor=HERE)
+    hub.sessions["two"] = Session("two", Settings(), 0.0, named=True)
+    with pytest.raises(HubError, match="wanted fewer"):
+        hub.check("two", HERE)
+    hub.open(2, "two", 0.0, visitor=THERE)
+
+
+def test_hello_counts_what_it_leaves_and_what_it_opens() -> None:
+    hub = limited(max_address_sessions=1)
+    here = hub.open(1, None, 0.0, visitor=HERE)
+    here.receive(1, '{"type":"hello","session":"show"}', 0.5)
+    hub.effects(here, 0.5)
+    there = hub.session_of(1)
+    assert there is not None
+    assert there.id == "show"
+    there.receive(1, '{"type":"hello","session":"another"}', 0.6)
+    (effect,) = hub.effects(there, 0.6)
+    assert "REALIZER_MAX_ADDRESS_SESSIONS" in effect.data
+
+
+def test_a_visitor_who_is_bound_to_sessions_comes_into_no_other() -> None:
+    hub = limited()
+    bound = Visitor("10.0.0.1", frozenset({"show", "stage"}))
+    for name in ("other", None):
+        with pytest.raises(HubError, match=r"the token is for \(show, stage\)") as caught:
+            hub.open(1, name, 0.0, visitor=bound)
+        assert caught.value.status == 403
+    here = hub.open(1, "show", 0.0, visitor=bound)
+    here.receive(1, '{"type":"hello","session":"other"}', 0.5)
+    (effect,) = hub.effects(here, 0.5)
+    assert "hello.session" in effect.data
+    assert hub.session_of(1) is here
+    here.receive(1, '{"type":"hello","session":"stage"}', 0.5)
+    hub.effects(here, 0.5)
+    there = hub.session_of(1)
+    assert there is not None
+    assert there.id == "stage"
+
+
+def test_where_memory_is_used_up_no_session_is_opened_and_those_that_play_are_joined(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages = tmp_path / "statm"
+    monkeypatch.setattr(limits, "MEMORY", pages)
+    hub = limited(max_memory=64)
+    pages.write_text("2 1 0")
+    hub.open(1, "show", 0.0)
+    pages.write_text("2000000 1000000 0")
+    hub.open(2, "show", 0.0)
+    with pytest.raises(HubError, match="REALIZER_MAX_MEMORY") as caught:
+        hub.open(3, "more", 0.0)
+    assert caught.value.status == 503

@@ -8,22 +8,26 @@ import logging
 import re
 import ssl
 import subprocess
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+import jwt
 import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
 
-from realizer.server import guard
+from realizer.server import guard, limits
+from realizer.server.passes import Pass
 from realizer.server.serve import Server
 from realizer.settings import Settings
 
 LIMIT = 60  # s; a hung test ends
 TOKEN = "Xk-secret-7"
+SECRET = "a secret that is long enough to be one"
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 
 
@@ -33,6 +37,10 @@ def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
             await test(server)
 
     asyncio.run(run())
+
+
+def signed(**claims: Any) -> str:
+    return jwt.encode(claims, SECRET, "HS256")
 
 
 async def read(url: str, headers: dict[str, str] | None = None) -> str:
@@ -97,6 +105,124 @@ def test_a_client_that_says_nothing_is_not_waited_for(monkeypatch: pytest.Monkey
     serving(test, token=TOKEN)
 
 
+def test_a_signed_token_opens_its_sessions_and_no_other() -> None:
+    async def test(server: Server) -> None:
+        mine, all_ = signed(session=["show"]), signed()
+        assert (await welcomed(f"{server.url}?session=show&token={mine}"))["session"] == "show"
+        header = {"Authorization": f"Bearer {mine}"}
+        assert (await welcomed(f"{server.url}?session=show", additional_headers=header))["session"] == "show"
+        assert (await welcomed(f"{server.url}?session=show", {"token": mine}))["session"] == "show"
+        assert (await welcomed(server.url, {"token": all_}))["type"] == "welcome"
+        for target in (f"{server.url}?session=other&token={mine}", f"{server.url}?token={mine}"):
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(target)
+            assert refused.value.response.status_code == 403
+            assert b"session: wanted one that the token is for (show)" in refused.value.response.body
+        told = await welcomed(f"{server.url}?session=other", {"token": mine})
+        assert (told["code"], told["where"]) == ("token", "hello.session")
+        async with connect(f"{server.url}?session=show&token={mine}") as socket:
+            await socket.send(json.dumps({"type": "hello", "session": "other"}))
+            error = json.loads(await socket.recv())
+            assert (error["type"], error["where"]) == ("error", "hello.session")
+        health = json.loads(await read(f"{server.page}healthz"))
+        assert health["sessions"] <= 2  # show, and one without a name that may be ending
+
+    serving(test, jwt_key=SECRET)
+
+
+@pytest.mark.parametrize(
+    ("claims", "says"),
+    [({"exp": 1}, b"has expired"), ({"nbf": 10**10}, b"not valid yet"), ({"aud": "x"}, b"for somebody else")],
+)
+def test_a_signed_token_that_does_not_hold_is_refused(claims: dict[str, Any], says: bytes) -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as refused:
+            await connect(f"{server.url}?token={signed(**claims)}")
+        assert refused.value.response.status_code == 401
+        assert says in refused.value.response.body
+
+    serving(test, jwt_key=SECRET)
+
+
+def test_one_whose_token_ends_is_let_go_and_the_others_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test(server: Server) -> None:
+        until = int(time.time()) + 1000
+        async with connect(f"{server.url}?token={signed()}") as stays:
+            monkeypatch.setattr(Pass, "left", property(lambda self: None if self.until is None else 0.0))
+            async with connect(f"{server.url}?token={signed(exp=until)}") as socket:
+                with pytest.raises(ConnectionClosed) as closed:
+                    await socket.recv()
+            assert closed.value.rcvd is not None
+            assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1008, "token: it has expired")
+            await stays.send(json.dumps({"type": "hello"}))
+            assert json.loads(await stays.recv())["type"] == "welcome"
+
+    serving(test, jwt_key=SECRET)
+
+
+def test_metrics_of_all_are_not_for_one_who_has_a_session() -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            await read(f"{server.page}metrics?token={signed(session='show')}")
+        assert "realizer_sessions 0" in await read(f"{server.page}metrics?token={signed()}")
+
+    serving(test, jwt_key=SECRET)
+
+
+def test_one_address_opens_no_more_sessions_than_its_share() -> None:
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=a"), connect(f"{server.url}?session=b") as socket:
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(f"{server.url}?session=c")
+            assert refused.value.response.status_code == 429
+            assert b"REALIZER_MAX_ADDRESS_SESSIONS" in refused.value.response.body
+            async with connect(f"{server.url}?session=a"):  # to join is not to open
+                pass
+            await socket.send(json.dumps({"type": "hello"}))
+            assert json.loads(await socket.recv())["type"] == "welcome"
+        # Both have a name and are kept; the one that was left first makes room.
+        async with connect(f"{server.url}?session=c"):
+            pass
+        assert json.loads(await read(f"{server.page}healthz"))["sessions"] == 2
+
+    serving(test, max_address_sessions=2)
+
+
+def test_where_memory_is_used_up_those_that_play_go_on(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    pages = tmp_path / "statm"
+    pages.write_text("2 1 0")
+    monkeypatch.setattr(limits, "MEMORY", pages)
+
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=show") as socket:
+            pages.write_text("2000000 1000000 0")
+            for target in (server.url, server.url.replace("/ws", "/check")):
+                with pytest.raises(InvalidStatus) as refused:
+                    await connect(target)
+                assert refused.value.response.status_code == 503
+                assert b"REALIZER_MAX_MEMORY" in refused.value.response.body
+            await socket.send(NOD.format("b"))
+            while 'id="b:end"' not in str(await socket.recv()):
+                pass
+            async with connect(f"{server.url}?session=show&seen=1") as back:
+                assert 'seq="2"' in str(await back.recv())
+
+    serving(test, max_memory=64)
+
+
+@pytest.mark.parametrize("seen", ["abc", "-1", "1.5", "9" * 16, "%C2%B2"])
+def test_a_seen_that_is_no_number_is_refused_with_what_was_wanted(seen: str) -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as refused:
+            await connect(f"{server.url}?session=show&seen={seen}")
+        assert refused.value.response.status_code == 400
+        assert b"seen: wanted the number of the last feedback that came" in refused.value.response.body
+
+    serving(test)
+
+
 def test_no_token_is_logged_however_much_is(caplog: pytest.LogCaptureFixture) -> None:
     async def test(server: Server) -> None:
         quiet = logging.getLogger("websockets.client")
@@ -106,13 +232,19 @@ def test_no_token_is_logged_however_much_is(caplog: pytest.LogCaptureFixture) ->
         await welcomed(server.url, {"token": TOKEN})
         with pytest.raises(InvalidStatus):
             await connect(f"{server.url}?token=other-secret")
+        await welcomed(f"{server.url}?token={mine}")
+        await welcomed(server.url, {"token": mine})
+        with pytest.raises(InvalidStatus):
+            await connect(f"{server.url}?token={old}")
         quiet.setLevel(logging.NOTSET)
 
+    mine, old = signed(), signed(exp=1)
     with caplog.at_level(logging.DEBUG):
-        serving(test, token=TOKEN)
+        serving(test, token=TOKEN, jwt_key=SECRET)
     told = [*caplog.messages, *map(str, (vars(record) for record in caplog.records))]
     assert any("joined" in line for line in told)
-    assert not [line for line in told if TOKEN in line or "other-secret" in line]
+    secrets = (TOKEN, SECRET, "other-secret", mine, old)
+    assert not [line for line in told if any(secret in line for secret in secrets)]
 
 
 def test_a_page_of_elsewhere_opens_no_socket() -> None:
