@@ -5,6 +5,7 @@ Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speec
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -72,11 +73,12 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
             continue
         at, length = phoneme.start, phoneme.end - phoneme.start
         for part in parts:
-            row = _Row(at, at + part.share * length, part.mix, part.vowel)
+            until = at + part.share * length
             if part.vowel:
-                row = row._replace(size=_size(phoneme, row.end - at), effort=_effort(phoneme))
-            rows.append(row)
-            at = row.end
+                rows.append(_Row(at, until, part.mix, True, _size(phoneme, until - at), _effort(phoneme)))
+            else:
+                rows.append(_Row(at, until, part.mix))
+            at = until
     if all(row.mix in (SILENT, ()) for row in rows):
         return None
     # A short pause between sounds does not bring the mouth to rest; at the ends it always does.
@@ -110,14 +112,14 @@ def _size(phoneme: Phoneme, length: float) -> float:
     Source: Lindblom 1963, "Spectrographic study of vowel reduction", of formants; here of the mouth.
     """
     short = coarticulation()["undershoot"]
-    stress: float = coarticulation()["stress"][STRESS.get(phoneme.stress, "none")]
-    return stress * float(1 - short["lost"] * np.exp(-length / short["decay"]))
+    stress = coarticulation()["stress"][STRESS.get(phoneme.stress, "none")]
+    return float(stress * (1 - short["lost"] * math.exp(-length / short["decay"])))
 
 
 def _effort(phoneme: Phoneme) -> float:
     """How much further a vowel opens because it is loud."""
     facts = coarticulation()["loudness"]
-    return float(np.clip(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"], facts["most"]))
+    return float(min(max(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"]), facts["most"]))
 
 
 def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:
@@ -131,7 +133,7 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     """How much the sounds around each time have to say, for each class of articulators.
 
     Yields:
-        Which sounds, (n, k); their parts, (n, k), which add to a little less than 1: the rest is the neutral
+        Which sounds, (k, n); their parts, (k, n), which add to a little less than 1: the rest is the neutral
         mouth's; the columns of `SHAPE` that the class moves.
     """
     facts = coarticulation()
@@ -140,20 +142,23 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     base = np.where(track.vowel, rule["base_vowel"], rule["base_consonant"])
     rate = base * (rule["length"] / length) ** rule["exponent"]
     strength = np.where(track.vowel, rule["strength_vowel"], rule["strength_consonant"])
-    weight = (track.mix @ shape_table()[1]) * strength[:, None]
+    weight = (track.mix @ shape_table()[1]).T * strength
     # A pause is at rest over its whole length but its edges; a sound is strongest in its middle part.
     edge = np.where(track.rest, np.minimum(0.1, length / 3), length * (1 - rule["core"]) / 2)
     core_begin, core_end = track.begin + edge, track.end - edge
 
-    # Sounds further away than `neighbours` add nothing that can be seen: a band, not a matrix.
-    band = np.arange(-rule["neighbours"], rule["neighbours"] + 1)
-    near = np.searchsorted(track.begin, times, "right")[:, None] - 1 + band
-    there = (near >= 0) & (near < len(length))
+    # Sounds further away than `neighbours` add nothing that can be seen: a band, not a matrix. Times lie
+    # along the last axis, where numpy is fast.
+    band = np.arange(-rule["neighbours"], rule["neighbours"] + 1)[:, None]
+    near = np.searchsorted(track.begin, times, "right") - 1 + band
+    beyond = (near < 0) | (near >= len(length))
     near = np.clip(near, 0, len(length) - 1)
-    before = rate[near] * np.maximum(core_begin[near] - times[:, None], 0)
-    after = rate[near] * np.maximum(times[:, None] - core_end[near], 0)
+    fall = rate.take(near)
+    before = fall * np.maximum(core_begin.take(near) - times, 0)
+    after = fall * np.maximum(times - core_end.take(near), 0)
+    before[beyond] = np.inf
 
-    for column, (name, members) in enumerate(CLASSES.items()):
+    for own, (name, members) in zip(weight, CLASSES.items(), strict=True):
         pace = facts["articulators"][name]
-        d = np.exp(-(pace["before"] * before + pace["after"] * after)) * weight[near, column] * there
-        yield near, d / (d.sum(1) + rule["rest"])[:, None], members
+        d = np.exp(-(pace["before"] * before + pace["after"] * after)) * own.take(near)
+        yield near, d / (d.sum(axis=0) + rule["rest"]), members

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -44,23 +45,22 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
         return ()
     times = key_times(phonemes, min(room, facts["pauses"]["attack"]))
     taken = lips_taken(track, times)
-    mouth = _mouth(track, times) * taken[:, None]
+    mouth = _mouth(track, times) * taken
     _constrain(mouth, track, times, taken, facts)
-    mouth[[0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
+    mouth[:, [0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
     return _channels(times + start, mouth, taken)
 
 
 def _mouth(track: Track, times: Float64) -> Float64:
-    """(n, 10) float64: the weighted mean of the sounds around each time; columns `SHAPE`."""
-    target = (track.mix @ shape_table()[0]) * track.size[:, None]
-    opening = [SHAPE.index(name) for name in OPENING]
-    target[:, opening] *= track.effort[:, None]
-    mouth = np.empty((len(times), len(SHAPE)))
-    for near, parts, members in dominances(track, times):
-        for member in members:
-            k = SHAPE.index(member)
-            mouth[:, k] = (parts * target[near, k]).sum(1)
-    return mouth
+    """(10, n) float64: the weighted mean of the sounds around each time; rows `SHAPE`."""
+    target = (track.mix @ shape_table()[0]).T * track.size
+    target[[SHAPE.index(name) for name in OPENING]] *= track.effort
+    mouth = [
+        np.einsum("kn,kn->n", parts, target[SHAPE.index(member)].take(near))
+        for near, parts, members in dominances(track, times)
+        for member in members
+    ]
+    return np.array(mouth)
 
 
 def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, facts: dict[str, Any]) -> None:
@@ -68,7 +68,7 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     shapes, _ = shape_table()
     column = {name: k for k, name in enumerate(SHAPE)}
     closed, bitten = held(track, times)
-    upper, lower, jaw = mouth[:, column["upper"]], mouth[:, column["lower"]], mouth[:, column["jaw"]]
+    upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
     speed = facts["speed"]["lips"]
     # The upper lip clears the teeth for f v: raised where it is lower, then lowered wherever p b m close.
     raised = shapes[LABIODENTAL, column["upper"]] * taken
@@ -85,36 +85,41 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
         limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
         reach = facts["articulators"][name]["smooth"] * facts["rate"]
         block = slice(column[members[0]], column[members[-1]] + 1)
-        mouth[:, block] = _smooth(_reachable(mouth[:, block], times[:, None], limit), reach)
+        mouth[block] = _smooth(_reachable(mouth[block], times, limit), reach)
     # Lips that press meet; they do not pass through each other.
     least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
     lower[:] = np.maximum(lower, least - upper)
 
 
 def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
-    """The greatest curves along axis 0 that stay below `values` and are nowhere steeper than `speed`."""
+    """The greatest curves along the last axis, nowhere above `values` and nowhere steeper than `speed`."""
     climb = speed * times
-    values = np.minimum.accumulate(values - climb) + climb
-    falling: Float64 = np.minimum.accumulate((values + climb)[::-1])[::-1] - climb
+    values = np.minimum.accumulate(values - climb, axis=-1) + climb
+    falling: Float64 = np.minimum.accumulate((values + climb)[..., ::-1], axis=-1)[..., ::-1] - climb
     return falling
 
 
 def _smooth(values: Float64, reach: float) -> Float64:
-    """Mean along axis 0 under a bell that ends `reach` samples away; end values stay."""
-    half = min(round(reach), len(values) - 1)
+    """Mean of (k, n) along its last axis under a bell that ends `reach` samples away; end values stay."""
+    half = min(round(reach), values.shape[1] - 1)
     if half < 1:
         return values
-    bell = np.hanning(2 * half + 3)[1:-1]
-    bell /= bell.sum()
     # Beyond its ends the curve is turned about its end point, so that the ends do not move.
-    padded = np.concatenate(
-        (2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1])
-    )
-    smooth: Float64 = sum(weight * padded[k : k + len(values)] for k, weight in enumerate(bell))
-    return smooth
+    first, last = values[:, :1], values[:, -1:]
+    before, after = values[:, half:0:-1], values[:, -2 : -half - 2 : -1]
+    padded = np.hstack((2 * first - before, values, 2 * last - after))
+    return np.array([np.convolve(row, _bell(half), "valid") for row in padded])
+
+
+@lru_cache(maxsize=16)
+def _bell(half: int) -> Float64:
+    """(2 half + 1,) weights that add to 1, and nearly reach 0 at both ends."""
+    bell = np.hanning(2 * half + 3)[1:-1]
+    weights: Float64 = bell / bell.sum()
+    return weights
 
 
 def _channels(times: Float64, mouth: Float64, taken: Float64) -> tuple[Channel, ...]:
     lips = Channel(presence("lips"), times, taken, "linear", Layer.SPEECH)
-    moved = mouth_faps(mouth).items()
+    moved = mouth_faps(mouth.T).items()
     return (lips, *(Channel(fap(number), times, value, "linear", Layer.SPEECH) for number, value in moved))

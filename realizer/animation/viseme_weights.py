@@ -56,7 +56,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
     shown = np.zeros((len(keys), VISEMES))
     classes = list(dominances(track, keys))
     for near, parts, _ in classes:
-        shown += np.einsum("nk,nkv->nv", parts, track.mix[near]) / len(classes)
+        shown += np.einsum("kn,knv->nv", parts, track.mix[near]) / len(classes)
     for viseme, holds in zip((BILABIAL, LABIODENTAL), held(track, keys), strict=True):
         # Over a key on either side, as the lips themselves pass into a closure.
         share = np.convolve(np.pad(holds.astype(float), 1, "edge"), [0.25, 0.5, 0.25], "valid")[:, None]

@@ -264,6 +264,8 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
         before, here = begins[k - 1], begins[k]
         if not sounds[k] or not sounds[k - 1] or is_vowel(bare(sounds[k])):
             continue
+        if abs(int(pcm[here - 1])) > SILENCE:  # mostly
+            continue
         loud = np.flatnonzero(np.abs(pcm[before:here].astype(np.int32)) > SILENCE)
         quiet = before + (int(loud[-1]) + 1 if len(loud) else 0)
         if here - quiet >= LEAST_CLOSURE * rate:

@@ -20,6 +20,7 @@ class Kept:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._said: OrderedDict[Say, Utterance] = OrderedDict()
+        self._samples = 0
 
     def get(self, request: Say, speak: Callable[[Say], Utterance]) -> Utterance:
         """What was said before, or what `speak` says now, which is then kept."""
@@ -29,10 +30,12 @@ class Kept:
                 return self._said[request]
         utterance = speak(request)
         with self._lock:
+            if (same := self._said.pop(request, None)) is not None:  # another thread asked too
+                self._samples -= _samples(same)
             self._said[request] = utterance
-            samples = sum(_samples(said) for said in self._said.values())
-            while self._said and (len(self._said) > MOST or samples > MOST_SAMPLES):
-                samples -= _samples(self._said.popitem(last=False)[1])
+            self._samples += _samples(utterance)
+            while self._said and (len(self._said) > MOST or self._samples > MOST_SAMPLES):
+                self._samples -= _samples(self._said.popitem(last=False)[1])
         return utterance
 
 

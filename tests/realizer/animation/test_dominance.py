@@ -69,15 +69,15 @@ def test_the_parts_of_all_sounds_add_to_a_little_less_than_everything() -> None:
     for near, parts, _ in dominances(found, key_times(said)):
         assert near.shape == parts.shape
         assert (parts >= 0).all()
-        assert (parts.sum(axis=1) < 1).all()
-        assert (parts.sum(axis=1) > 0.75).all()
+        assert (parts.sum(axis=0) < 1).all()
+        assert (parts.sum(axis=0) > 0.75).all()
 
 
 def test_in_its_middle_a_sound_has_more_to_say_than_at_its_edges() -> None:
     found = track(("t", 0.1), ("a", 0.1), ("t", 0.1))
     times = np.array([0.1, 0.15, 0.2])
     for near, parts, members in dominances(found, times):
-        own = np.where(near == 1, parts, 0).sum(axis=1)
+        own = np.where(near == 1, parts, 0).sum(axis=0)
         assert own[1] > own[0], members
         assert own[1] > own[2], members
 
