@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -100,6 +100,15 @@ class Cast:
             return first
         last = max(0.0, newest.stopped - newest.start)  # nothing of it comes any more
         return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
+
+    def known(self) -> tuple[list[Schedule], Schedule]:
+        """What there is of blocks that are gone, the oldest first, and what is anticipated."""
+        return list(self._past.values()), self._anticipated
+
+    def restore(self, past: Iterable[Schedule], anticipated: Schedule) -> None:
+        """Know what another cast has known."""
+        self._past = {schedule.block: schedule for schedule in past}
+        self._anticipated = anticipated
 
     def anticipate(self, id: str, syncs: Mapping[str, float]) -> None:
         """Points in time that a client expects, seconds on the session clock."""

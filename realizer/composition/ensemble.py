@@ -135,6 +135,11 @@ class Ensemble:
     def next_deadline(self) -> float | None:
         return float("-inf") if self.reports else self.course.calendar.next
 
+    @property
+    def resting(self) -> bool:
+        """Nothing plays, waits, is expected or owed, and of what has ended nothing is to be seen."""
+        return not (self.cast.all() or self._expected or self.reports)
+
     def stirs(self, now: float, before: float) -> bool:
         """Whether `due(now)` or `forget(before)` would have something."""
         due = self.next_deadline()
