@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from random import Random
+from unittest.mock import patch
 from zlib import crc32
 
 import numpy as np
@@ -18,9 +19,10 @@ from realizer.errors import RenderError, VoiceError
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import Hub
 from realizer.server.journal import JournalError
-from realizer.server.journal.entry import Entry
+from realizer.server.journal import notes as thresholds
+from realizer.server.journal.entry import Entry, Kept
 from realizer.server.journal.notes import Notes
-from realizer.server.journal.replay import replay
+from realizer.server.journal.replay import restored
 from realizer.server.session import Session
 from realizer.server.wire import ClipPiece, pack_clip, unpack
 from realizer.settings import Settings
@@ -29,7 +31,7 @@ from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Utterance
 from tests.mutants import mutants
 
-__all__ = ["CONTROLS", "FILTERS", "Interleaving", "no_error"]
+__all__ = ["BODIES", "CONTROLS", "FILTERS", "HEADS", "NAMES", "Interleaving", "Memory", "no_error", "spoken"]
 
 OPENED = 1000.0
 EPOCH = 1.7e9
@@ -89,29 +91,49 @@ FILTERS: tuple[Mapping[str, object], ...] = (
 )
 
 
-class Kept:
-    """A journal in memory; `full` says whether it has room for one more entry."""
+class Memory:
+    """A journal in memory; `full` says whether it has no room for what comes.
 
-    def __init__(self, full: Callable[[], bool]) -> None:
+    Attributes:
+        compacted: how many checkpoints were kept.
+    """
+
+    def __init__(self, full: Callable[[], bool] = lambda: False) -> None:
+        self.compacted = 0
         self.entries: dict[str, list[Entry]] = {}
+        self.parts: dict[str, dict[str, str]] = {}
         self._full = full
 
     def begin(self, session: str, epoch: float) -> None:
-        self.entries[session] = []
+        self.entries[session], self.parts[session] = [], {}
 
     def add(self, session: str, entry: Entry) -> None:
         if self._full():
             raise JournalError("no room")
         self.entries[session].append(Entry.read(entry.line()))
 
-    def take(self, session: str) -> tuple[float, list[Entry]] | None:
-        return (EPOCH, self.entries[session]) if session in self.entries else None
+    def take(self, session: str) -> Kept | None:
+        if session not in self.entries:
+            return None
+        return Kept(EPOCH, list(self.entries[session]), dict(self.parts[session]))
+
+    def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
+        if self._full():
+            raise JournalError("no room")
+        self.compacted += 1
+        self.entries[session].clear()
+        for name, text in parts.items():
+            self.parts[session].pop(name, None)
+            if text is not None:
+                self.parts[session][name] = text
 
     def end(self, session: str) -> None:
         self.entries.pop(session, None)
+        self.parts.pop(session, None)
 
     def close(self) -> None:
         self.entries.clear()
+        self.parts.clear()
 
 
 @dataclass
@@ -144,9 +166,9 @@ class Interleaving:
         self.random = Random(seed)
         self.now = OPENED
         self._full = full
-        self._journal = Kept(lambda: self.random.random() < self._full)
-        self._hub = Hub(self._make, self._settings)
+        self._journal = Memory(lambda: self.random.random() < self._full)
         self._settings = Settings(max_blocks=50, keep=5)
+        self._hub = Hub(self._make, self._settings)
         self._broken = mutants(documents, 10**9, seed) if documents else None
         self._views: dict[int, View] = {}
         self._count = 0
@@ -156,7 +178,7 @@ class Interleaving:
 
     def _make(self, id: str, now: float, named: bool) -> Session:
         session = Session(id, self._settings, now, named=named, epoch=EPOCH)
-        session.notes = Notes(id, [self._journal] if named else [])
+        session.notes = Notes(id, self._journal if named else None)
         session.notes.begin(EPOCH)
         return session
 
@@ -166,7 +188,8 @@ class Interleaving:
         Raises:
             AssertionError: a law is broken.
         """
-        with no_error():
+        # Checkpoints are taken wherever one can be.
+        with no_error(), patch.object(thresholds, "ENTRIES", 5):
             for _ in range(steps):
                 self._step()
             self._end()
@@ -366,8 +389,10 @@ class Interleaving:
     def _again(self, session: Session) -> None:
         """Another process tells the same, from the journal."""
         other = Session(session.id, self._settings, 0.0, named=True, epoch=EPOCH)
-        replay(other, self._journal.entries[session.id], spoken)
-        told = [text for _, text in session.log.since(1)]
+        kept = self._journal.take(session.id)
+        assert kept is not None
+        restored(other, kept, spoken)
+        told = [text for _, text in session.log.since(other.log.first)]
         deadline = other.next_deadline()
         while deadline is not None and deadline <= self.now - session.opened:
             other.tick(max(deadline, 0.0))

@@ -32,6 +32,9 @@ class Expected:
     def __init__(self) -> None:
         self._fates: dict[str, Fate] = {}
 
+    def __len__(self) -> int:
+        return len(self._fates)
+
     def __contains__(self, id: str) -> bool:
         return id in self._fates
 

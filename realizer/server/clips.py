@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import base64
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +50,32 @@ class _Clip:
     def size(self) -> int:
         return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
 
+    def plain(self) -> dict[str, Any]:
+        """All of it, as JSON can hold it."""
+        sound = None
+        if self.sound is not None:
+            sound = {"rate": self.sound[0], "pcm": _text(self.sound[1].astype("<i2").tobytes())}
+        return {
+            "pieces": [_text(piece) for piece in self.pieces],
+            "rate": self.rate,
+            "sound": sound,
+            "text": self.text,
+            "words": [one.model_dump() for one in self.words],
+            "phonemes": [one.model_dump() for one in self.phonemes],
+            "told": self.told,
+        }
+
+    @classmethod
+    def of(cls, told: Mapping[str, Any]) -> _Clip:
+        """What `plain` told of."""
+        sound = None
+        if told["sound"] is not None:
+            pcm = np.frombuffer(base64.b64decode(told["sound"]["pcm"]), "<i2")
+            sound = int(told["sound"]["rate"]), pcm.astype(np.int16, copy=False)
+        words, phonemes = ([Timed(**one) for one in told[of]] for of in ("words", "phonemes"))
+        pieces = [base64.b64decode(piece) for piece in told["pieces"]]
+        return cls(pieces, told["rate"], sound, told["text"], words, phonemes, told["told"])
+
 
 class Clips:
     """The sound clips of one session.
@@ -58,6 +87,33 @@ class Clips:
     def __init__(self) -> None:
         self.recordings: dict[str, Recording] = {}
         self._clips: dict[str, _Clip] = {}
+        self._changed: set[str] = set()
+
+    @property
+    def ids(self) -> list[str]:
+        """Of all clips, whole or not, the oldest first."""
+        return list(self._clips)
+
+    def changes(self) -> dict[str, str | None]:
+        """Id -> JSON of each clip that has changed since `settle`, None of one that is gone."""
+        return {
+            id: json.dumps(clip.plain(), ensure_ascii=False) if (clip := self._clips.get(id)) else None
+            for id in sorted(self._changed)
+        }
+
+    def settle(self) -> None:
+        """What `changes` told of is kept."""
+        self._changed.clear()
+
+    def restore(self, clips: Iterable[tuple[str, str]]) -> None:
+        """Have the clips, id and JSON of each, that others have told of; the oldest first.
+
+        Raises:
+            KeyError, TypeError, ValueError: that is none.
+        """
+        for id, text in clips:
+            self._clips[id] = _Clip.of(json.loads(text))
+            self._publish(id, self._clips[id])
 
     def take(self, piece: ClipPiece) -> None:
         """One more piece of a clip.
@@ -67,6 +123,7 @@ class Clips:
                 could not be read.
         """
         where = f"clip:{piece.id}"
+        self._changed.add(piece.id)
         clip = self._clips.get(piece.id)
         if clip is None or (piece.number == 0 and clip.sound is not None):
             clip = self._new(piece.id)
@@ -97,6 +154,7 @@ class Clips:
         """
         assert message.clip is not None
         phonemes = [*message.phonemes, *_sounds(message)]
+        self._changed.add(message.clip)
         clip = self._clips.get(message.clip) or _Clip()
         before: tuple[list[Timed], list[Timed], str | None]
         before = ([], [], None) if clip.told else (clip.words, clip.phonemes, clip.text)
@@ -153,7 +211,12 @@ class Clips:
         while sum(sizes.values()) > MOST_BYTES or len(sizes) > MOST_CLIPS:
             oldest = next(id for id in sizes if id != newest)
             del sizes[oldest], self._clips[oldest]
+            self._changed.add(oldest)
             self.recordings.pop(oldest, None)
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
 
 
 def _sounds(message: SpeechMessage) -> list[Timed]:

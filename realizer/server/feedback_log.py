@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from itertools import islice
 
-from bml_schema import Feedback
+from bml_schema import Feedback, parse_feedback
 
 __all__: list[str] = []
 
@@ -35,6 +36,11 @@ class FeedbackLog:
         """Number a message and keep it."""
         self.newest += 1
         self._kept.append((feedback, feedback.to_xml(self.newest, self._epoch)))
+
+    def restore(self, newest: int, texts: Iterable[str]) -> None:
+        """Have told these messages, the last of which has the number `newest`."""
+        self.newest = newest
+        self._kept.extend((parse_feedback(text), text) for text in texts)
 
     def since(self, seq: int) -> list[tuple[Feedback, str]]:
         """The kept messages from `seq` on, in order, each with its text."""

@@ -55,6 +55,11 @@ class Intake:
         """Something can be read or planned at once."""
         return bool(self.inbox or self.speeches.has_next or self.preparation.has_ready)
 
+    @property
+    def resting(self) -> bool:
+        """Nothing is being read, spoken, prepared or said piece by piece."""
+        return not (self.inbox or len(self.preparation) or len(self.speeches) or len(self.orders))
+
     def put(self, text: str, t: float) -> None:
         """Take a message with documents, or refuse it."""
         if (refused := self.inbox.put(text)) is not None:

@@ -56,6 +56,10 @@ class Metrics:
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
         self._labels = "" if worker is None else f'worker="{worker}"'
 
+    def record_stopped(self) -> None:
+        """One that could not be written."""
+        self.counts["records_stopped"] += 1
+
     def text(self, now: Mapping[str, float], more: Mapping[str, int]) -> str:
         """All of it.
 
@@ -95,4 +99,5 @@ COUNTERS = {
     "refused": "Connections that were not let in.",
     "frames_dropped": "Frames, pictures and sound packets that slow clients did not get.",
     "failures": "Sessions that a fault of the service ended.",
+    "records_stopped": "Records that could not be written to their end.",
 }

@@ -43,15 +43,20 @@ class Orders:
 
     Attributes:
         fault: why a voice failed last; None where none did.
+        placed: how many orders were given; the last one has this number.
     """
 
     def __init__(self, player: Player, preparation: Preparation) -> None:
         self.fault: str | None = None
         self._player = player
         self._preparation = preparation
-        self._count = 0
+        self.placed = 0
         self._texts: dict[int, _Text] = {}
         self._flowing: set[int] = set()  # what is a sentence only with the piece that follows
+
+    def __len__(self) -> int:
+        """Long texts of which a part is being said."""
+        return len(self._texts)
 
     def place(self, waiting: Waiting, wants: Mapping[str, Say]) -> list[Speak]:
         """Ask for what a block wants said, of a long text for its first clause.
@@ -120,8 +125,8 @@ class Orders:
         return self._preparation.deadline(PATIENCE)
 
     def _speak(self, say: Say) -> Speak:
-        self._count += 1
-        return Speak(self._count, say)
+        self.placed += 1
+        return Speak(self.placed, say)
 
     def _grown(self, text: _Text, speak: int, part: Utterance, t: float) -> bool:
         """Give a block one more part of its text; False where it wants no more."""

@@ -23,6 +23,7 @@ from realizer.server.feedback_log import FeedbackLog
 from realizer.server.inbox import name_of
 from realizer.server.intake import Intake
 from realizer.server.journal import JournalError, Lost
+from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.notes import Notes
 from realizer.server.limits import MAX_CHARACTERS, too_long
@@ -189,6 +190,8 @@ class Session:
         # What was due is told before anything changes, whether somebody woke the session in time or not:
         # who does all of it again from the journal is not woken in between.
         self._publish(t)
+        if self.notes.grown and not self._compact(t):
+            return
         kept = False
         if isinstance(message, bytes):
             if kept := self._keep(t, "sound", connection, message):
@@ -231,6 +234,15 @@ class Session:
         """Write into the journal what has happened; False where the session is another process's now."""
         try:
             self.notes.tell(t, kind, number, body)
+        except Lost as error:
+            self._lose(error)
+            return False
+        return True
+
+    def _compact(self, t: float) -> bool:
+        """Let the journal begin anew where nothing plays; False where the session is another process's now."""
+        try:
+            checkpoint(self, t)
         except Lost as error:
             self._lose(error)
             return False
@@ -291,6 +303,13 @@ class Session:
             self.broadcast.frames_due(t, self._effects)
         elif self._work(t, reads):
             self._tell(t, "tick")
+
+    def rest(self, now: float) -> None:
+        """Keep the journal short, where it has grown; what is due is told first."""
+        if self.notes.grown and not self.closed:
+            self._calm = None
+            self._publish(now - self.opened)
+            self._compact(now - self.opened)
 
     def pass_time(self, t: float) -> None:
         """Tell what comes due before `t` on the session clock, each at its own time; for who replays it."""

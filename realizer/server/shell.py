@@ -17,10 +17,10 @@ from realizer.server.alarms import Alarms
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import ANYBODY, Hub, HubError, Visitor
-from realizer.server.journal import Journal, JournalError, journal_at
+from realizer.server.journal import Journal, JournalError, Log, journal_at
 from realizer.server.journal.folder import FolderJournal, head
 from realizer.server.journal.notes import Notes
-from realizer.server.journal.replay import caught_up, replay
+from realizer.server.journal.replay import caught_up, restored
 from realizer.server.metrics import Metrics
 from realizer.server.session import Session
 from realizer.server.studio import Studio
@@ -65,7 +65,7 @@ class Shell:
         self._ending = False
         self._closed = False
         self._journal: Journal | None = None
-        self._record: Journal | None = None
+        self._record: Log | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
 
     async def start(self) -> None:
@@ -171,17 +171,16 @@ class Shell:
         try:
             if (kept := journal.take(name)) is None:
                 return
-            epoch, entries = kept
-            session = self._new(name, 0.0, named=True, epoch=epoch)
-            owed = await self._loop.run_in_executor(None, replay, session, entries, self._studio.speak)
-            session.notes = Notes(name, [journal])
-            at, more = caught_up(session, entries[-1].at if entries else 0.0, seen)
+            session = self._new(name, 0.0, named=True, epoch=kept.epoch)
+            at, owed = await self._loop.run_in_executor(None, restored, session, kept, self._studio.speak)
+            session.notes = Notes(name, journal, kept=kept)
+            at, more = caught_up(session, at, seen)
             now = self._loop.time()
-            session.opened = now - max(at, time.time() - epoch)
+            session.opened = now - max(at, time.time() - kept.epoch)
             for connection in session.connections:  # which went with the other process
                 session.disconnect(connection, now)
             self._hub.sessions[name] = session
-            log.info("session %s is gone on with, %d entries long", name, len(entries))
+            log.info("session %s is gone on with, %d entries long", name, len(kept.entries))
             for effect in (*owed, *more):
                 self._do(session, effect)
             self._pump(session)
@@ -236,8 +235,8 @@ class Shell:
     def _make(self, id: str, now: float, named: bool) -> Session:
         epoch = time.time()
         session = self._new(id, now, named=named, epoch=epoch)
-        journals = [self._journal if named else None, self._record]
-        session.notes = Notes(id, [journal for journal in journals if journal is not None])
+        journal = self._journal if named else None
+        session.notes = Notes(id, journal, self._record, stopped=self.metrics.record_stopped)
         try:
             session.notes.begin(epoch)
         except JournalError as error:

@@ -102,6 +102,9 @@ class Speeches:
         self._player = player
         self._speeches: dict[str, _Speech] = {}
 
+    def __len__(self) -> int:
+        return len(self._speeches)
+
     # from clients -------------------------------------------------------------------------------
 
     def hear(self, message: SpeechMessage, connection: int, t: float) -> None:

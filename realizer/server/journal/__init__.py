@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Lost
+from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Log, Lost
 
-__all__ = ["Entry", "Journal", "JournalError", "Lost", "journal_at"]
+__all__ = ["Entry", "Journal", "JournalError", "Kept", "Log", "Lost", "journal_at"]
 
 
 def journal_at(where: str) -> Journal:

@@ -1,15 +1,16 @@
-"""The unit of a journal: one thing that was done to a session, at a time of its clock, as a line of JSON."""
+"""What journals keep of sessions: each thing that was done, as a line of JSON, and what that has come to."""
 
 from __future__ import annotations
 
 import base64
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal, Protocol, get_args
 
 from realizer.errors import RealizerError
 
-__all__ = ["Entry", "Journal", "JournalError", "Kind", "Lost"]
+__all__ = ["Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost"]
 
 # join, leave: of a connection. text, sound: a message of one. spoken: a voice answered. tick: something that
 # waited was read or planned.
@@ -69,8 +70,23 @@ class Entry:
             raise JournalError(f"wanted an entry of a journal, got {line[:80]!r}: {error}") from None
 
 
-class Journal(Protocol):
-    """Where the entries of sessions are kept. Called inside the event loop: a call takes well under 1 ms."""
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What there is of a session.
+
+    Attributes:
+        epoch: POSIX seconds at 0 of its clock.
+        entries: what was done to it, all of it or what followed the checkpoint.
+        parts: name -> text: what it was at its last checkpoint; {} where there was none.
+    """
+
+    epoch: float
+    entries: list[Entry]
+    parts: Mapping[str, str] = field(default_factory=dict)
+
+
+class Log(Protocol):
+    """Where what is done to sessions is written. Called in the event loop: a call takes well under 1 ms."""
 
     def begin(self, session: str, epoch: float) -> None:
         """Keep a new session.
@@ -92,18 +108,34 @@ class Journal(Protocol):
         """
         ...
 
-    def take(self, session: str) -> tuple[float, list[Entry]] | None:
-        """Take a session over: its epoch and its entries so far, to be gone on with; None where it has none.
+    def end(self, session: str) -> None:
+        """The session is over. A fault is left to those who clean up."""
+        ...
+
+    def close(self) -> None:
+        """Write what is not written."""
+        ...
+
+
+class Journal(Log, Protocol):
+    """Where sessions are kept until they end, so that another process can go on with them."""
+
+    def take(self, session: str) -> Kept | None:
+        """Take a session over, to be gone on with; None where it is not there.
 
         Raises:
             JournalError: it cannot be read.
         """
         ...
 
-    def end(self, session: str) -> None:
-        """The session is over: nothing of it is kept. A fault is left to those who clean up."""
-        ...
+    def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
+        """A checkpoint: put what the session is in the place of what was done to it, all or nothing of it.
 
-    def close(self) -> None:
-        """Write what is not written."""
+        Args:
+            parts: name -> text of each that is new or another one; None: it is gone. The others stay.
+
+        Raises:
+            Lost: another process has taken the session over.
+            JournalError: it cannot be written, and all is as it was.
+        """
         ...

@@ -58,9 +58,6 @@ class FolderJournal:
         except OSError as error:
             raise JournalError(f"the record {file.name}: {error.strerror}") from None
 
-    def take(self, session: str) -> tuple[float, list[Entry]] | None:
-        return None
-
     def end(self, session: str) -> None:
         if (file := self._files.pop(session, None)) is not None:
             with contextlib.suppress(OSError):

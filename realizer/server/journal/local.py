@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import secrets
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from realizer.server.journal.entry import Entry, JournalError, Lost
+from realizer.server.journal.entry import Entry, JournalError, Kept, Lost
 
 __all__ = ["LocalJournal"]
 
@@ -16,6 +16,9 @@ TABLES = """
 CREATE TABLE IF NOT EXISTS sessions (id TEXT PRIMARY KEY, owner TEXT NOT NULL, epoch REAL NOT NULL);
 CREATE TABLE IF NOT EXISTS entries (n INTEGER PRIMARY KEY, session TEXT NOT NULL, line TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS of_session ON entries (session, n);
+CREATE TABLE IF NOT EXISTS parts (
+    session TEXT NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL, PRIMARY KEY (session, name)
+);
 """
 # How long a write waits for another worker's.
 BUSY = 2.0  # s
@@ -24,7 +27,8 @@ BUSY = 2.0  # s
 class LocalJournal:
     """The file of that name, made where it is not there; several workers of one machine may share it.
 
-    A killed process loses nothing of it; a machine that loses power may lose its last moments.
+    A killed process loses nothing of it; a machine that loses power may lose its last moments. What sessions
+    no longer need is room for others: the file does not grow by it, and does not shrink.
 
     Raises:
         JournalError: the file cannot be had.
@@ -41,15 +45,9 @@ class LocalJournal:
             self._file.executescript(TABLES)
 
     def begin(self, session: str, epoch: float) -> None:
-        with self._told():
-            self._file.execute("BEGIN IMMEDIATE")
-            try:
-                self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
-                self._file.execute("REPLACE INTO sessions VALUES (?, ?, ?)", (session, self._owner, epoch))
-                self._file.execute("COMMIT")
-            except BaseException:
-                self._file.rollback()
-                raise
+        with self._at_once():
+            self._forget(session)
+            self._file.execute("REPLACE INTO sessions VALUES (?, ?, ?)", (session, self._owner, epoch))
 
     def add(self, session: str, entry: Entry) -> None:
         with self._told():
@@ -58,29 +56,63 @@ class LocalJournal:
                 (entry.line(), session, self._owner),
             )
         if not done.rowcount:
-            raise Lost(f"session {session} is another process's now")
+            raise _lost(session)
 
-    def take(self, session: str) -> tuple[float, list[Entry]] | None:
+    def take(self, session: str) -> Kept | None:
         with self._told():
+            # From here on nobody else writes of it.
             mine = self._file.execute(
                 "UPDATE sessions SET owner = ? WHERE id = ? RETURNING epoch", (self._owner, session)
             ).fetchone()
             lines = self._file.execute(
                 "SELECT line FROM entries WHERE session = ? ORDER BY n", (session,)
             ).fetchall()
-        return None if mine is None else (mine[0], [Entry.read(line) for (line,) in lines])
+            parts = self._file.execute(
+                "SELECT name, text FROM parts WHERE session = ?", (session,)
+            ).fetchall()
+        return None if mine is None else Kept(mine[0], [Entry.read(line) for (line,) in lines], dict(parts))
+
+    def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
+        with self._at_once():
+            if not self._mine(session):
+                raise _lost(session)
+            self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
+            for name, text in parts.items():
+                if text is None:
+                    self._file.execute("DELETE FROM parts WHERE session = ? AND name = ?", (session, name))
+                else:
+                    self._file.execute("REPLACE INTO parts VALUES (?, ?, ?)", (session, name, text))
 
     def end(self, session: str) -> None:
-        with contextlib.suppress(JournalError), self._told():
-            gone = self._file.execute(
-                "DELETE FROM sessions WHERE id = ? AND owner = ?", (session, self._owner)
-            )
-            if gone.rowcount:
-                self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
+        with contextlib.suppress(JournalError), self._at_once():
+            if self._mine(session):
+                self._forget(session)
 
     def close(self) -> None:
         with contextlib.suppress(sqlite3.Error):
             self._file.close()
+
+    def _mine(self, session: str) -> bool:
+        found = self._file.execute(
+            "SELECT 1 FROM sessions WHERE id = ? AND owner = ?", (session, self._owner)
+        ).fetchone()
+        return found is not None
+
+    def _forget(self, session: str) -> None:
+        for table, column in (("entries", "session"), ("parts", "session"), ("sessions", "id")):
+            self._file.execute(f"DELETE FROM {table} WHERE {column} = ?", (session,))
+
+    @contextlib.contextmanager
+    def _at_once(self) -> Iterator[None]:
+        """All that is done inside, or nothing of it."""
+        with self._told():
+            self._file.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._file.execute("COMMIT")
+            except BaseException:
+                self._file.rollback()
+                raise
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
@@ -88,3 +120,7 @@ class LocalJournal:
             yield
         except (sqlite3.Error, OSError) as error:
             raise JournalError(f"the journal {self._path}: {error}") from None
+
+
+def _lost(session: str) -> Lost:
+    return Lost(f"session {session} is another process's now")

@@ -1,15 +1,21 @@
-"""What is done to one session in, entries of its journals out."""
+"""What is done to one session in, entries of its journal and of its record out."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Kind, Lost
+from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Kind, Log, Lost
 
 __all__ = ["Notes"]
 
 log = logging.getLogger(__name__)
+
+# A checkpoint is due after so many entries, which are done again in about half a second, or so many bytes.
+ENTRIES = 250
+BYTES = 2**20
+# And where it could not be written, again after so many.
+AGAIN = 25
 
 
 class Notes:
@@ -17,13 +23,34 @@ class Notes:
 
     Args:
         session: its name.
-        journals: where to; none: nothing is kept.
+        journal: what another process would go on from; None: none does.
+        record: what is played again to look at it. It may fail: nobody waits for it.
+        stopped: is called when a record has failed; nothing more is written of it.
+        kept: what is in the journal already.
     """
 
-    def __init__(self, session: str, journals: Iterable[Journal] = ()) -> None:
+    def __init__(
+        self,
+        session: str,
+        journal: Journal | None = None,
+        record: Log | None = None,
+        *,
+        stopped: Callable[[], None] = lambda: None,
+        kept: Kept | None = None,
+    ) -> None:
         self._session = session
-        self._journals = tuple(journals)
+        self._journal = journal
+        self._record = record
+        self._stopped = stopped
         self._failing = False
+        entries = [] if kept is None else kept.entries
+        self._entries = len(entries)
+        self._bytes = sum(len(entry.body) for entry in entries)
+
+    @property
+    def grown(self) -> bool:
+        """A checkpoint is due."""
+        return self._entries >= ENTRIES or self._bytes >= BYTES
 
     def begin(self, epoch: float) -> None:
         """The session is new.
@@ -31,8 +58,9 @@ class Notes:
         Raises:
             JournalError: it cannot be kept.
         """
-        for journal in self._journals:
-            journal.begin(self._session, epoch)
+        if self._journal is not None:
+            self._journal.begin(self._session, epoch)
+        self._recorded(lambda record: record.begin(self._session, epoch))
 
     def keep(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
         """What must not be done unless it is kept.
@@ -41,8 +69,9 @@ class Notes:
             Lost: another process has the session.
             JournalError: it cannot be kept.
         """
-        for journal in self._journals:
-            journal.add(self._session, Entry(at, kind, number, body))
+        entry = Entry(at, kind, number, body)
+        self._kept(entry)
+        self._recorded(lambda record: record.add(self._session, entry))
 
     def tell(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
         """What happens all the same. A fault is logged once, until it is over.
@@ -50,17 +79,61 @@ class Notes:
         Raises:
             Lost: another process has the session.
         """
+        entry = Entry(at, kind, number, body)
         try:
-            self.keep(at, kind, number, body)
-            self._failing = False
+            self._kept(entry)
         except Lost:
             raise
         except JournalError as error:
-            if not self._failing:
-                log.error("session %s: %s", self._session, error)
-            self._failing = True
+            self._fails(error)
+            self._entries = ENTRIES  # what the journal lacks now, a checkpoint gives it back
+        self._recorded(lambda record: record.add(self._session, entry))
+
+    def compact(self, parts: Mapping[str, str | None]) -> bool:
+        """A checkpoint; False where it cannot be kept: then it is due again soon.
+
+        Raises:
+            Lost: another process has the session.
+        """
+        try:
+            if self._journal is not None:
+                self._journal.compact(self._session, parts)
+        except Lost:
+            raise
+        except JournalError as error:
+            self._fails(error)
+            self._entries, self._bytes = ENTRIES - AGAIN, 0
+            return False
+        self._entries = self._bytes = 0
+        return True
 
     def end(self) -> None:
         """The session is over."""
-        for journal in self._journals:
-            journal.end(self._session)
+        for one in (self._journal, self._record):
+            if one is not None:
+                one.end(self._session)
+
+    def _kept(self, entry: Entry) -> None:
+        if self._journal is None:
+            return
+        self._journal.add(self._session, entry)
+        self._failing = False
+        self._entries += 1
+        self._bytes += len(entry.body)
+
+    def _recorded(self, write: Callable[[Log], None]) -> None:
+        """A record has all or ends: one with a hole would be played otherwise than the session was."""
+        if self._record is None:
+            return
+        try:
+            write(self._record)
+        except JournalError as error:
+            log.warning("session %s is recorded no further: %s", self._session, error)
+            self._record.end(self._session)
+            self._record = None
+            self._stopped()
+
+    def _fails(self, error: JournalError) -> None:
+        if not self._failing:
+            log.error("session %s: %s", self._session, error)
+        self._failing = True

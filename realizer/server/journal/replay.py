@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable
 
 from realizer.errors import RealizerError, VoiceError
 from realizer.server.effects import Effect, Speak
-from realizer.server.journal.entry import Entry
+from realizer.server.journal.checkpoint import restore
+from realizer.server.journal.entry import Entry, Kept
 from realizer.server.session import Session
 from realizer.speech.utterance import Utterance
 
-__all__ = ["caught_up", "replay"]
+__all__ = ["caught_up", "replay", "restored"]
 
 
 def replay(
@@ -37,15 +38,31 @@ def replay(
                 session.receive(entry.number, entry.body, entry.at)
             case "spoken":
                 order = owed.pop(entry.number, None)
-                if order is not None:
-                    fault = VoiceError(str(entry.body)) if entry.body else None
-                    session.spoken(entry.number, fault or speak(order), entry.at)
+                # What was asked for before a checkpoint nobody waits for any more.
+                said = None if order is None or entry.body else speak(order)
+                session.spoken(entry.number, said or VoiceError(str(entry.body)), entry.at)
             case "tick":
                 session.tick(entry.at)
         for effect in session.outgoing():
             if isinstance(effect, Speak):
                 owed[effect.id] = effect
     return list(owed.values())
+
+
+def restored(
+    session: Session, kept: Kept, speak: Callable[[Speak], Utterance | RealizerError]
+) -> tuple[float, list[Effect]]:
+    """Let a new session be what a journal has kept, up to the last entry; as `replay`.
+
+    Returns:
+        Seconds on its clock, and what its shell owes it.
+
+    Raises:
+        JournalError: its checkpoint cannot be read.
+    """
+    at = restore(session, kept.parts) if kept.parts else 0.0
+    owed = replay(session, kept.entries, speak)
+    return kept.entries[-1].at if kept.entries else at, owed
 
 
 def caught_up(session: Session, at: float, seen: int) -> tuple[float, list[Effect]]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from realizer.server.journal.entry import Entry, JournalError, Lost
+from realizer.server.journal.entry import Entry, JournalError, Kept, Lost
 
 __all__ = ["SharedJournal"]
 
@@ -15,21 +15,32 @@ PATIENCE = 1.0  # s for an answer
 # Sessions whose node died and that nobody came back to are forgotten after so long.
 KEPT = 7 * 24 * 3600  # s
 
-# KEYS: of the head (owner, epoch) and of the list of entries. Nobody comes between the look and the write.
+# KEYS: of the head (owner, epoch), of the list of entries, and of the parts by name. Nobody comes between
+# the look and the write, and who restarts the store finds all of a script's writes in its log, or none.
 ADD = """
 if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
-redis.call('RPUSH', KEYS[2], ARGV[2])
-redis.call('EXPIRE', KEYS[1], ARGV[3])
-redis.call('EXPIRE', KEYS[2], ARGV[3])
+redis.call('RPUSH', KEYS[2], ARGV[3])
+for _, key in ipairs(KEYS) do redis.call('EXPIRE', key, ARGV[2]) end
 return 1
 """
 TAKE = """
 if redis.call('EXISTS', KEYS[1]) == 0 then return false end
 redis.call('HSET', KEYS[1], 'owner', ARGV[1])
-return {redis.call('HGET', KEYS[1], 'epoch'), redis.call('LRANGE', KEYS[2], 0, -1)}
+return {
+    redis.call('HGET', KEYS[1], 'epoch'), redis.call('LRANGE', KEYS[2], 0, -1), redis.call('HGETALL', KEYS[3])
+}
+"""
+# ARGV: ..., how many parts are gone, their names, and then name and text of each that is new.
+COMPACT = """
+if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
+redis.call('DEL', KEYS[2])
+for k = 4, 3 + ARGV[3] do redis.call('HDEL', KEYS[3], ARGV[k]) end
+for k = 4 + ARGV[3], #ARGV, 2 do redis.call('HSET', KEYS[3], ARGV[k], ARGV[k + 1]) end
+for _, key in ipairs(KEYS) do redis.call('EXPIRE', key, ARGV[2]) end
+return 1
 """
 END = """
-if redis.call('HGET', KEYS[1], 'owner') == ARGV[1] then redis.call('DEL', KEYS[1], KEYS[2]) end
+if redis.call('HGET', KEYS[1], 'owner') == ARGV[1] then redis.call('DEL', unpack(KEYS)) end
 """
 
 
@@ -54,32 +65,42 @@ class SharedJournal:
             )
         except ValueError as error:
             raise JournalError(f"the journal {self._url}: {error}") from None
-        self._add, self._take, self._end = map(self._store.register_script, (ADD, TAKE, END))
+        scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, END))
+        self._add, self._take, self._compact, self._end = scripts
         with self._told():
             self._store.ping()
 
     def begin(self, session: str, epoch: float) -> None:
-        head, entries = _keys(session)
+        head, *rest = _keys(session)
         with self._told():
             pipe = self._store.pipeline()
-            pipe.delete(entries)
+            pipe.delete(*rest)
             pipe.hset(head, mapping={"owner": self._owner, "epoch": repr(epoch)})
             pipe.expire(head, KEPT)
             pipe.execute()
 
     def add(self, session: str, entry: Entry) -> None:
         with self._told():
-            done = self._add(_keys(session), [self._owner, entry.line(), KEPT])
+            done = self._add(_keys(session), [self._owner, KEPT, entry.line()])
         if not done:
-            raise Lost(f"session {session} is another node's now")
+            raise _lost(session)
 
-    def take(self, session: str) -> tuple[float, list[Entry]] | None:
+    def take(self, session: str) -> Kept | None:
         with self._told():
             there = self._take(_keys(session), [self._owner])
         if there is None:
             return None
-        epoch, lines = there
-        return float(epoch), [Entry.read(line) for line in lines]
+        epoch, lines, parts = there
+        texts = dict(zip(parts[::2], parts[1::2], strict=True))
+        return Kept(float(epoch), [Entry.read(line) for line in lines], texts)
+
+    def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
+        gone = [name for name, text in parts.items() if text is None]
+        new = [word for name, text in parts.items() if text is not None for word in (name, text)]
+        with self._told():
+            done = self._compact(_keys(session), [self._owner, KEPT, len(gone), *gone, *new])
+        if not done:
+            raise _lost(session)
 
     def end(self, session: str) -> None:
         with contextlib.suppress(JournalError), self._told():
@@ -98,5 +119,10 @@ class SharedJournal:
 
 
 def _keys(session: str) -> list[str]:
-    """The braces keep both in one place of a cluster."""
-    return [f"realizer:{{{session}}}", f"realizer:{{{session}}}:entries"]
+    """The braces keep them in one place of a cluster."""
+    head = f"realizer:{{{session}}}"
+    return [head, f"{head}:entries", f"{head}:parts"]
+
+
+def _lost(session: str) -> Lost:
+    return Lost(f"session {session} is another node's now")

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from realizer.server.journal import Entry, JournalError, Lost, journal_at
+from realizer.server.journal import Entry, JournalError, Kept, Lost, journal_at
+from realizer.server.journal.local import LocalJournal
 
 ENTRIES = [
     Entry(0.0, "join", 1),
@@ -28,7 +29,7 @@ def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, s
     one.begin(session, 1234.5)
     for entry in ENTRIES:
         one.add(session, entry)
-    assert other.take(session) == (1234.5, ENTRIES)
+    assert other.take(session) == Kept(1234.5, ENTRIES)
     one.close()
     other.close()
 
@@ -36,12 +37,12 @@ def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, s
 def test_who_has_lost_a_session_is_told_when_it_writes(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     one.begin(session, 0.0)
-    assert other.take(session) == (0.0, [])
+    assert other.take(session) == Kept(0.0, [])
     with pytest.raises(Lost, match=session):
         one.add(session, ENTRIES[0])
     other.add(session, ENTRIES[1])
     one.end(session)  # which is not its any more
-    assert one.take(session) == (0.0, [ENTRIES[1]])
+    assert one.take(session) == Kept(0.0, [ENTRIES[1]])
 
 
 def test_a_session_that_ended_or_never_was_is_not_taken(where: str, session: str) -> None:
@@ -58,7 +59,53 @@ def test_a_session_that_begins_again_has_nothing_of_the_one_before(where: str, s
     journal.begin(session, 1.0)
     journal.add(session, ENTRIES[0])
     journal.begin(session, 2.0)
-    assert journal.take(session) == (2.0, [])
+    assert journal.take(session) == Kept(2.0, [])
+
+
+def test_a_checkpoint_stands_for_what_came_before_and_says_what_has_changed(where: str, session: str) -> None:
+    journal = journal_at(where)
+    journal.begin(session, 1.0)
+    journal.add(session, ENTRIES[0])
+    journal.compact(session, {"state": "one", "clip:a": "Grüße\n\u2028", "clip:b": "b"})
+    assert journal.take(session) == Kept(1.0, [], {"state": "one", "clip:a": "Grüße\n\u2028", "clip:b": "b"})
+    journal.add(session, ENTRIES[1])
+    journal.add(session, ENTRIES[2])
+    journal.compact(session, {"state": "two", "clip:b": None, "clip:never": None})
+    journal.add(session, ENTRIES[3])
+    assert journal_at(where).take(session) == Kept(
+        1.0, [ENTRIES[3]], {"state": "two", "clip:a": "Grüße\n\u2028"}
+    )
+
+
+def test_a_session_that_begins_again_or_ends_has_no_checkpoint(where: str, session: str) -> None:
+    journal = journal_at(where)
+    for end in (lambda: journal.begin(session, 2.0), lambda: journal.end(session)):
+        journal.begin(session, 1.0)
+        journal.compact(session, {"state": "old"})
+        end()
+        journal.begin(session, 2.0)
+        assert journal.take(session) == Kept(2.0, [])
+
+
+def test_who_has_lost_a_session_changes_nothing_by_a_checkpoint(where: str, session: str) -> None:
+    one, other = journal_at(where), journal_at(where)
+    one.begin(session, 0.0)
+    one.add(session, ENTRIES[0])
+    other.take(session)
+    with pytest.raises(Lost, match=session):
+        one.compact(session, {"state": "mine"})
+    assert other.take(session) == Kept(0.0, [ENTRIES[0]])
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_all_as_it_was(tmp_path: Path, session: str) -> None:
+    journal = LocalJournal(tmp_path / "journal.db")
+    journal.begin(session, 0.0)
+    journal.add(session, ENTRIES[0])
+    (used,) = journal._file.execute("PRAGMA page_count").fetchone()
+    journal._file.execute(f"PRAGMA max_page_count = {used}")
+    with pytest.raises(JournalError, match="full"):
+        journal.compact(session, {"state": "small", "clip:a": "x" * 100_000})
+    assert journal.take(session) == Kept(0.0, [ENTRIES[0]])
 
 
 def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -> None:
@@ -66,7 +113,7 @@ def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -
     for name, entry in ((session, ENTRIES[0]), (session + "~", ENTRIES[1])):
         journal.begin(name, 0.0)
         journal.add(name, entry)
-    assert journal.take(session) == (0.0, [ENTRIES[0]])
+    assert journal.take(session) == Kept(0.0, [ENTRIES[0]])
 
 
 @pytest.mark.parametrize(

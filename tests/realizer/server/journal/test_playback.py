@@ -33,7 +33,7 @@ SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
 def recorded(folder: Path) -> tuple[Path, list[str], Player]:
     """A session that was played with a voice that takes its time: its record, what was told, its player."""
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9, history=float("inf"))
-    session.notes = Notes("s", [FolderJournal(folder, head(SETTINGS, None))])
+    session.notes = Notes("s", record=FolderJournal(folder, head(SETTINGS, None)))
     session.notes.begin(1e9)
     session.connect(1, 100.0)
     coming = [

@@ -1,0 +1,189 @@
+"""A session that goes on from a checkpoint is the one that was never touched."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from random import Random
+
+import numpy as np
+import pytest
+
+from realizer.server.effects import Speak
+from realizer.server.journal import notes as thresholds
+from realizer.server.journal.notes import Notes
+from realizer.server.journal.replay import restored
+from realizer.server.session import Session
+from realizer.server.wire import ClipPiece, pack_clip
+from realizer.settings import Settings
+from tests.interleavings import BODIES, CONTROLS, HEADS, NAMES, Memory, no_error, spoken
+
+SETTINGS = Settings(voice="silent")
+EPOCH = 1.7e9
+RATE = 8000
+# Documents that say and show what the others do not, and what lasts.
+MORE = (
+    '<faceShift id="s" lexeme="SMILE" end="0.7"/>',
+    '<gazeShift id="s" target="cup" end="0.4"/><pointing id="p" target="cup"/>',
+    '<realizer:mood xmlns:realizer="urn:bml-realizer:1" id="m" name="joy" end="0.5"/>',
+    '<realizer:idle xmlns:realizer="urn:bml-realizer:1" id="i" blinks="0.2" motion="0.5" end="0.3"/>',
+    '<bmlt:audiofile xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt" id="a" fileName="clip:c"/>',
+    '<speech id="s"><text>Here it is</text></speech><head id="n" lexeme="NOD" start="{other}:bml:end"/>',
+)
+OWN_HEADS = (*HEADS, 'characterId="Ben"', 'characterId="Ben"')
+# What lasts, more often than it is said among all that can be.
+LASTING = (
+    {"type": "set", "emotion": {"name": "joy", "intensity": 0.7}},
+    {"type": "set", "emotion": {"name": "sadness"}, "character": "Ben"},
+    {"type": "set", "aus": {"12L": 0.5, "4": 1}, "faps": {"open_jaw": 200}},
+    {"type": "set", "aus": {"1": 0.3}, "character": "Ben"},
+    {"type": "character", "id": "Ben", "voice": "silent"},
+    {"type": "character", "id": "Ben", "face": "ben"},
+    {"type": "scene", "objects": {"cup": {"x": -0.3, "y": 0.1, "z": 0.4}}},
+    {"type": "anticipate", "id": "clock", "syncs": {"beat": 60.0}},
+)
+
+
+def opened(journal: Memory | None) -> Session:
+    session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
+    session.notes = Notes("s", journal)
+    session.notes.begin(EPOCH)
+    return session
+
+
+@dataclass
+class Run:
+    """A session with its clock at 0, and what its voice owes it."""
+
+    session: Session
+    owed: dict[int, Speak] = field(default_factory=dict)
+
+    def collect(self) -> None:
+        self.owed |= {effect.id: effect for effect in self.session.outgoing() if isinstance(effect, Speak)}
+
+    def until(self, t: float) -> None:
+        while (due := self.session.next_deadline()) is not None and due <= t:
+            self.session.tick(max(due, 0.0))
+            self.collect()
+
+
+class Pair:
+    """Two sessions to which the same is done; one of them dies now and then, and goes on from its journal."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = Random(seed)
+        self.journal = Memory()
+        self.whole, self.torn = Run(opened(None)), Run(opened(self.journal))
+        self.restored = 0
+        self._now = 0.0
+        self._connection = 1
+        for run in (self.whole, self.torn):
+            run.session.connect(1, 0.0)
+
+    def run(self, steps: int) -> None:
+        for _ in range(steps):
+            self.random.choice(
+                (self._send, self._send, self._control, self._clip, self._answer, self._rest)
+            )()
+            self._pass(self.random.choice((0.0, 0.02, 0.3, 1.0)))
+            self._agree()
+            if self.random.random() < 0.15:
+                self._die()
+                self._agree()
+
+    def _both(self, message: str | bytes) -> None:
+        for run in (self.whole, self.torn):
+            run.session.receive(self._connection, message, self._now)
+            run.collect()
+
+    def _send(self) -> None:
+        body = self.random.choice(BODIES + MORE)
+        text = f'<bml id="{self.random.choice(NAMES)}" {self.random.choice(OWN_HEADS)}>{body}</bml>'
+        self._both(text.replace("{other}", self.random.choice(NAMES)))
+
+    def _control(self) -> None:
+        message = self.random.choice(CONTROLS if self.random.random() < 0.5 else LASTING)
+        if message["type"] != "subscribe":  # frames are looked at without
+            self._both(json.dumps(message))
+
+    def _clip(self) -> None:
+        number, rate = self.random.choice((0, 0, 1)), self.random.choice((RATE, RATE, 0))
+        sound = self.random.randbytes(2 * RATE // 10)
+        self._both(pack_clip(ClipPiece(self.random.choice("cd"), number, rate, sound, number == 1)))
+
+    def _answer(self) -> None:
+        """Voices say what they were asked for, not in that order."""
+        ids = sorted(self.whole.owed.keys() | self.torn.owed.keys())
+        self.random.shuffle(ids)
+        for id in ids:
+            for run in (self.whole, self.torn):
+                if (order := run.owed.pop(id, None)) is not None:
+                    run.session.spoken(id, spoken(order), self._now)
+                    run.collect()
+
+    def _rest(self) -> None:
+        """Nobody does anything until nothing is seen any more; what is open is mostly closed."""
+        if self.random.random() < 0.7:
+            self._both('{"type": "stop"}')
+            for id in ("turn", "other"):
+                self._both(json.dumps({"type": "speech", "id": id, "close": True}))
+        for _ in range(4):
+            self._answer()
+            self._pass(1.5)
+        for run in (self.whole, self.torn):
+            run.session.rest(self._now)
+
+    def _pass(self, seconds: float) -> None:
+        self._now += seconds
+        for run in (self.whole, self.torn):
+            run.until(self._now)
+
+    def _die(self) -> None:
+        kept = self.journal.take("s")
+        assert kept is not None
+        session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
+        _, owed = restored(session, kept, spoken)
+        session.notes = Notes("s", self.journal, kept=kept)
+        self.torn = Run(session, {effect.id: effect for effect in owed if isinstance(effect, Speak)})
+        self.restored += bool(kept.parts)
+        for run in (self.torn, self.whole):
+            run.until(self._now)
+            run.session.disconnect(self._connection, self._now)
+            run.session.connect(self._connection + 1, self._now)
+            run.until(self._now)
+        self._connection += 1
+
+    def _agree(self) -> None:
+        whole, torn = self.whole.session, self.torn.session
+        first = torn.log.first
+        assert [text for _, text in torn.log.since(1)] == [text for _, text in whole.log.since(first)]
+        assert torn.log.newest == whole.log.newest
+        assert torn.player.characters == whole.player.characters
+        assert torn.clips.ids == whole.clips.ids
+        assert (torn.faces, torn.intake.voices) == (whole.faces, whole.intake.voices)
+        assert torn.intake.orders.fault == whole.intake.orders.fault
+        times = self._now + np.arange(4) / 25
+        for index in range(len(whole.player.characters)):
+            one, other = (session.player.frames(times, index) for session in (whole, torn))
+            assert np.array_equal(one.aus, other.aus)
+            assert np.array_equal(one.faps, other.faps)
+
+
+@pytest.fixture
+def eager(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checkpoints are taken wherever one can be."""
+    monkeypatch.setattr(thresholds, "ENTRIES", 1)
+
+
+def test_whatever_is_done_to_it_a_session_that_goes_on_from_a_checkpoint_is_as_if_it_had_never_died(
+    eager: None,
+) -> None:
+    taken = restored = 0
+    for seed in range(10):
+        pair = Pair(seed)
+        with no_error():
+            pair.run(60)
+        taken += pair.journal.compacted
+        restored += pair.restored
+    assert taken > 100
+    assert restored > 50
