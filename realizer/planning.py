@@ -79,8 +79,7 @@ def plan(
         for node in work.block.behaviours
         if node.id in schedule.times
     }
-    own = tuple(claims(work.block, schedule, kinds, world))
-    return Plan(work.block, schedule, channels, own, work.timings, moved)
+    return Plan(work.block, schedule, channels, work.claims, work.timings, moved)
 
 
 class _Failed(Exception):
@@ -108,6 +107,7 @@ class _Work:
         self.world = world
         self.timings: dict[str, Timing] = {}
         self.warnings: list[Warning] = []
+        self.claims: tuple[Claim, ...] = ()
 
     def take_problems(self) -> None:
         """What the parser dropped."""
@@ -159,10 +159,12 @@ class _Work:
             gone = self.timings.keys() - found.times.keys()
             self.drop([(self.behaviour(w), w) for w in warnings if self.behaviour(w) in gone])
             self.warnings += [w for w in warnings if self.behaviour(w) not in gone]
-            found = replace(found, start=start, character=self.block.character_id)
-            lost = losses(claims(self.block, found, self.kinds, self.world), held, start)
+            whole = tuple(self.warnings)
+            found = replace(found, start=start, character=self.block.character_id, warnings=whole)
+            self.claims = tuple(claims(self.block, found, self.kinds, self.world))
+            lost = losses(self.claims, held, start)
             if not lost:
-                return [replace(found, warnings=tuple(self.warnings)), *moved]
+                return [found, *moved]
             self.drop(
                 (
                     loss.claim.behaviour,

@@ -10,61 +10,70 @@ from realizer.composition.reporting import Event, Phase, State, events
 
 __all__ = ["Calendar"]
 
+# Entries of blocks that were dropped or moved may wait beside those that count, as many and so many more.
+SPARE = 16
+
 
 class Calendar:
     """Events that have not happened."""
 
     def __init__(self) -> None:
-        self._events: list[tuple[Event, int]] = []
-        # Number of a block -> which of its entries count: dropping them is a new edition, not a search.
-        self._edition: dict[int, int] = {}
+        # Number of a block -> its events, the first one last.
+        self._events: dict[int, list[Event]] = {}
+        # A heap of the first event of each block, and of others that count no more.
+        self._firsts: list[Event] = []
 
     @property
     def next(self) -> float | None:
         """When the first is due; None where there is none."""
-        self._skip()
-        return self._events[0][0].time if self._events else None
+        first = self._first()
+        return None if first is None else first.time
 
     def due(self, now: float) -> Iterator[Event]:
         """Take what is due out, in order; what is put in meanwhile comes in its turn."""
-        while (first := self.next) is not None and first <= now:
-            yield heapq.heappop(self._events)[0]
+        while (first := self._first()) is not None and first.time <= now:
+            events = self._events[first.block]
+            events.pop()
+            if events:
+                heapq.heapreplace(self._firsts, events[-1])
+            else:
+                heapq.heappop(self._firsts)
+                del self._events[first.block]
+            yield first
 
     def put(self, playing: Playing, only: Collection[tuple[str, str]] | None = None) -> None:
         """Put in what is still to happen in a block; of its sync points all, or `only` (behaviour, sync)."""
         number, order = playing.number, playing.order
         due = events(playing.block, playing.schedule, order, number)
-        due = [e for e in due if only is None or (e.name, e.sync) in only]
+        if only is not None:
+            due = [e for e in due if (e.name, e.sync) in only]
+        subsides, end = playing.subsides, playing.end
         if playing.waiting:
             due.append(Event(playing.start, order, Phase.START, block=number))
-        if playing.state is not State.SUBSIDING and playing.subsides < playing.end:
-            due.append(Event(playing.subsides, order, Phase.SUBSIDES, block=number))
-        due.append(Event(playing.end, order, Phase.END, block=number))
-        edition = self._edition.setdefault(number, 0)
-        for event in due:
-            heapq.heappush(self._events, (event, edition))
+        if playing.state is not State.SUBSIDING and subsides < end:
+            due.append(Event(subsides, order, Phase.SUBSIDES, block=number))
+        due.append(Event(end, order, Phase.END, block=number))
+        due.sort(reverse=True)
+        self._events[number] = due
+        heapq.heappush(self._firsts, due[-1])
+        if len(self._firsts) > 2 * len(self._events) + SPARE:
+            self._firsts = [events[-1] for events in self._events.values()]
+            heapq.heapify(self._firsts)
 
     def pending(self, playing: Playing) -> set[tuple[str, str]]:
         """The sync points of a block that have not passed, as (behaviour, sync)."""
-        return {
-            (event.name, event.sync)
-            for event, edition in self._events
-            if event.block == playing.number and edition == self._edition[event.block] and event.name
-        }
+        return {(e.name, e.sync) for e in self._events.get(playing.number, ()) if e.name}
 
     def drop(self, playing: Playing) -> None:
         """Take out all that is still to happen in a block."""
-        if playing.number in self._edition:
-            self._edition[playing.number] += 1
+        self._events.pop(playing.number, None)
 
-    def forget(self, playing: Playing) -> None:
-        """Nothing will happen in a block any more."""
-        self.drop(playing)
-        self._events = [entry for entry in self._events if entry[0].block != playing.number]
-        heapq.heapify(self._events)
-        self._edition.pop(playing.number, None)
-
-    def _skip(self) -> None:
-        """Take what was dropped off the top."""
-        while self._events and self._events[0][1] != self._edition[self._events[0][0].block]:
-            heapq.heappop(self._events)
+    def _first(self) -> Event | None:
+        """What comes first; what was dropped is taken off the top."""
+        while self._firsts:
+            first = self._firsts[0]
+            events = self._events.get(first.block)
+            if events and events[-1] is first:
+                return first
+            heapq.heappop(self._firsts)
+        return None

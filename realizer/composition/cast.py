@@ -24,10 +24,13 @@ class Cast:
 
     Attributes:
         next_number: of the next block that is added.
+        first_gone: from when on nothing is to be seen of the first block that has ended; infinite where none
+            has.
     """
 
     def __init__(self) -> None:
         self.next_number = 0
+        self.first_gone = FOREVER
         self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
         self._alive: dict[str, Playing] = {}  # by id; those that are not done
         self._ended: list[Playing] = []  # those of `_playing` that are done
@@ -43,17 +46,16 @@ class Cast:
         """A block has ended: its id is free."""
         del self._alive[playing.block.id]
         self._ended.append(playing)
-
-    @property
-    def first_gone(self) -> float:
-        """From when on nothing is to be seen of the first block that has ended; infinite where none has."""
-        return min((p.gone for p in self._ended), default=float("inf"))
+        self.first_gone = min(self.first_gone, playing.gone)
 
     def forget(self, before: float) -> list[Playing]:
         """Drop the blocks of which nothing is to be seen from a time on; returns them."""
         gone = [p for p in self._ended if p.gone < before]
+        if not gone:
+            return gone
+        self._ended = [p for p in self._ended if p.gone >= before]
+        self.first_gone = min((p.gone for p in self._ended), default=FOREVER)
         for playing in gone:
-            self._ended.remove(playing)
             self._past[playing.block.id] = playing.schedule
             del self._playing[playing.number]
         while len(self._past) > PAST:

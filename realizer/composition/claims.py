@@ -70,13 +70,14 @@ class Loss:
 def claims(block: Block, schedule: Schedule, kinds: Mapping[str, Kind], world: World) -> Iterator[Claim]:
     """What the scheduled behaviours of a block claim, on the clock of `schedule.start`."""
     for order, node in enumerate(block.behaviours):
-        if node.id not in schedule.times:
+        wanted = kinds[node.tag].claims(node, world) if node.id in schedule.times else ()
+        if not wanted:
             continue
         points, times = schedule.points[node.id], schedule.times[node.id]
         last = points.index("relax") if "relax" in points else -1
         begin, end = schedule.start + float(times[0]), schedule.start + float(times[last])
         rank = (-node.priority, node.id not in block.required, order)
-        for what in sorted(kinds[node.tag].claims(node, world)):
+        for what in sorted(wanted):
             yield Claim(what, begin, end, block.id, node.id, rank)
 
 

@@ -234,7 +234,7 @@ class Course:
         if playing.start < FOREVER:
             self.calendar.put(playing, pending)
         self.changed()
-        self.predict(playing, now, [b for b in behaviours if b in playing.schedule.times])
+        self.predict(playing, now, [b for b in playing.schedule.times if b in behaviours])
         self.solve_again(tied, playing.start, now)
         self.follow(playing, now)
 

@@ -149,7 +149,7 @@ class Ensemble:
         """Drop blocks of which nothing is to be seen after a time; True where there were some."""
         gone = self.cast.forget(before)
         for playing in gone:
-            self.course.calendar.forget(playing)
+            self.course.calendar.drop(playing)
         return bool(gone)
 
     def _happens(self, event: Event, playing: Playing) -> None:

@@ -173,16 +173,18 @@ class Playing:
 
     def lay(self, plan: Plan, start: float) -> None:
         """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
-        late = start - plan.schedule.start
-        held = tuple(claim.shifted(late) for claim in plan.claims)
-        self.plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
-        self.abroad = abroad(self.block)
+        if plan.block is not self.block:
+            self.abroad = abroad(plan.block)
+        if start != plan.schedule.start:
+            late = start - plan.schedule.start
+            held = tuple(claim.shifted(late) for claim in plan.claims)
+            plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
+        self.plan = plan
         self.channels, self.shifts, self.speech = {}, {}, {}
         if start == float("inf"):
             return
-        nodes = {node.id: node for node in self.block.behaviours}
         for behaviour, times in self.schedule.times.items():
-            node = nodes[behaviour]
+            node = self.block[behaviour]
             kind = self.kinds[node.tag]
             own = self._placed(behaviour, plan.channels.get(behaviour, ()))
             begin, end = start + float(times[0]), start + float(times[-1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -110,7 +111,7 @@ class Schedule:
     lengths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     character: str | None = field(default=None, compare=False)
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Seconds from block start to the last behaviour's end; 0 for an empty block."""
         return max((float(t[-1]) for t in self.times.values()), default=0.0)
@@ -123,10 +124,7 @@ class Schedule:
     @property
     def behaviours(self) -> dict[str, dict[str, float]]:
         """{behaviour id: {sync point: seconds from block start}}."""
-        return {
-            b: {p: float(t) for p, t in zip(self.points[b], times, strict=True)}
-            for b, times in self.times.items()
-        }
+        return {b: dict(zip(self.points[b], times.tolist(), strict=True)) for b, times in self.times.items()}
 
     @property
     def dropped(self) -> tuple[str, ...]:

@@ -66,11 +66,17 @@ def test_a_block_that_is_put_in_again_comes_once() -> None:
     assert [e.phase for e in calendar.due(10.0)].count(Phase.END) == 1
 
 
-def test_a_block_that_is_forgotten_leaves_nothing() -> None:
+def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> None:
     calendar = Calendar()
-    block = playing(0, 0.0)
-    calendar.put(block)
-    calendar.forget(block)
+    beside = playing(1, 5.0)
+    calendar.put(beside)
+    for later in range(200):
+        block = playing(0, 100.0 - later / 10)
+        calendar.drop(block)
+        calendar.put(block)
+        assert calendar.next == 5.0
+    assert len(calendar._firsts) < 50
+    assert [e.block for e in calendar.due(1000.0)] == [1] * 7 + [0] * 7
     assert calendar.next is None
 
 
