@@ -15,7 +15,7 @@ from realizer.server.hub import HubError
 from realizer.server.limits import used_up
 from realizer.server.messages import MAX_CONTROL
 from realizer.server.passes import Pass, PassError, Passes
-from realizer.settings import Settings
+from realizer.settings import Settings, raises
 
 __all__ = ["Guard", "Pace"]
 
@@ -152,16 +152,25 @@ class Pace:
 
     Args:
         rate: messages a second; twice as many may come at once after a pause.
+
+    Attributes:
+        news: what the client is to be told of the last wait; None where it was told, or kept to the rate.
     """
 
     def __init__(self, rate: float) -> None:
+        self.news: str | None = None
         self._rate = rate
+        self._held = False
         self._free = float("-inf")  # when everything that came would have come at that rate
 
     def wait(self, now: float) -> float:
         """Seconds to wait after a message that came `now`; 0 for a client that keeps to the rate."""
         self._free = max(self._free, now) + 1.0 / self._rate
-        return max(0.0, self._free - now - 2.0)
+        pause = max(0.0, self._free - now - 2.0)
+        words = f"wanted at most {self._rate:g} messages a second; more are read later {raises('max_rate')}"
+        self.news = words if pause and not self._held else None
+        self._held = bool(pause)
+        return pause
 
 
 def _digest(token: str) -> bytes:

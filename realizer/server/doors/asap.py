@@ -18,9 +18,10 @@ from typing import cast
 from bml_schema import WarningFeedback
 from realizer.server.doors.assembler import Assembler, Fault
 from realizer.server.doors.listener import Listener, session_of
+from realizer.server.guard import Pace
 from realizer.server.hub import HubError
 from realizer.server.shell import Shell
-from realizer.settings import Settings
+from realizer.settings import Settings, raises
 
 __all__ = ["AsapDoor"]
 
@@ -49,8 +50,9 @@ class AsapDoor:
     def __init__(self, shell: Shell, settings: Settings) -> None:
         assert settings.asap_ports is not None
         port, self._feedback_port = settings.asap_ports
-        self._listener = Listener("asap", settings.host, port, self._talk)
+        self._listener = Listener("asap", settings.host, port, self._talk, settings.max_connections)
         self._limit = settings.max_document
+        self._rate = settings.max_rate
         self._shell = shell
 
     @property
@@ -92,15 +94,22 @@ class AsapDoor:
                 await calling
 
     async def _read(self, reader: asyncio.StreamReader, number: int, link: CallBack) -> None:
-        assembler = Assembler(self._limit)
+        assembler, pace = Assembler(self._limit), Pace(self._rate)
+        loop = asyncio.get_running_loop()
         while data := await reader.read(READ):
             for found in assembler.feed(data):
                 if isinstance(found, Fault):
-                    id = found.block or "<no id>"
-                    link.send(WarningFeedback(id=id, type="PARSING_FAILURE", text=found.text).to_xml())
+                    id, text = found.block or "<no id>", found.text
+                    if found.large:
+                        text = f"{text} {raises('max_document')}"
+                    link.send(WarningFeedback(id=id, type="PARSING_FAILURE", text=text).to_xml())
                 elif not self._shell.receive(number, found):
                     return
-                await asyncio.sleep(0)  # a read full of documents must not hold up the frames of others
+                # 0 too: a read full of documents must not hold up the frames of others.
+                pause = pace.wait(loop.time())
+                if pace.news is not None:
+                    link.send(WarningFeedback(id="<no id>", type="IOException", text=pace.news).to_xml())
+                await asyncio.sleep(pause)
 
 
 class CallBack(asyncio.Protocol):

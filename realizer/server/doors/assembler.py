@@ -10,10 +10,15 @@ __all__ = ["Assembler", "Fault"]
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A stretch of the stream that gave no document: why, and the block's id where it can be read."""
+    """A stretch of the stream that gave no document: why, and the block's id where it can be read.
+
+    Attributes:
+        large: it was longer than a document may be.
+    """
 
     text: str
     block: str | None = None
+    large: bool = False
 
 
 # What decides where documents begin and end, and what may hide such marks. The lookahead wants the byte
@@ -196,7 +201,7 @@ class Assembler:
         if self._document >= 0 and self._here - self._document > self._limit:
             self._broken = False
             words = f"wanted at most {self._limit} bytes in a document, got more"
-            self._fault(words, self._id(self._document + self._limit))
+            self._fault(words, self._id(self._document + self._limit), large=True)
             self._orphans += 1
             self._document = -1
 
@@ -219,11 +224,11 @@ class Assembler:
             shown = bytes(self._stray).strip(_BLANKS).decode("utf-8", "replace")
             self._fault(f"wanted <bml>, got {shown!r}")
 
-    def _fault(self, text: str, block: str | None = None) -> None:
+    def _fault(self, text: str, block: str | None = None, *, large: bool = False) -> None:
         """One message for a stretch, however much is wrong with it."""
         self._stray.clear()
         if not self._broken:
-            self._found.append(Fault(text, block))
+            self._found.append(Fault(text, block, large))
         self._broken = True
 
     def _id(self, end: int) -> str | None:

@@ -6,7 +6,10 @@ import asyncio
 import logging
 import re
 import socket
+from collections import Counter
 from collections.abc import Awaitable, Callable
+
+from realizer.settings import raises
 
 __all__ = ["Listener", "session_of"]
 
@@ -26,6 +29,7 @@ class Listener:
     Args:
         name: of the door, for the log.
         talk: (address, reader, writer) -> serves one client to its end.
+        most: connections that may be open from one address.
     """
 
     def __init__(
@@ -34,11 +38,14 @@ class Listener:
         host: str,
         port: int,
         talk: Callable[[str, asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
+        most: int,
     ) -> None:
         self.port = port
         self._name = name
         self._host = host
         self._talk = talk
+        self._most = most
+        self._from: Counter[str] = Counter()  # address -> connections that are open
         self._server: asyncio.Server | None = None
         self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
@@ -79,15 +86,23 @@ class Listener:
         assert task is not None
         self._clients[task] = writer
         peer = writer.get_extra_info("peername")
+        host = "" if peer is None else peer[0].removeprefix("::ffff:")
+        self._from[host] += 1
         try:
-            if peer is not None:  # otherwise it has gone again
+            if self._from[host] > self._most:
+                words = f"{self._most} connections from it are open: wanted fewer {raises('max_connections')}"
+                log.warning("%s: %s is not let in: %s", self._name, host, words)
+            elif peer is not None:  # otherwise it has gone again
                 # Nobody says good-bye, least of all a machine that loses its power.
                 writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-                await self._talk(peer[0].removeprefix("::ffff:"), reader, writer)
+                await self._talk(host, reader, writer)
         except OSError:
             pass  # it is gone
         except Exception:
-            log.exception("%s: %s is let go of: its connection failed", self._name, peer[0])
+            log.exception("%s: %s is let go of: its connection failed", self._name, host)
         finally:
             writer.transport.abort()
+            self._from[host] -= 1
+            if not self._from[host]:
+                del self._from[host]
             del self._clients[task]

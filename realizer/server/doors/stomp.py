@@ -10,13 +10,15 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from bml_schema import WarningFeedback
 from realizer.errors import RealizerError
 from realizer.server.doors.broker import Link, check_installed
 from realizer.server.doors.dialect import Dialect, Leave, Message, ToSession
 from realizer.server.doors.dialects import DIALECTS
+from realizer.server.guard import Pace
 from realizer.server.hub import HubError
 from realizer.server.shell import Shell
-from realizer.settings import Settings
+from realizer.settings import Settings, raises
 
 __all__ = ["StompDoor"]
 
@@ -44,6 +46,7 @@ class StompDoor:
         self._settings = settings
         made = {name: make(settings) for name, make in DIALECTS.items()}
         self._seats = [_Seat(self, name, dialect) for name, dialect in made.items() if dialect is not None]
+        self._pace = Pace(settings.max_rate)
         self._thread = ThreadPoolExecutor(1, "stomp")
         self._link: Link | None = None
         self._out: deque[Message] = deque()
@@ -104,9 +107,23 @@ class StompDoor:
         return self._size
 
     def _take(self, link: Link, seat: int, body: bytes) -> None:
-        """A message has come in; in the event loop."""
-        link.handled()
+        """A message has come in; in the event loop. The next one is read when it may be."""
+        pause = self._pace.wait(self._loop.time())
+        if self._pace.news is not None:
+            log.warning("stomp: %s", self._pace.news)
+        if pause:
+            self._loop.call_later(pause, link.handled)
+        else:
+            link.handled()
         if link is not self._link or self._leaving is not None:
+            return
+        if len(body) > self._settings.max_message:
+            words = f"wanted at most {self._settings.max_message} bytes in a message, got {len(body)}"
+            log.warning("stomp: %s: %s", self._seats[seat].name, words)
+            refusal = WarningFeedback(
+                id="<no id>", type="PARSING_FAILURE", text=f"{words} {raises('max_message')}"
+            )
+            self._seats[seat].send(refusal.to_xml())
             return
         for action in self._seats[seat].dialect.incoming(body):
             match action:

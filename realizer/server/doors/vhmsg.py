@@ -12,6 +12,7 @@ from xml.sax.saxutils import quoteattr, unescape
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.server.doors.assembler import Assembler
 from realizer.server.doors.dialect import Action, Leave, Message, ToSession
+from realizer.settings import raises
 
 __all__ = ["Vhmsg"]
 
@@ -78,7 +79,9 @@ class Vhmsg:
         speak = _Speak(agent, recipient, id, set())
         if not documents:
             faults = [
-                fault.text for fault in found if not isinstance(fault, str) and "<bml" not in fault.text
+                f"{fault.text} {raises('max_document')}" if fault.large else fault.text
+                for fault in found
+                if not isinstance(fault, str) and "<bml" not in fault.text
             ]
             speak.error = faults[0] if faults else "wanted a whole <bml> document"
             return list(self._over(speak))

@@ -249,19 +249,14 @@ class WebSocketDoor:
     async def _read(self, socket: ServerConnection, number: int, client: _Client) -> None:
         """Hand messages on, no faster than a client may send them: the rest waits in its own buffers."""
         loop = asyncio.get_running_loop()
-        pace, held = Pace(self._settings.max_rate), False
+        pace = Pace(self._settings.max_rate)
         async for message in socket:
             if not self._shell.receive(number, message):
                 return
             # 0 too: messages that are there already must not hold up everybody else.
             pause = pace.wait(loop.time())
-            if pause and not held:
-                words = (
-                    f"wanted at most {self._settings.max_rate:g} messages a second; more are read later "
-                    f"{raises('max_rate')}"
-                )
-                client.send(ErrorMessage(code="rate", message=words).text())
-            held = bool(pause)
+            if pace.news is not None:
+                client.send(ErrorMessage(code="rate", message=pace.news).text())
             await asyncio.sleep(pause)
 
     async def _greeting(self, socket: ServerConnection) -> tuple[str | bytes, Pass]:

@@ -13,6 +13,7 @@ from realizer.server.doors.xface_brought import Brought, prepare
 from realizer.server.doors.xface_reader import Content, Fault, TaskReader
 from realizer.server.doors.xface_tasks import ERROR, Answer, Desk
 from realizer.server.doors.xface_wire import Task
+from realizer.server.guard import Pace
 from realizer.server.hub import HubError
 from realizer.server.shell import Shell
 from realizer.settings import Settings
@@ -42,10 +43,10 @@ class XfaceDoor:
 
     def __init__(self, shell: Shell, settings: Settings) -> None:
         assert settings.xface_port is not None
-        self._listener = Listener("xface", settings.host, settings.xface_port, self._talk)
-        self._media = settings.media
-        # A block has more to it than its keys.
-        self._most = settings.max_document - 2**10
+        self._listener = Listener(
+            "xface", settings.host, settings.xface_port, self._talk, settings.max_connections
+        )
+        self._settings = settings
         self._shell = shell
         self._count = 0
 
@@ -90,7 +91,8 @@ class XfaceDoor:
             self._shell.leave(number)
 
     async def _read(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, seat: _Seat) -> None:
-        tasks = TaskReader(LIMIT)
+        tasks = TaskReader(min(LIMIT, self._settings.max_message))
+        pace, loop = Pace(self._settings.max_rate), asyncio.get_running_loop()
         while data := await reader.read(READ):
             for found in tasks.feed(data):
                 match found:
@@ -105,16 +107,19 @@ class XfaceDoor:
                         pass  # of a task that has been answered
                 if seat.left:
                     return
-                # A read full of tasks must not hold up the frames of others, nor pile up notes unread.
-                await asyncio.sleep(0)
+                # 0 too: a read full of tasks must not hold up the frames of others, nor pile up notes unread.
+                pause = pace.wait(loop.time())
+                if pace.news is not None:
+                    log.warning("xface: client %d: %s", seat.desk.owner, pace.news)
+                await asyncio.sleep(pause)
                 await writer.drain()
 
     async def _prepared(self, task: Task) -> Brought:
         try:
             if sum(map(len, task.params)) < SMALL and task.name != "LOAD_FAP":
-                return prepare(task, self._media, self._most)
+                return prepare(task, self._settings)
             loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(None, prepare, task, self._media, self._most)
+            return await loop.run_in_executor(None, prepare, task, self._settings)
         except RealizerError as error:
             return error
         except OSError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import unescape
-from pathlib import Path
 
 from bml_schema import Block, BMLError, read
 from realizer.animation.fap_clip import FAPClip
@@ -17,8 +16,12 @@ from realizer.behaviours.kind import World
 from realizer.behaviours.media import media_file
 from realizer.errors import RealizerError
 from realizer.server.doors.xface_wire import Task
+from realizer.server.limits import too_large
+from realizer.settings import Settings, raises
 
 __all__ = ["Brought", "Empty", "Script", "prepare"]
+
+ROOM = 2**10  # bytes of a document that are not its keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,27 +39,28 @@ class Empty(RealizerError):
     """A task without what it should bring."""
 
 
-def prepare(task: Task, media: Path | None, most: int) -> FAPClip | Script | None:
+def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
     """What a task brings, understood; this may take a second. None where it brings nothing.
 
     Args:
-        media: the folder that LOAD_FAP reads from.
-        most: bytes of the document that a file plays as.
+        settings: the folder that LOAD_FAP reads from, and how large a document may be.
 
     Raises:
         RealizerError: it cannot be understood.
     """
     match task.name, task.params:
         case "UPLOAD_FAP", (text, *_) if text.strip():
-            return _clip(text, most)
+            return _clip(text, settings)
         case "LOAD_FAP", (name, *_) if name.strip():
-            path = media_file(name, World(media=media))
+            path = media_file(name, World(media=settings.media))
             if (size := path.stat().st_size) > MOST_BYTES:
                 raise RealizerError(f"wanted at most {MOST_BYTES} bytes of FAP text, got {size}")
-            return _clip(path.read_bytes(), most)
+            return _clip(path.read_bytes(), settings)
         case "UPLOAD_SCRIPT", (text, processor, *_) if processor.strip().upper() == "BML":
             script = text if "<" in text else unescape(text)
-            items = list(read(script, VOCABULARY))
+            if (large := too_large(script, settings)) is not None:
+                raise RealizerError(large)
+            items = list(read(script, VOCABULARY, most_bytes=settings.max_document))
             blocks = tuple(item.id for item in items if isinstance(item, Block))
             if not blocks:
                 wrong = next((str(item) for item in items if isinstance(item, BMLError)), "nothing")
@@ -69,11 +73,13 @@ def prepare(task: Task, media: Path | None, most: int) -> FAPClip | Script | Non
     return None
 
 
-def _clip(text: str | bytes, most: int) -> FAPClip:
+def _clip(text: str | bytes, settings: Settings) -> FAPClip:
+    most = settings.max_document - ROOM
     clip = shown(read_fap(text))
     if not len(clip.values):
         raise RealizerError("wanted frames, got none")
     if len(clip.values) > 1 and clip.mask.any() and len(document_of(clip, "")) > most:
         got = f"{len(clip.values)} frames of {clip.mask.sum()} FAPs"
-        raise RealizerError(f"wanted a file that plays as at most {most} bytes of BML, got {got}: send parts")
+        words = f"wanted a file that plays as at most {most} bytes of BML, got {got}: send parts"
+        raise RealizerError(f"{words} {raises('max_document')}")
     return clip

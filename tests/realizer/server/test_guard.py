@@ -185,6 +185,16 @@ def test_a_client_that_keeps_to_its_rate_never_waits() -> None:
     assert all(pace.wait(k / 10) == 0.0 for k in range(1000))
 
 
+def test_of_a_flood_it_is_told_once_which_limit_it_met() -> None:
+    pace = Pace(2)
+    told = [pace.wait(0.0) > 0 and pace.news for _ in range(10)]
+    assert told[:4] == [False] * 4
+    assert told[4] == "wanted at most 2 messages a second; more are read later (REALIZER_MAX_RATE sets it)"
+    assert told[5:] == [None] * 5
+    pace.wait(60.0)
+    assert [pace.wait(60.0) > 0 and pace.news for _ in range(4)][-1] == told[4]  # and again, after a pause
+
+
 def test_a_flood_is_read_at_the_rate_after_a_first_burst() -> None:
     pace, now, read = Pace(10), 0.0, 0
     while now < 60.0:

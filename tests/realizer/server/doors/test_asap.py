@@ -420,6 +420,60 @@ def test_a_client_that_finds_the_service_full_is_let_go_of() -> None:
     serving(test, max_sessions=1)
 
 
+def test_one_address_has_no_more_connections_than_its_share(caplog: pytest.LogCaptureFixture) -> None:
+    async def test(server: Server, bml: int, port: int) -> None:
+        async with Client(bml, port) as client:
+            more = Client(bml, port)
+            await more.connect()
+            assert await more.reader.read() == b""
+            more.bml.transport.abort()
+            assert "127.0.0.1 is not let in: 1 connections from it are open" in caplog.text
+            assert "REALIZER_MAX_CONNECTIONS" in caplog.text
+            async with Client(bml, free_port("127.0.0.2"), "127.0.0.2"):  # another address has its own
+                pass
+            client.send(NOD.format("b"))
+            await client.until("b:end")
+
+    serving(test, max_connections=1)
+
+
+def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
+    async def test(server: Server, bml: int, port: int) -> None:
+        async with Client(bml, port) as client:
+            client.send("".join(f'<bml id="b{n}"/>' for n in range(8)))
+            feedback = await client.until("b7:end")
+            (warning,) = [f for f in feedback if isinstance(f, WarningFeedback)]
+            assert "REALIZER_MAX_RATE" in warning.text
+            ends = [f.id for f in feedback if isinstance(f, BlockProgress) and f.id.endswith(":end")]
+            assert ends == [f"b{n}:end" for n in range(8)]
+
+    serving(test, max_rate=3)
+
+
+@pytest.mark.parametrize(
+    ("limit", "document"),
+    [
+        ({"max_document": 60}, f'<bml id="b"><!--{"x" * 100}--></bml>'),
+        ({"max_elements": 2}, '<bml id="b"><wait id="w"/><wait id="v"/></bml>'),
+        ({"max_behaviours": 1}, '<bml id="b"><wait id="w"/><wait id="v"/></bml>'),
+        ({"max_duration": 9}, '<bml id="b"><wait id="w" duration="10"/></bml>'),
+        ({"max_speech": 3}, '<bml id="b"><speech id="s"><text>Hello</text></speech></bml>'),
+    ],
+)
+def test_the_limits_of_the_service_hold_here_too_and_are_named(limit: dict[str, int], document: str) -> None:
+    async def test(server: Server, bml: int, port: int) -> None:
+        async with Client(bml, port) as client:
+            client.send(document)
+            client.send('<bml id="c"/>')
+            feedback = await client.until("c:end")
+            (warning,) = [f for f in feedback if isinstance(f, WarningFeedback)]
+            (name,) = limit
+            assert warning.id == "b"
+            assert f"REALIZER_{name.upper()} sets it" in warning.text
+
+    serving(test, **limit)
+
+
 def test_the_door_says_where_it_is_and_a_port_in_use_is_an_os_error() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         (door,) = [d for d in server.doors if isinstance(d, AsapDoor)]

@@ -230,6 +230,32 @@ def test_many_messages_at_once_all_play(broker) -> None:
     serving(test, broker.address)
 
 
+def test_a_message_that_is_too_large_is_refused_by_name_and_the_next_one_plays(broker) -> None:
+    async def test(server: Server) -> None:
+        async with Peer(broker.port, "/topic/bmlFeedback") as peer:
+            peer.send("/topic/bmlRequests", "x" * 500)
+            peer.ask(NOD.format("good"))
+            feedback = await peer.feedback("good:end")
+            (warning,) = [f for f in feedback if isinstance(f, WarningFeedback)]
+            assert "at most 400 bytes in a message, got 500" in warning.text
+            assert "REALIZER_MAX_MESSAGE" in warning.text
+
+    serving(test, broker.address, max_message=400)
+
+
+def test_a_flood_is_read_slowly_and_nothing_of_it_is_lost(broker, caplog: pytest.LogCaptureFixture) -> None:
+    async def test(server: Server) -> None:
+        async with Peer(broker.port, "/topic/bmlFeedback") as peer:
+            for n in range(8):
+                peer.ask(f'<bml id="b{n}"/>')
+            feedback = await peer.feedback("b7:end")
+            ends = [f.id for f in feedback if isinstance(f, BlockProgress) and f.id.endswith(":end")]
+            assert ends == [f"b{n}:end" for n in range(8)]
+        assert caplog.text.count("REALIZER_MAX_RATE") == 1
+
+    serving(test, broker.address, max_rate=3)
+
+
 def test_topics_are_settings_and_a_dialect_can_be_off(broker) -> None:
     settings = {
         "stomp_json_in": "/topic/mine.in",

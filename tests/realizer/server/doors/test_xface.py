@@ -481,6 +481,31 @@ def test_more_clients_than_there_may_be_are_turned_away(monkeypatch: pytest.Monk
     serving(test)
 
 
+def test_a_flood_of_tasks_is_read_slowly_and_nothing_of_it_is_lost(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def test(server: Server, door: XfaceDoor) -> None:
+        async with Client(door.port) as client:
+            for id in range(1, 9):
+                client.send(task("UPLOAD_FAP", client.owner, id, fap(1)))
+            assert await client.statuses(8) == [1, 2, 3]
+        assert caplog.text.count("REALIZER_MAX_RATE") == 1
+
+    serving(test, max_rate=3)
+
+
+def test_one_address_has_no_more_connections_than_its_share() -> None:
+    async def test(server: Server, door: XfaceDoor) -> None:
+        async with Client(door.port) as client:
+            reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
+            assert await reader.read() == b""
+            writer.transport.abort()
+            client.send(task("UPLOAD_FAP", client.owner, 1, fap(1)))
+            assert await client.statuses(1) == [1, 2, 3]
+
+    serving(test, max_connections=1)
+
+
 def test_a_client_that_never_reads_is_not_read_either_and_others_notice_nothing() -> None:
     async def test(server: Server, door: XfaceDoor) -> None:
         async with Client(door.port) as deaf, Client(door.port) as other:
