@@ -167,7 +167,7 @@ class Session:
 
     def close(self) -> None:
         """End: nothing is done and nothing is sent after it."""
-        self.closed = True
+        self.closed, self._calm = True, None
         self._connections.clear()
         self.intake.inbox.clear()
         self._effects.clear()
@@ -176,6 +176,8 @@ class Session:
         """How many bytes wait to be sent to a client: a slow one loses frames, a stuck one is closed."""
         if (known := self._connections.get(connection)) is not None:
             known.backlog = waiting
+            if known.slow:
+                self._calm = None
             if waiting > STUCK:
                 reason = f"{waiting} bytes wait to be read; come back with the session's name and seen"
                 self._effects.append(Close(connection, 1013, reason))
@@ -297,12 +299,17 @@ class Session:
             reads: or leave documents for another time.
         """
         t = now - self.opened
-        if self.closed:
-            return
-        if self._calm is not None and t + EPSILON < self._calm and not (reads and self.reads):
-            self.broadcast.frames_due(t, self._effects)
-        elif self._work(t, reads):
+        if not self.closed and self._work(t, reads):
             self._tell(t, "tick")
+
+    def frames(self, now: float) -> list[Effect] | None:
+        """What `tick` would have done where nothing is due but frames; None where it must be asked."""
+        t = now - self.opened
+        if self._calm is None or t + EPSILON >= self._calm:
+            return None
+        effects: list[Effect] = []
+        self.broadcast.frames_due(t, effects)
+        return effects
 
     def rest(self, now: float) -> None:
         """Keep the journal short, where it has grown; what is due is told first."""
@@ -337,7 +344,7 @@ class Session:
     @property
     def reads(self) -> bool:
         """A document can be read or planned at once."""
-        return not self.closed and (self._unsettled or self.intake.ready)
+        return self._calm is None and not self.closed and (self._unsettled or self.intake.ready)
 
     def next_deadline(self) -> float | None:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
@@ -353,7 +360,9 @@ class Session:
             self.broadcast.gets(self._connections.values())
             due = [self.player.next_change(), self.broadcast.next_other]
             other = min(due if asked is None else [*due, asked])
-            if not self.intake.speeches.lasting:  # which are looked at with every frame
+            # Speeches that last and clients that are slow are looked at with every frame.
+            slow = any(connection.slow for connection in self._connections.values())
+            if not (self.reads or slow or self.intake.speeches.lasting):
                 self._calm = other
         first = min(other, self.broadcast.next_frame)
         return None if first == float("inf") else first + self.opened

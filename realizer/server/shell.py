@@ -14,6 +14,7 @@ from realizer.behaviours.kind import Position
 from realizer.expressions import library_of
 from realizer.mapping import mapping_of
 from realizer.server.alarms import Alarms
+from realizer.server.connection import SLOW
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import ANYBODY, Hub, HubError, Visitor
@@ -276,7 +277,20 @@ class Shell:
         """Frames, feedback and whatever else is due."""
         now = self._loop.time()
         self.metrics.late.observe(now - when)
-        self._work(session, now, reads=False)
+        try:
+            frames = session.frames(now)
+        except Exception:
+            self._fail(session)
+            return
+        if frames is None:
+            self._work(session, now, reads=False)
+            return
+        for effect in frames:
+            self._do(session, effect)
+        for number in session.connections:
+            if (waiting := self._clients[number].waiting) > SLOW:
+                session.backlog(number, waiting)
+        self._alarms.set(session, session.next_due())
 
     def _read(self) -> None:
         """Read or plan one document of one session; whatever is due in others comes before the next."""

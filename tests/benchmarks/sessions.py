@@ -1,188 +1,33 @@
 """Prints how many sessions one service plays at once: lateness, processor time, memory.
 
 Run: python tests/benchmarks/sessions.py [--sessions 1000] [--seconds 20] [--floor] [serve's own options]
+     python tests/benchmarks/sessions.py --sessions 125,250,500,1000     how it grows
+     python tests/benchmarks/sessions.py --sessions 200 --minutes 30     whether it stays as it is
 
 Each session is a WebSocket of its own that gets 25 FAP frames a second and plays documents of head, face,
 gaze and idle motion, one every 10 s. The client is a process of its own on plain sockets, so that it costs
 little. `--floor` runs a server beside it that does nothing but send as many bytes as often (with the package
-websockets), which no service can be better than. Noise is how late this machine wakes a process that does
-nothing else.
+websockets). Noise is how late this machine wakes a process that does nothing else.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
-import base64
 import json
 import os
-import random
-import re
 import resource
-import select
-import socket
 import struct
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from heapq import heappop, heappush
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import numpy as np
-
-FPS = 25
-EVERY = 10.0  # s between two documents of a session
-SCENE = {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}
-BODY = (
-    '<head id="n" lexeme="NOD" start="0.5"/><head id="m" lexeme="SHAKE" start="n:end+2"/>'
-    '<faceLexeme id="f" lexeme="SMILE" start="0.2" end="6"/>'
-    '<faceLexeme id="w" lexeme="RAISE_BROWS" start="n:stroke" end="n:end+1"/>'
-    '<gaze id="g" target="cup" start="1" end="3"/><realizer:emotion xmlns:realizer="urn:bml-realizer:1" '
-    'id="e" name="joy" start="m:start" end="m:end+1"/>'
-)
-# Bytes of a frame of 68 FAPs with its WebSocket header; its number and time stand behind four more.
-FRAME = 292
-NUMBER = struct.Struct("<Id")
-POSIX = re.compile(rb'globalTime="([0-9.]+)".*?posixTime="([0-9.]+)"')
-
-
-@dataclass(eq=False)
-class Peer:
-    """One connection of the client."""
-
-    socket: socket.socket
-    data: bytearray = field(default_factory=bytearray)
-    zero: float | None = None  # posix time of its session's 0
-    sent: dict[str, float] = field(default_factory=dict)
-    documents: int = 0
-    frames: list[tuple[float, float]] = field(default_factory=list)  # (time on its clock, posix when it came)
-    numbers: list[int] = field(default_factory=list)
-
-
-def masked(text: str) -> bytes:
-    """A WebSocket text message as a client sends it; the mask is 0, which changes nothing."""
-    data = text.encode()
-    head = bytes([0x81, 0x80 | len(data)]) if len(data) < 126 else struct.pack(">BBH", 0x81, 0xFE, len(data))
-    return head + bytes(4) + data
-
-
-def messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(opcode, payload) of all that have come whole; they are taken out of `data`."""
-    at = 0
-    while len(data) >= at + 2:
-        size, head = data[at + 1] & 0x7F, 2
-        if size == 126:
-            if len(data) < at + 4:
-                break
-            size, head = struct.unpack_from(">H", data, at + 2)[0], 4
-        elif size == 127:
-            if len(data) < at + 10:
-                break
-            size, head = struct.unpack_from(">Q", data, at + 2)[0], 10
-        if len(data) < at + head + size:
-            break
-        yield data[at] & 0x0F, bytes(data[at + head : at + head + size])
-        at += head + size
-    del data[:at]
-
-
-def joined(url: str, session: str, plays: bool) -> Peer:
-    """A connection that has opened and asked for frames."""
-    parts = urlsplit(url)
-    host, _, port = parts.netloc.rpartition(":")
-    peer = socket.create_connection((host, int(port)), 20)
-    peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    key = base64.b64encode(os.urandom(16)).decode()
-    peer.sendall(
-        f"GET /ws?session={session} HTTP/1.1\r\nHost: {parts.netloc}\r\nUpgrade: websocket\r\n"
-        f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
-    )
-    data = bytearray()
-    while b"\r\n\r\n" not in data:
-        data += peer.recv(4096)
-    head, _, rest = bytes(data).partition(b"\r\n\r\n")
-    assert b" 101 " in head.split(b"\r\n")[0], head
-    if plays:
-        peer.sendall(masked(json.dumps(SCENE)))
-        peer.sendall(masked(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS})))
-    peer.setblocking(False)
-    return Peer(peer, bytearray(rest))
-
-
-def load(url: str, sessions: int, seconds: float, warm: float, plays: bool) -> dict[str, float]:
-    """Connect, play, listen; what came, of the time after `warm`."""
-    chance = random.Random(0)
-    poll = select.epoll()
-    peers: dict[int, Peer] = {}
-    due: list[tuple[float, int]] = []  # when who sends its next document
-    for k in range(sessions):
-        peer = joined(url, f"load-{k}", plays)
-        peers[peer.socket.fileno()] = peer
-        poll.register(peer.socket, select.EPOLLIN)
-        if plays:
-            heappush(due, (time.time() + EVERY * chance.random(), peer.socket.fileno()))
-    measured = time.time() + warm
-    answers: list[float] = []
-    quiet = True
-    while (now := time.time()) < measured + seconds:
-        if quiet and now >= measured:
-            quiet = False
-            begun, used = now, time.process_time()
-            print("measuring", flush=True)
-        for number, _ in poll.poll(0.002):
-            peer = peers[number]
-            try:
-                data = peer.socket.recv(8192)
-            except BlockingIOError:
-                continue
-            came = time.time()
-            if len(data) == FRAME and not peer.data:  # nearly always: one frame, whole
-                if came >= measured:
-                    number, at = NUMBER.unpack_from(data, 8)
-                    peer.frames.append((at, came))
-                    peer.numbers.append(number)
-                continue
-            peer.data += data
-            for code, payload in messages(peer.data):
-                if code == 2 and payload[0] == 1:
-                    if came >= measured:
-                        number, at = NUMBER.unpack_from(payload, 4)
-                        peer.frames.append((at, came))
-                        peer.numbers.append(number)
-                elif code == 1 and payload[:1] == b"<":
-                    if (found := POSIX.search(payload)) is not None:
-                        peer.zero = float(found[2]) / 1e3 - float(found[1])
-                    for name in [name for name in peer.sent if f'"{name}"'.encode() in payload]:
-                        waited = came - peer.sent.pop(name)
-                        if came >= measured:
-                            answers.append(waited)
-        while due and due[0][0] <= now:
-            when, number = heappop(due)
-            peer = peers[number]
-            name = f"b{peer.documents}"
-            peer.documents += 1
-            heappush(due, (when + EVERY, number))
-            peer.sent[name] = time.time()
-            peer.socket.sendall(masked(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
-    zeros = {peer: 0.0 if not plays else peer.zero for peer in peers.values()}
-    late = [came - at - zero for peer, zero in zeros.items() if zero is not None for at, came in peer.frames]
-    gaps = sum(p.numbers[-1] - p.numbers[0] + 1 - len(p.numbers) for p in peers.values() if p.numbers)
-    return {
-        "frames": sum(len(peer.frames) for peer in zeros),
-        "expected": sessions * seconds * FPS,
-        "missing": gaps,
-        **{name: 1e3 * float(np.percentile(late, part)) for name, part in PARTS.items()},
-        "answers": len(answers),
-        **{f"answer_{n}": 1e3 * float(np.percentile(answers or [0.0], part)) for n, part in PARTS.items()},
-        "load": (time.process_time() - used) / (time.time() - begun),
-    }
-
-
-PARTS = {"p50": 50, "p99": 99, "most": 100}
+from crowd import FPS, Crowd
+from plot import bars, exponent
 
 
 def noise(seconds: float = 3.0) -> tuple[float, float]:
@@ -256,61 +101,104 @@ def floor() -> None:
     asyncio.run(run())
 
 
-def measure(name: str, command: list[str], arguments: argparse.Namespace, plays: bool) -> None:
+def measured(
+    command: list[str], sessions: int, seconds: float, warm: float, times: int, plays: bool
+) -> Iterator[dict[str, float]]:
+    """What a service does and costs in each of some stretches of so many seconds."""
     with served(command) as (url, service):
-        me = [sys.executable, __file__, "--load", url, "--sessions", str(arguments.sessions)]
-        me += ["--seconds", str(arguments.seconds), "--warm", str(arguments.warm)]
-        before = resident(service)
-        client = subprocess.Popen([*me, *([] if plays else ["--floor"])], stdout=subprocess.PIPE, text=True)
+        me = [sys.executable, __file__, "--load", url, "--sessions", str(sessions), "--seconds", str(seconds)]
+        me += ["--warm", str(warm), "--times", str(times), *([] if plays else ["--floor"])]
+        idle = resident(service)
+        client = subprocess.Popen(me, stdout=subprocess.PIPE, text=True)
         assert client.stdout is not None
         assert client.stdout.readline().strip() == "measuring"
-        begun, used = time.time(), spent(service)
-        told = json.loads(client.stdout.readline())
-        used, memory = spent(service) - used, resident(service) - before
-        took = time.time() - begun
+        for _ in range(times):
+            begun, used = time.time(), spent(service)
+            told = json.loads(client.stdout.readline())
+            told["cpu"] = (spent(service) - used) / (time.time() - begun)
+            told["frame"] = 1e6 * told["cpu"] * seconds / max(told["frames"], 1)
+            told["memory"] = resident(service) - idle
+            yield told
         client.wait()
+
+
+def tell(name: str, sessions: int, told: dict[str, float], plays: bool) -> None:
     print(
-        f"{name}: {arguments.sessions} sessions, {told['frames']} frames of {told['expected']:.0f}, "
+        f"{name}: {sessions} sessions, {told['frames']} frames of {told['expected']:.0f}, "
         f"{told['missing']} missing\n"
         f"  lateness ms     p50 {told['p50']:6.2f}  p99 {told['p99']:6.2f}  most {told['most']:6.1f}\n"
-        f"  processor       {used / took:5.0%} of a core, {1e6 * used / max(told['frames'], 1):5.1f} us a"
-        f" frame (the client {told['load']:.0%})\n"
-        f"  memory          {memory:5.0f} MB more than without sessions"
+        f"  processor       {told['cpu']:5.0%} of a core, {told['frame']:5.1f} us a frame"
+        f" (the client {told['load']:.0%})\n"
+        f"  memory          {told['memory']:5.0f} MB more than without sessions"
     )
     if plays:
         print(
             f"  first feedback  p50 {told['answer_p50']:6.2f}  p99 {told['answer_p99']:6.2f} ms"
             f" of {told['answers']:.0f} documents"
         )
+    sys.stdout.flush()
+
+
+def soak(command: list[str], sessions: int, minutes: int, warm: float) -> None:
+    """Minute by minute, and what the second half has more than the first."""
+    print("minute  memory MB  lateness p50    p99 ms  first feedback p50    p99 ms  us a frame")
+    rows = []
+    for minute, told in enumerate(measured(command, sessions, 60.0, warm, minutes, plays=True), 1):
+        rows.append(told)
+        print(
+            f"{minute:6}  {told['memory']:9.1f}  {told['p50']:12.2f}  {told['p99']:8.2f}"
+            f"  {told['answer_p50']:18.2f}  {told['answer_p99']:8.2f}  {told['frame']:10.1f}",
+            flush=True,
+        )
+    half = len(rows) // 2
+    for name in ("memory", "p50", "p99", "answer_p50", "frame"):
+        first, second = (float(np.median([r[name] for r in part])) for part in (rows[:half], rows[half:]))
+        print(f"{name:10}  median of the first half {first:8.2f}, of the second {second:8.2f}")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--sessions", type=int, default=1000)
+    parser.add_argument("--sessions", default="1000", help="how many, or several numbers with commas")
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--warm", type=float, default=5.0, help="seconds before it is measured")
-    parser.add_argument(
-        "--floor", action="store_true", help="a plain fan-out of package websockets beside it"
-    )
+    parser.add_argument("--minutes", type=int, help="for so long, minute by minute")
+    parser.add_argument("--warm", type=float, default=12.0, help="seconds before it is measured")
+    parser.add_argument("--floor", action="store_true", help="a plain server of package websockets beside it")
     parser.add_argument("--load", help=argparse.SUPPRESS)
+    parser.add_argument("--times", type=int, default=1, help=argparse.SUPPRESS)
     parser.add_argument("--serve-floor", action="store_true", help=argparse.SUPPRESS)
-    arguments, rest = parser.parse_known_args()
+    given, rest = parser.parse_known_args()
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    if arguments.serve_floor:
+    if given.serve_floor:
         floor()
-    elif arguments.load:
-        told = load(
-            arguments.load, arguments.sessions, arguments.seconds, arguments.warm, not arguments.floor
-        )
-        print(json.dumps(told), flush=True)
-    else:
-        median, worst = noise()
-        print(f"noise of this machine: p50 {median:.2f}, p99 {worst:.2f} ms")
-        serve = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *rest]
-        measure("realizer", serve, arguments, plays=True)
-        if arguments.floor:
-            measure("plain websockets", [sys.executable, __file__, "--serve-floor"], arguments, plays=False)
+        return
+    counts = [int(part) for part in given.sessions.split(",")]
+    if given.load:
+        crowd = Crowd(given.load, counts[0], not given.floor)
+        crowd.listen(given.warm)
+        print("measuring", flush=True)
+        for _ in range(given.times):
+            print(json.dumps(crowd.listen(given.seconds)), flush=True)
+        return
+    median, worst = noise()
+    print(f"noise of this machine: p50 {median:.2f}, p99 {worst:.2f} ms", flush=True)
+    serve = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *rest]
+    if given.minutes:
+        soak(serve, counts[0], given.minutes, given.warm)
+        return
+    rows: list[dict[str, float]] = []
+    for count in counts:
+        rows += measured(serve, count, given.seconds, given.warm, 1, plays=True)
+        tell("realizer", count, rows[-1], plays=True)
+    if len(counts) > 1:
+        for name, unit in (("cpu", "of a core"), ("memory", "MB"), ("p99", "ms late")):
+            values = [row[name] for row in rows]
+            print(f"{name}, {unit}: grows as sessions ^ {exponent(counts, values):.2f}")
+            print(bars(counts, values))
+    if given.floor:
+        command = [sys.executable, __file__, "--serve-floor"]
+        (told,) = measured(command, counts[-1], given.seconds, given.warm, 1, plays=False)
+        tell("plain websockets", counts[-1], told, plays=False)
 
 
 if __name__ == "__main__":

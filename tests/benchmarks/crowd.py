@@ -1,0 +1,188 @@
+"""Many clients of a service in one thread, on plain sockets: what comes to them, how late, at what cost."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import random
+import re
+import select
+import socket
+import struct
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+from urllib.parse import urlsplit
+
+import numpy as np
+
+__all__ = ["FPS", "Crowd"]
+
+FPS = 25
+EVERY = 10.0  # s between two documents of a session
+SCENE = {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}
+BODY = (
+    '<head id="n" lexeme="NOD" start="0.5"/><head id="m" lexeme="SHAKE" start="n:end+2"/>'
+    '<faceLexeme id="f" lexeme="SMILE" start="0.2" end="6"/>'
+    '<faceLexeme id="w" lexeme="RAISE_BROWS" start="n:stroke" end="n:end+1"/>'
+    '<gaze id="g" target="cup" start="1" end="3"/><realizer:emotion xmlns:realizer="urn:bml-realizer:1" '
+    'id="e" name="joy" start="m:start" end="m:end+1"/>'
+)
+# Bytes of a frame of 68 FAPs with its WebSocket header; its number and time stand behind four more.
+FRAME = 292
+NUMBER = struct.Struct("<Id")
+POSIX = re.compile(rb'globalTime="([0-9.]+)".*?posixTime="([0-9.]+)"')
+
+
+@dataclass(eq=False)
+class Peer:
+    """One connection."""
+
+    socket: socket.socket
+    data: bytearray = field(default_factory=bytearray)
+    zero: float | None = None  # posix time of its session's 0
+    sent: dict[str, float] = field(default_factory=dict)
+    documents: int = 0
+    newest: int | None = None  # number of its newest frame
+
+
+def masked(text: str) -> bytes:
+    """A WebSocket text message as a client sends it; the mask is 0, which changes nothing."""
+    data = text.encode()
+    head = bytes([0x81, 0x80 | len(data)]) if len(data) < 126 else struct.pack(">BBH", 0x81, 0xFE, len(data))
+    return head + bytes(4) + data
+
+
+def messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
+    """(opcode, payload) of all that have come whole; they are taken out of `data`."""
+    at = 0
+    while len(data) >= at + 2:
+        size, head = data[at + 1] & 0x7F, 2
+        if size == 126:
+            if len(data) < at + 4:
+                break
+            size, head = struct.unpack_from(">H", data, at + 2)[0], 4
+        elif size == 127:
+            if len(data) < at + 10:
+                break
+            size, head = struct.unpack_from(">Q", data, at + 2)[0], 10
+        if len(data) < at + head + size:
+            break
+        yield data[at] & 0x0F, bytes(data[at + head : at + head + size])
+        at += head + size
+    del data[:at]
+
+
+def joined(url: str, session: str, plays: bool) -> Peer:
+    """A connection that has opened and asked for frames."""
+    parts = urlsplit(url)
+    host, _, port = parts.netloc.rpartition(":")
+    peer = socket.create_connection((host, int(port)), 20)
+    peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    key = base64.b64encode(os.urandom(16)).decode()
+    peer.sendall(
+        f"GET /ws?session={session} HTTP/1.1\r\nHost: {parts.netloc}\r\nUpgrade: websocket\r\n"
+        f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+    )
+    data = bytearray()
+    while b"\r\n\r\n" not in data:
+        data += peer.recv(4096)
+    head, _, rest = bytes(data).partition(b"\r\n\r\n")
+    assert b" 101 " in head.split(b"\r\n")[0], head
+    if plays:
+        peer.sendall(masked(json.dumps(SCENE)))
+        peer.sendall(masked(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS})))
+    peer.setblocking(False)
+    return Peer(peer, bytearray(rest))
+
+
+class Crowd:
+    """Clients that have each a session of their own, get its frames and send it documents.
+
+    Args:
+        url: where BML goes.
+        sessions: how many.
+        plays: or only listens, to a server whose frames tell POSIX time.
+    """
+
+    def __init__(self, url: str, sessions: int, plays: bool) -> None:
+        chance = random.Random(0)
+        self._poll = select.epoll()
+        self._peers: dict[int, Peer] = {}
+        self._due: list[tuple[float, int]] = []  # when who sends its next document
+        self._plays = plays
+        self._late: list[float] = []
+        self._answers: list[float] = []
+        self._frames = self._missing = 0
+        for k in range(sessions):
+            peer = joined(url, f"load-{k}", plays)
+            if not plays:
+                peer.zero = 0.0
+            self._peers[peer.socket.fileno()] = peer
+            self._poll.register(peer.socket, select.EPOLLIN)
+            if plays:
+                heappush(self._due, (time.time() + EVERY * chance.random(), peer.socket.fileno()))
+
+    def listen(self, seconds: float) -> dict[str, float]:
+        """Play and listen for some time: what came in it, lateness and answers in ms."""
+        self._frames = self._missing = 0
+        self._late.clear()
+        self._answers.clear()
+        begun, used = time.time(), time.process_time()
+        while (now := time.time()) < begun + seconds:
+            for number, _ in self._poll.poll(0.002):
+                self._read(self._peers[number])
+            while self._due and self._due[0][0] <= now:
+                self._send()
+        late, answers = self._late or [0.0], self._answers or [0.0]
+        return {
+            "frames": self._frames,
+            "expected": len(self._peers) * seconds * FPS,
+            "missing": self._missing,
+            **{name: 1e3 * float(np.percentile(late, part)) for name, part in PARTS.items()},
+            "answers": len(self._answers),
+            **{f"answer_{n}": 1e3 * float(np.percentile(answers, part)) for n, part in PARTS.items()},
+            "load": (time.process_time() - used) / (time.time() - begun),
+        }
+
+    def _read(self, peer: Peer) -> None:
+        try:
+            data = peer.socket.recv(8192)
+        except BlockingIOError:
+            return
+        came = time.time()
+        if len(data) == FRAME and not peer.data:  # nearly always: one frame, whole
+            self._frame(peer, data, 8, came)
+            return
+        peer.data += data
+        for code, payload in messages(peer.data):
+            if code == 2 and payload[0] == 1:
+                self._frame(peer, payload, 4, came)
+            elif code == 1 and payload[:1] == b"<":
+                if (found := POSIX.search(payload)) is not None:
+                    peer.zero = float(found[2]) / 1e3 - float(found[1])
+                for name in [name for name in peer.sent if f'"{name}"'.encode() in payload]:
+                    self._answers.append(came - peer.sent.pop(name))
+
+    def _frame(self, peer: Peer, data: bytes, at: int, came: float) -> None:
+        number, when = NUMBER.unpack_from(data, at)
+        self._frames += 1
+        if peer.newest is not None:
+            self._missing += number - peer.newest - 1
+        peer.newest = number
+        if peer.zero is not None:
+            self._late.append(came - when - peer.zero)
+
+    def _send(self) -> None:
+        when, number = heappop(self._due)
+        heappush(self._due, (when + EVERY, number))
+        peer = self._peers[number]
+        name = f"b{peer.documents}"
+        peer.documents += 1
+        peer.sent[name] = time.time()
+        peer.socket.sendall(masked(f'<bml id="{name}" composition="REPLACE">{BODY}</bml>'))
+
+
+PARTS = {"p50": 50, "p99": 99, "most": 100}
