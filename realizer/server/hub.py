@@ -190,7 +190,8 @@ class Hub:
     def _refusal(self, move: Move, left: Session, visitor: Visitor) -> str | None:
         """Why a connection cannot move; None where it can. It may leave room behind it."""
         if not self._ours(move.session):
-            return f"wanted another worker's session in the address: /ws?session={move.session}"
+            there = f"/ws?session={move.session}" + ("" if move.seen is None else f"&seen={move.seen}")
+            return f"hello reaches the sessions of this process only: connect to {there} instead"
         try:
             self._check(move.session, visitor, None if left.named or len(left.connections) > 1 else left)
         except HubError as error:

@@ -242,7 +242,7 @@ class Session:
         return True
 
     def _compact(self, t: float) -> bool:
-        """Let the journal begin anew where nothing plays; False where the session is another process's now."""
+        """Let the journal begin anew where nothing plays; False where another process has the session."""
         try:
             checkpoint(self, t)
         except Lost as error:

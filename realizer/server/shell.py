@@ -162,11 +162,17 @@ class Shell:
         Raises:
             JournalError: the journal cannot be read.
         """
-        if self._journal is None or name is None or name in self._hub.sessions:
+        if self._journal is None or name is None:
             return
-        if name not in self._restoring:
-            self._restoring[name] = self._loop.create_task(self._restore(self._journal, name, seen or 0))
-        await asyncio.shield(self._restoring[name])
+        if name not in self._hub.sessions:
+            if name not in self._restoring:
+                self._restoring[name] = self._loop.create_task(self._restore(self._journal, name, seen or 0))
+            await asyncio.shield(self._restoring[name])
+        session = self._hub.sessions.get(name)
+        if session is not None and session.notes.taken_over and session.log.newest < (seen or 0):
+            now = self._loop.time()
+            session.opened -= caught_up(session, now, seen or 0) - now
+            self._pump(session)
 
     async def _restore(self, journal: Journal, name: str, seen: int) -> None:
         try:
@@ -175,14 +181,15 @@ class Shell:
             session = self._new(name, 0.0, named=True, epoch=kept.epoch)
             at, owed = await self._loop.run_in_executor(None, restored, session, kept, self._studio.speak)
             session.notes = Notes(name, journal, kept=kept)
-            at, more = caught_up(session, at, seen)
+            at = caught_up(session, at, seen)
+            owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
             now = self._loop.time()
             session.opened = now - max(at, time.time() - kept.epoch)
             for connection in session.connections:  # which went with the other process
                 session.disconnect(connection, now)
             self._hub.sessions[name] = session
             log.info("session %s is gone on with, %d entries long", name, len(kept.entries))
-            for effect in (*owed, *more):
+            for effect in owed:
                 self._do(session, effect)
             self._pump(session)
         finally:
@@ -343,8 +350,21 @@ class Shell:
             tell(id, future.result(), self._loop.time())
             self._pump(session)
 
+    def _rest(self, session: Session) -> None:
+        if self._closed:
+            return
+        try:
+            session.rest(self._loop.time())
+        except Exception:
+            self._fail(session)
+        self._pump(session)
+
     def _sweep(self) -> None:
         self._hub.sweep(self._loop.time())
+        # What is written for all of them is written one after the other, until the next sweep.
+        grown = [session for session in self._hub.sessions.values() if session.notes.grown]
+        for place, session in enumerate(grown):
+            self._loop.call_later(SWEEP * place / len(grown), self._rest, session)
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
 
 

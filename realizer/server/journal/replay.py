@@ -65,21 +65,21 @@ def restored(
     return kept.entries[-1].at if kept.entries else at, owed
 
 
-def caught_up(session: Session, at: float, seen: int) -> tuple[float, list[Effect]]:
+def caught_up(session: Session, now: float, seen: int) -> float:
     """Let time pass until a session has told again what somebody has seen of it already.
 
     The clock that says how much has passed may be another machine's, or have been set back.
 
     Args:
-        at: seconds on the clock of the session, which was opened at 0, at its last entry.
-        seen: seq of the feedback that its client had last; 0 where it had none.
+        now: seconds on its caller's clock.
+        seen: seq of the feedback that its client had last.
 
     Returns:
-        Seconds on its clock, and what its shell owes it.
+        Seconds on that clock, as late as it must be.
     """
-    owed: list[Effect] = []
-    while session.log.newest < seen and (due := session.player.next_deadline()) is not None:
-        at = max(at, due)
-        session.tick(at)
-        owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
-    return at, owed
+    while session.log.newest < seen and not session.closed:
+        if (due := session.player.next_deadline()) is None:
+            break
+        now = max(now, session.opened + due)
+        session.tick(now)
+    return now

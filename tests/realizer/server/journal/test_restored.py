@@ -6,14 +6,18 @@ import asyncio
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
+from realizer.server.serve import Server
+from realizer.settings import Settings
 from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends
@@ -173,6 +177,32 @@ def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
         asyncio.run(test(one, other))
 
 
+def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_more_and_clocks_differ(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    real, step = time.time, [0.0]
+    monkeypatch.setattr(time, "time", lambda: real() + step[0])
+    block = '<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="3"/></bml>'
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
+        async with asyncio.timeout(LIMIT):
+            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+                await client.send(block)
+                told = await feedback(client, "b:n:end")
+            step[0] = -3600.0  # what has passed since is not known
+            async with Server(settings) as server:
+                async with connect(f"{server.url}?session=s&seen=1") as first:
+                    seen = numbers(told)[-1]
+                    async with connect(f"{server.url}?session=s&seen={seen}") as second:
+                        rest = await feedback(second, "b:end")
+                    others = await feedback(first, "b:end")
+        assert numbers(told + rest) == list(range(1, len(told + rest) + 1))
+        assert others == told[1:] + rest
+
+    asyncio.run(run())
+
+
 def test_a_hello_does_not_begin_a_session_anew_that_is_in_the_journal(where: str) -> None:
     async def play(url: str) -> list[str]:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept") as client:
@@ -184,7 +214,7 @@ def test_a_hello_does_not_begin_a_session_anew_that_is_in_the_journal(where: str
             await client.send(json.dumps({"type": "hello", "version": 1, "session": "kept", "seen": 0}))
             refused = json.loads(await client.recv())
             assert refused["code"] == "invalid"
-            assert "/ws?session=kept" in refused["message"]
+            assert refused["message"].endswith("connect to /ws?session=kept&seen=0 instead")
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept&seen=0") as client:
             return await feedback(client, "b:end")
 
