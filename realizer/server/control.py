@@ -88,10 +88,7 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
             case SpeechMessage():
                 _say(session, connection, message, t)
             case Stop():
-                wanted = None if message.blocks is None else set(message.blocks)
-                waiting = session.intake.preparation.waiting
-                session.intake.withdraw([w for w in waiting if wanted is None or w.block.id in wanted], t)
-                session.player.stop(t, wanted)
+                _stop(session, message, t)
             case StateQuery():
                 session.reply(connection.id, _state(session, connection, t))
             case Ping():
@@ -107,6 +104,22 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
     except VoiceError as error:
         where = f"{message.type}.voice"
         session.reply(connection.id, ErrorMessage(code="voice", message=str(error), where=where))
+
+
+def _stop(session: Session, message: Stop, t: float) -> None:
+    """End what is known of these blocks; one that has ended by itself has only been quicker."""
+    intake, wanted = session.intake, None if message.blocks is None else set(message.blocks)
+    waiting = [w for w in intake.preparation.waiting if wanted is None or w.block.id in wanted]
+    known = {w.block.id for w in waiting}
+    intake.withdraw(waiting, t)
+    session.player.stop(t, wanted)
+    strange = [
+        repr(id[:80])
+        for id in message.blocks or ()
+        if not (id in known or id in intake.speeches or session.player.cast.knew(id))
+    ]
+    if strange:
+        raise Wrong("blocks", f"wanted blocks that play or wait, got {', '.join(strange[:10])}")
 
 
 def _say(session: Session, connection: Connection, message: SpeechMessage, t: float) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from bml_schema import Block, Speech
-from realizer.composition.retiming import anticipated
+from realizer.composition.references import abroad
 from realizer.scheduling.timing import Schedule
 from realizer.settings import Settings, raises
 
@@ -56,9 +56,10 @@ def beyond(block: Block, settings: Settings, busy: int, characters: Collection[s
 def too_long(block: Block, schedule: Schedule, settings: Settings) -> str | None:
     """Why what was planned is not played; None where it is.
 
-    A block that is tied to what a client anticipates lasts until the client says.
+    A block that is tied to points of others, or to what a client anticipates, lasts as these say: an open
+    speech for example has no end yet.
     """
-    if schedule.duration <= settings.max_duration or anticipated(block):
+    if schedule.duration <= settings.max_duration or abroad(block):
         return None
     words = f"wanted a block of at most {settings.max_duration:g} s, got {schedule.duration:.1f}"
     return f"{words} {raises('max_duration')}"

@@ -149,6 +149,10 @@ class Speeches:
             if speech.over:
                 del self._speeches[speech.id]
 
+    def __contains__(self, block: str) -> bool:
+        """Whether a block is one of a speech that is not over."""
+        return self._of(block) is not None
+
     # blocks out ---------------------------------------------------------------------------------
 
     def next(self) -> Block | None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 __all__ = [
     "MAX_CONTROL",
@@ -16,6 +16,7 @@ __all__ = [
     "Message",
     "Picture",
     "Reply",
+    "Seconds",
     "Stream",
 ]
 
@@ -27,6 +28,8 @@ MAX_CONTROL = 256 * 1024  # bytes
 # The highest rate of frames; ten times as fast as a film.
 MAX_FPS = 240
 
+# Of a time no more is told than anybody can mean.
+Seconds = Annotated[float, AfterValidator(lambda time: round(time, 6))]
 Stream = Literal["feedback", "fap", "au", "arkit", "mesh", "audio", "video", "schedule"]
 Encoding = Literal["binary", "json", "text"]
 Picture = Literal["jpeg", "png", "webp"]

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from realizer.server.messages.common import PROTOCOL, Reply
+from realizer.server.messages.common import PROTOCOL, Reply, Seconds
 
 __all__ = [
     "BlockState",
@@ -50,11 +50,16 @@ class Limits(Reply):
     message: int = Field(description="bytes of a WebSocket message")
     document: int = Field(description="bytes of a document")
     control: int = Field(description="bytes of a control message")
+    elements: int = Field(description="in a message")
     behaviours: int = Field(description="in a block")
+    duration: float = Field(description="seconds that a block may last")
+    speech: int = Field(description="characters of one speech")
     blocks: int = Field(description="that play or wait in a session")
     characters: int = Field(description="in a session")
     connections: int = Field(description="from one address")
+    rate: float = Field(description="messages a second that are read from a connection")
     picture: int = Field(description="pixels of a longer side")
+    pixels: float = Field(description="pixels a second of one stream of pictures")
     fps: float = Field(description="frames a second")
     keep: float = Field(description="seconds a named session outlives its connections")
 
@@ -65,7 +70,7 @@ class Welcome(Reply):
     type: Literal["welcome"] = "welcome"
     version: int = PROTOCOL
     session: str
-    time: float = Field(description="seconds on the session clock")
+    time: Seconds = Field(description="seconds on the session clock")
     seq: int = Field(description="seq of the newest feedback, 0 where there is none")
     capabilities: Capabilities
     limits: Limits
@@ -98,8 +103,8 @@ class BlockState(Reply):
     id: str
     character: str | None = None
     status: str = Field(description="IN_PREP, PENDING, LURKING, IN_EXEC or SUBSIDING, as in feedback")
-    start: float | None = Field(None, description="seconds on the session clock")
-    end: float | None = None
+    start: Seconds | None = Field(None, description="seconds on the session clock")
+    end: Seconds | None = None
     behaviours: list[str] | None = Field(None, description="ids of those that have begun and not ended")
 
 
@@ -134,7 +139,7 @@ class StateMessage(Reply):
 
     type: Literal["state"] = "state"
     session: str
-    time: float
+    time: Seconds
     blocks: list[BlockState]
     characters: list[CharacterState]
     voice: VoiceState
@@ -180,7 +185,7 @@ class Pong(Reply):
 
     type: Literal["pong"] = "pong"
     id: int | str | None = None
-    time: float = Field(description="seconds on the session clock")
+    time: Seconds = Field(description="seconds on the session clock")
 
 
 class FrameMessage(Reply):

@@ -10,6 +10,8 @@ import pytest
 from realizer.animation.targets import axis
 from realizer.tables.emotions import emotion_faces
 
+NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
+TALK = '<bml id="{}"><speech id="s"><text>Hello there</text></speech></bml>'
 SETS = (
     {"emotion": {"angle": 45, "activation": 6}},
     {"aus": {"12": 0.3, "1L": 0.9, "25": 0}},
@@ -171,3 +173,53 @@ def test_an_unknown_face_is_told_by_the_known_ones_and_no_folders(face, name: st
     (error,) = face.driver.clients[1].of("error")
     assert (error["code"], error["where"]) == ("face", "character.face")
     assert error["message"] == f"wanted one of ada, ben, ida, got {name!r}"
+
+
+def test_blocks_to_stop_that_nobody_knows_are_named_and_the_others_end(drive) -> None:
+    driver = drive()
+    driver.send(NOD.format("a"))
+    client = driver.send({"type": "stop", "blocks": ["x", "a", "y"]})
+    (error,) = client.of("error")
+    assert (error["code"], error["where"]) == ("invalid", "stop.blocks")
+    assert error["message"] == "wanted blocks that play or wait, got 'x', 'y'"
+    driver.run(0.1)
+    assert "a:end" in client.ids
+
+
+def test_a_block_that_waits_for_its_voice_is_known_and_so_is_one_that_has_just_ended(drive) -> None:
+    driver = drive(mute=True)
+    driver.send(TALK.format("talk"))
+    driver.send(NOD.format("nod"))
+    client = driver.run(5.0)
+    assert "nod:end" in client.ids
+    driver.send({"type": "stop", "blocks": ["talk", "nod"]})
+    driver.send({"type": "stop"})
+    assert not client.of("error")
+    assert "talk:end" in client.ids
+
+
+def test_a_speech_that_is_open_is_known_from_its_first_message_on(drive) -> None:
+    driver = drive()
+    driver.send({"type": "speech", "id": "turn", "append": "Hello. "})
+    client = driver.send({"type": "stop", "blocks": ["turn"]})
+    assert not client.of("error")
+
+
+def test_times_are_told_to_the_microsecond(drive) -> None:
+    driver = drive()
+    driver.run(1 / 3)
+    driver.send('<bml id="b"><wait id="w" duration="0.12345678"/></bml>')
+    client = driver.send({"type": "ping", "id": 1})
+    driver.send({"type": "state"})
+    driver.send({"type": "hello"})
+    (pong,), (state,), (welcome,) = (client.of(kind) for kind in ("pong", "state", "welcome"))
+    assert pong["time"] == state["time"] == welcome["time"] == 0.333333
+    (block,) = state["blocks"]
+    assert (block["start"], block["end"]) == (0.333333, 0.45679)
+
+
+def test_a_client_is_told_every_limit_it_can_meet(drive) -> None:
+    limits = {"max_elements": 7, "max_duration": 8, "max_speech": 9, "max_rate": 10, "max_pixels": 1000}
+    (welcome,) = drive(**limits).send({"type": "hello"}).of("welcome")
+    told = {f"max_{name}": value for name, value in welcome["limits"].items()}
+    assert limits.items() <= told.items()

@@ -80,8 +80,9 @@ def test_a_block_that_is_planned_to_last_too_long_is_not_played() -> None:
     assert words == "wanted a block of at most 60 s, got 60.5 (REALIZER_MAX_DURATION sets it)"
 
 
-def test_what_a_client_anticipates_may_come_later_than_any_block_lasts() -> None:
-    tied = '<bml id="b"><wait id="w" start="0" end="anticipators:clock:beat"/></bml>'
+@pytest.mark.parametrize("point", ["anticipators:clock:beat", "turn:turn:end"])
+def test_what_others_say_may_come_later_than_any_block_lasts(point: str) -> None:
+    tied = f'<bml id="b"><wait id="w" start="0" end="{point}"/></bml>'
     late = Schedule("b", {"w": ("start", "end")}, {"w": np.array([0.0, 1e6])})
     assert too_long(block(tied), late, Settings()) is None
 
