@@ -6,43 +6,59 @@ from collections import deque
 from collections.abc import Iterable
 from itertools import islice
 
-from bml_schema import Feedback, parse_feedback
+from bml_schema import Feedback
 
 __all__: list[str] = []
+
+# What is kept in any case, and how many messages at most; of what is older only so many characters.
+FRESH = 60.0  # s
+MOST = 10_000
+ROOM = 2**17
 
 
 class FeedbackLog:
     """The newest messages of a session, each with its `seq` 1, 2, ...
 
+    Who comes back after a minute finds all that was told since; of what is older some is kept, so that the
+    memory of a session that talks for days has a bound.
+
     Args:
-        keep: how many are kept; None: all.
         epoch: POSIX seconds at which the session clock was 0; None where nobody need know.
 
     Attributes:
         newest: seq of the last message, 0 while there is none.
     """
 
-    def __init__(self, keep: int | None, epoch: float | None = None) -> None:
+    def __init__(self, epoch: float | None = None) -> None:
         self.newest = 0
         self._epoch = epoch
-        self._kept: deque[tuple[Feedback, str]] = deque(maxlen=keep)
+        self._kept: deque[tuple[float, str]] = deque()  # (when it was told, its text)
+        self._size = 0
 
     @property
     def first(self) -> int:
         """Seq of the oldest message that is kept; of the next one where none is."""
         return self.newest - len(self._kept) + 1
 
-    def add(self, feedback: Feedback) -> None:
-        """Number a message and keep it."""
+    def add(self, feedback: Feedback, now: float) -> None:
+        """Number a message and keep it; seconds on the session clock."""
         self.newest += 1
-        self._kept.append((feedback, feedback.to_xml(self.newest, self._epoch)))
+        self._keep(feedback.to_xml(self.newest, self._epoch), now)
 
-    def restore(self, newest: int, texts: Iterable[str]) -> None:
+    def restore(self, newest: int, texts: Iterable[str], now: float) -> None:
         """Have told these messages, the last of which has the number `newest`."""
         self.newest = newest
-        self._kept.extend((parse_feedback(text), text) for text in texts)
+        for text in texts:
+            self._keep(text, now)
 
-    def since(self, seq: int) -> list[tuple[Feedback, str]]:
-        """The kept messages from `seq` on, in order, each with its text."""
+    def _keep(self, text: str, now: float) -> None:
+        kept = self._kept
+        kept.append((now, text))
+        self._size += len(text)
+        while len(kept) > MOST or (self._size > ROOM and kept[0][0] < now - FRESH):
+            self._size -= len(kept.popleft()[1])
+
+    def since(self, seq: int) -> list[str]:
+        """The kept messages from `seq` on, in order."""
         skipped = max(0, seq - self.first)
-        return list(islice(self._kept, skipped, None))
+        return [text for _, text in islice(self._kept, skipped, None)]
