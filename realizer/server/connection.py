@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from bml_schema import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress, WarningFeedback
+from bml_schema import parse_feedback
 from realizer.server.effects import Look
 from realizer.server.sound import Sound
 from realizer.server.streams import Timeline
 
 __all__: list[str] = []
 
-ELEMENTS: Mapping[type[Feedback], str] = {
-    BlockProgress: "blockProgress",
-    SyncPointProgress: "syncPointProgress",
-    PredictionFeedback: "predictionFeedback",
-    WarningFeedback: "warningFeedback",
-}
 # Bytes that wait to be sent above which a connection loses frames: two thirds of a second of a mesh.
 SLOW = 512 * 1024
 # And above which it has stopped reading: it is closed, and can come back with `seen`.
@@ -101,11 +94,11 @@ class FeedbackFilter:
     elements: frozenset[str] | None = None
     character: str | None = None
 
-    def takes(self, feedback: Feedback) -> bool:
-        """Whether it is to be sent."""
-        if self.elements is not None and ELEMENTS[type(feedback)] not in self.elements:
+    def takes(self, text: str) -> bool:
+        """Whether a message is to be sent."""
+        if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
             return False
-        return self.character is None or feedback.character_id in (None, self.character)
+        return self.character is None or parse_feedback(text).character_id in (None, self.character)
 
 
 @dataclass(eq=False)

@@ -58,8 +58,6 @@ log = logging.getLogger(__name__)
 
 # Messages that change nothing for others, nor for who comes later.
 PASSING = (Hello, Ping, StateQuery, Subscribe, Unsubscribe)
-# Feedback that is kept for clients that come back: about an hour of talk.
-LOG = 10_000
 
 
 class Session:
@@ -122,7 +120,7 @@ class Session:
         self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
         self.intake = Intake(id, settings, self.player, self._owe)
         self._connections: dict[int, Connection] = {}
-        self.log = FeedbackLog(LOG if history < float("inf") else None, epoch)
+        self.log = FeedbackLog(epoch)
         self._effects: list[Effect] = []
         self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
         # Until then nothing is due but frames, on its own clock; None where that is not known.
@@ -389,7 +387,7 @@ class Session:
         while due := self.player.due(t + EPSILON):
             for feedback in due:
                 told, ends = self.intake.speeches.told(feedback)
-                self.log.add(told)
+                self.log.add(told, t)
                 if ends:
                     waiting = self.intake.preparation.waiting
                     self.intake.withdraw([w for w in waiting if w.block.id in ends], t)
@@ -402,7 +400,7 @@ class Session:
         if connection.feedback is not None:
             wanted = connection.feedback
             told = self.log.since(connection.place)
-            self._effects += [Send(connection.id, text) for feedback, text in told if wanted.takes(feedback)]
+            self._effects += [Send(connection.id, text) for text in told if wanted.takes(text)]
         connection.place = self.log.newest + 1
 
     def resume(self, connection: int, seen: int) -> None:

@@ -97,7 +97,7 @@ def _restore(session: Session, told: Mapping[str, Any], parts: Mapping[str, str]
     intake.voices.update({int(index): voice for index, voice in told["voices"].items()})
     intake.orders.placed, intake.orders.fault = int(told["spoken"]), told["fault"]
     session.clips.restore((id, parts[CLIP + id]) for id in told["clips"])
-    session.log.restore(int(told["seq"]), told["told"])
+    session.log.restore(int(told["seq"]), told["told"], float(told["at"]))
     for connection in told["connections"]:
         session.connect(int(connection), float(told["at"]))
 
@@ -106,7 +106,7 @@ def _told(session: Session) -> list[str]:
     """The last messages of the log, the oldest first."""
     found: list[str] = []
     size = 0
-    for _, text in reversed(session.log.since(session.log.newest - MOST_TOLD + 1)):
+    for text in reversed(session.log.since(session.log.newest - MOST_TOLD + 1)):
         size += len(text)
         if size > MOST_TEXT:
             break

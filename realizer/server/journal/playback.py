@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bml_schema import Feedback
 from realizer.realization import Realization, seen
+from realizer.server.feedback_log import FeedbackLog
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.folder import Record
 from realizer.server.journal.replay import replay
@@ -43,25 +45,37 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         epoch=record.head["epoch"],
         history=float("inf"),
     )
+    log = session.log = _Whole(record.head["epoch"])
     studio = Studio(settings.deformer)
     try:
         replay(session, record.entries, studio.speak)
     finally:
         studio.close()
     for feedback in session.player.due(float("inf")):
-        session.log.add(feedback)
-    told = session.log.since(1)
+        session.log.add(feedback, float("inf"))
     player = session.player
     realization = seen(
         player,
-        [feedback for feedback, _ in told],
+        [feedback for feedback, _ in log.told],
         [playing.schedule for playing in player.cast.all()],
         fps=settings.fps,
         face=session.face_name(0),
         deformer=settings.deformer,
         mapping=session.mapping(0),
     )
-    return realization, [text for _, text in told]
+    return realization, [text for _, text in log.told]
+
+
+class _Whole(FeedbackLog):
+    """All that a session ever tells, with its text."""
+
+    def __init__(self, epoch: float | None) -> None:
+        super().__init__(epoch)
+        self.told: list[tuple[Feedback, str]] = []
+
+    def add(self, feedback: Feedback, now: float) -> None:
+        super().add(feedback, now)
+        self.told.append((feedback, self.since(self.newest)[0]))
 
 
 def _settings(head: Mapping[str, Any]) -> dict[str, Any]:

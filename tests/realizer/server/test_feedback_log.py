@@ -3,37 +3,60 @@
 from __future__ import annotations
 
 from bml_schema import BlockProgress, SyncPointProgress, parse_feedback
-from realizer.server.feedback_log import FeedbackLog
+from realizer.server.feedback_log import FRESH, MOST, ROOM, FeedbackLog
 
 
-def filled(keep: int, count: int) -> FeedbackLog:
-    log = FeedbackLog(keep)
+def filled(count: int, step: float = 1.0) -> FeedbackLog:
+    log = FeedbackLog()
     for n in range(count):
-        log.add(BlockProgress(id=f"b{n}:end", global_time=n))
+        log.add(BlockProgress(id=f"b{n}:end", global_time=n * step), n * step)
     return log
 
 
+def numbers(log: FeedbackLog, seq: int) -> list[int | None]:
+    return [parse_feedback(text).seq for text in log.since(seq)]
+
+
 def test_messages_are_numbered_from_1() -> None:
-    log = filled(10, 3)
-    assert [parse_feedback(text).seq for _, text in log.since(1)] == [1, 2, 3]
+    log = filled(3)
+    assert numbers(log, 1) == [1, 2, 3]
     assert (log.first, log.newest) == (1, 3)
 
 
 def test_since_gives_what_follows() -> None:
-    log = filled(10, 5)
-    assert [parse_feedback(text).seq for _, text in log.since(4)] == [4, 5]
+    log = filled(5)
+    assert numbers(log, 4) == [4, 5]
     assert log.since(6) == []
 
 
-def test_the_oldest_are_forgotten() -> None:
-    log = filled(2, 5)
-    assert (log.first, log.newest) == (4, 5)
-    assert [parse_feedback(text).seq for _, text in log.since(1)] == [4, 5]
+def test_what_was_told_in_the_last_minute_is_kept_and_of_what_is_older_only_so_much() -> None:
+    log = filled(6000, step=0.05)
+    texts = log.since(1)
+    assert len(texts) == log.newest - log.first + 1
+    assert FRESH / 0.05 <= len(texts) < 6000
+    assert sum(map(len, texts)) > ROOM  # the last minute alone is larger here
+    slow = filled(6000, step=10.0)
+    assert ROOM * 0.9 < sum(map(len, slow.since(1))) <= ROOM
+    assert numbers(slow, 1) == list(range(slow.first, 6001))
+
+
+def test_there_is_a_limit_even_to_what_was_told_just_now() -> None:
+    log = filled(MOST + 5, step=0.0)
+    assert (log.first, log.newest) == (6, MOST + 5)
+    assert len(log.since(1)) == MOST
+
+
+def test_what_was_told_before_can_be_put_back() -> None:
+    log = filled(5)
+    again = FeedbackLog()
+    again.restore(log.newest, log.since(3), now=7.0)
+    assert (again.first, again.newest) == (3, 5)
+    assert again.since(4) == log.since(4)
 
 
 def test_with_an_epoch_every_time_comes_in_posix_milliseconds_too() -> None:
-    log = FeedbackLog(5, epoch=1_700_000_000.25)
-    log.add(SyncPointProgress(id="b:h:end", time=1.0, global_time=2.5))
-    ((_, text),) = log.since(1)
+    log = FeedbackLog(epoch=1_700_000_000.25)
+    log.add(SyncPointProgress(id="b:h:end", time=1.0, global_time=2.5), 2.5)
+    (text,) = log.since(1)
     assert 'globalTime="2.5"' in text
     assert parse_feedback(text).posix_time == 1_700_000_002_750

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.errors import RenderError, VoiceError
+from realizer.server import feedback_log
 from realizer.server.effects import Close
-from realizer.server.feedback_log import FeedbackLog
 from realizer.server.journal.entry import Entry, Lost
 from realizer.server.journal.local import LocalJournal
 from realizer.server.journal.notes import Notes
@@ -582,7 +582,7 @@ def test_hello_with_seen_sends_what_followed(driver) -> None:
 
 
 def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
-    monkeypatch.setattr(driver.session, "log", FeedbackLog(5))
+    monkeypatch.setattr(feedback_log, "MOST", 5)
     driver.send(NOD.format("b"))
     driver.run(10)
     viewer = driver.join(2, seen=2)
