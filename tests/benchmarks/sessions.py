@@ -26,7 +26,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from crowd import FPS, Crowd
+from listeners import FPS, Crowd
 from plot import bars, exponent
 
 
