@@ -11,7 +11,6 @@ import socket
 import tempfile
 from collections import Counter
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 from weakref import WeakSet
@@ -21,12 +20,12 @@ from websockets.asyncio.server import ServerConnection
 from websockets.asyncio.server import serve as listen
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
-from websockets.frames import Frame, Opcode
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from realizer.server import guard
+from realizer.server.doors.websocket_client import GOODBYE, WebSocketClient
 from realizer.server.guard import Guard, Pace
 from realizer.server.hub import HubError, Visitor
 from realizer.server.journal import JournalError
@@ -45,8 +44,6 @@ log = logging.getLogger(__name__)
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 # How long one that connects has to say what it wants.
 OPENING = 10.0  # s
-# A client that has not answered the close by then is gone.
-GOODBYE = 2.0  # s
 
 
 class WebSocketDoor:
@@ -214,7 +211,7 @@ class WebSocketDoor:
                 del self._from[address]
 
     async def _join(self, socket: ServerConnection, request: Request) -> None:
-        client = _Client(socket)
+        client = WebSocketClient(socket)
         greeting = None
         try:
             allowed = self._guard.request(request.path, _headers(request), later=True)
@@ -246,7 +243,7 @@ class WebSocketDoor:
             self._shell.leave(number)
             log.info("left", extra={**told, "code": socket.close_code})
 
-    async def _read(self, socket: ServerConnection, number: int, client: _Client) -> None:
+    async def _read(self, socket: ServerConnection, number: int, client: WebSocketClient) -> None:
         """Hand messages on, no faster than a client may send them: the rest waits in its own buffers."""
         loop = asyncio.get_running_loop()
         pace = Pace(self._settings.max_rate)
@@ -296,45 +293,6 @@ class WebSocketDoor:
                 async with self._checking:
                     told = await loop.run_in_executor(None, faults, text, self._settings)
                 await socket.send(told)
-
-
-class _Client:
-    """The way out to one WebSocket: what is sent is written at once, or waits in the socket's own buffer."""
-
-    def __init__(self, socket: ServerConnection) -> None:
-        self._socket = socket
-        self._end: asyncio.Task[None] | None = None
-
-    @property
-    def waiting(self) -> int:
-        transport = self._socket.transport
-        return 0 if transport is None else transport.get_write_buffer_size()
-
-    def send(self, data: str | bytes) -> None:
-        # Without a task that wakes for every frame; a socket that closes is left out.
-        if self._end is None and self._socket.protocol.state is State.OPEN:
-            text = isinstance(data, str)
-            payload = data.encode() if isinstance(data, str) else data
-            self._socket.transport.write(_head(text, len(payload)) + payload)
-
-    def end(self, code: int, reason: str) -> None:
-        if self._end is None:
-            self._end = asyncio.get_running_loop().create_task(self._close(code, reason))
-
-    async def _close(self, code: int, reason: str) -> None:
-        """One that does not read will not hear that it is let go: `close` would wait for it for ever."""
-        try:
-            async with asyncio.timeout(GOODBYE):
-                await self._socket.close(code, reason)
-        except TimeoutError:
-            self._socket.transport.abort()
-
-
-@lru_cache(maxsize=1024)
-def _head(text: bool, length: int) -> bytes:
-    """What goes before a message of so many bytes."""
-    whole = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
-    return whole[: len(whole) - length]
 
 
 def _address(socket: ServerConnection) -> str:
