@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-__all__ = ["MEDIA_TYPE", "Histogram", "Metrics"]
+__all__ = ["MEDIA_TYPE", "Histogram", "Metrics", "summed"]
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 # Upper ends in seconds: a frame is late by less than a millisecond, or by several frames.
@@ -34,7 +35,7 @@ class Histogram:
             inside = ",".join(filter(None, (labels, f'le="{end}"')))
             yield f"{name}_bucket{{{inside}}} {count}"
         outside = f"{{{labels}}}" if labels else ""
-        yield f"{name}_sum{outside} {self._sum:.9g}"
+        yield f"{name}_sum{outside} {_number(self._sum)}"
         yield f"{name}_count{outside} {count}"
 
 
@@ -76,7 +77,7 @@ class Metrics:
                 lines += [
                     f"# HELP {whole} {says}",
                     f"# TYPE {whole} {kind}",
-                    f"{whole}{outside} {values[name]:g}",
+                    f"{whole}{outside} {_number(values[name])}",
                 ]
         for name, says, histogram in (
             ("realizer_lateness_seconds", "By how much a session was woken too late.", self.late),
@@ -85,6 +86,40 @@ class Metrics:
             lines += [f"# HELP {name} {says}", f"# TYPE {name} histogram"]
             lines += histogram.lines(name, self._labels)
         return "\n".join(lines) + "\n"
+
+
+_SAMPLE = re.compile(r"(\w+)(?:\{([^}]*)\})? (\S+)")
+_WORKER = re.compile(r'worker="[^"]*",?')
+
+
+def summed(texts: Mapping[int, str]) -> str:
+    """What several workers have counted as what all of them have: each sample is the sum of theirs.
+
+    Args:
+        texts: number of a worker -> its text. `realizer_worker_sessions` says which there are.
+    """
+    told: dict[str, float | None] = {}  # a comment, or the name and labels of a sample -> its sum
+    sessions: dict[int, float] = {}
+    for number, text in texts.items():
+        for line in text.splitlines():
+            if (sample := _SAMPLE.fullmatch(line)) is None:
+                told.setdefault(line)
+                continue
+            name, labels, value = sample[1], _WORKER.sub("", sample[2] or ""), float(sample[3])
+            key = f"{name}{{{labels}}}" if labels else name
+            told[key] = (told.get(key) or 0.0) + value
+            if key == "realizer_sessions":
+                sessions[number] = value
+    lines = [key if value is None else f"{key} {_number(value)}" for key, value in told.items()]
+    lines += ["# HELP realizer_worker_sessions Sessions of each worker that has answered."]
+    lines += ["# TYPE realizer_worker_sessions gauge"]
+    lines += [f'realizer_worker_sessions{{worker="{n}"}} {_number(value)}' for n, value in sessions.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    """To the last digit where it counts, to nine where it measures."""
+    return str(int(value)) if value == int(value) else f"{value:.9g}"
 
 
 GAUGES = {

@@ -20,6 +20,7 @@ from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from urllib.parse import parse_qs
 
+from realizer.server.gathered import gathered, is_for_all
 from realizer.settings import Settings
 
 __all__ = ["WorkerError", "Workers", "handed", "worker_of"]
@@ -173,13 +174,19 @@ class Workers:
         with client, contextlib.suppress(TimeoutError, OSError):
             async with asyncio.timeout(PATIENCE):
                 line = await _first_line(client)
-                number = self._number(line)
-                while True:
-                    try:
-                        socket.send_fds(self._children[number][1], [READY], [client.fileno()])
-                        return
-                    except BlockingIOError:
-                        await asyncio.sleep(STEP)
+                if is_for_all(line):
+                    await gathered(client, len(self._children), self._give)
+                else:
+                    await self._give(self._number(line), client)
+
+    async def _give(self, number: int, client: socket.socket) -> None:
+        """Hand a connection over."""
+        while True:
+            try:
+                socket.send_fds(self._children[number][1], [READY], [client.fileno()])
+                return
+            except BlockingIOError:
+                await asyncio.sleep(STEP)
 
     def _number(self, line: str) -> int:
         """The worker of a request: that of its session, the one it names (`?worker=1`), or the next."""

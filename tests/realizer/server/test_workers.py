@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import threading
+import urllib.error
 import urllib.request
 from collections.abc import Coroutine, Iterator
 from typing import TypeVar
@@ -18,6 +19,7 @@ from typing import TypeVar
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 
+from realizer.server import gathered
 from realizer.server.workers import Workers, worker_of
 from realizer.settings import Settings
 
@@ -105,6 +107,81 @@ def test_each_worker_tells_its_own_numbers_to_who_names_it(workers: Workers) -> 
         address = f"http://127.0.0.1:{workers.port}/metrics?worker={number}"
         with urllib.request.urlopen(address, timeout=LIMIT) as answer:
             assert f'realizer_sessions{{worker="{number}"}}' in answer.read().decode()
+
+
+def metrics(workers: Workers, query: str = "", headers: dict[str, str] | None = None) -> dict[str, float]:
+    """name and labels -> value, of what all workers or one of them tell."""
+    address = f"http://127.0.0.1:{workers.port}/metrics{query}"
+    with urllib.request.urlopen(urllib.request.Request(address, headers=headers or {}), timeout=LIMIT) as got:
+        text = got.read().decode()
+        assert len(text.encode()) == int(got.headers["Content-Length"])
+    assert text.count("# TYPE realizer_sessions gauge") == 1
+    return {
+        line.rpartition(" ")[0]: float(line.rpartition(" ")[2])
+        for line in text.splitlines()
+        if not line.startswith("#")
+    }
+
+
+def test_one_scrape_tells_the_sum_of_all_workers(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        names = [one_of(0), one_of(1)]
+        async with contextlib.AsyncExitStack() as stack:
+            clients = [await stack.enter_async_context(connect(f"{url}?session={name}")) for name in names]
+            clients.append(await stack.enter_async_context(connect(f"{url}?session={names[1]}")))
+            for number, client in enumerate(clients):
+                await client.send(NOD.format(f"m{number}"))
+            for number, client in enumerate(clients):
+                await told(client, f'"m{number}:start"')
+            each = [await asyncio.to_thread(metrics, workers, f"?worker={number}") for number in (0, 1)]
+            whole = await asyncio.to_thread(metrics, workers)
+        for name in ("realizer_sessions", "realizer_connections", "realizer_messages_total"):
+            assert whole[name] == sum(each[k][f'{name}{{worker="{k}"}}'] for k in (0, 1))
+        assert whole["realizer_connections"] == 3
+        for number in (0, 1):
+            mine = each[number][f'realizer_sessions{{worker="{number}"}}']
+            assert whole[f'realizer_worker_sessions{{worker="{number}"}}'] == mine >= 1
+        planned = [each[k][f'realizer_planning_seconds_bucket{{worker="{k}",le="+Inf"}}'] for k in (0, 1)]
+        assert whole['realizer_planning_seconds_bucket{le="+Inf"}'] >= sum(planned) >= 3
+        assert (
+            whole["realizer_planning_seconds_count"] == whole['realizer_planning_seconds_bucket{le="+Inf"}']
+        )
+
+    played(test())
+
+
+def test_one_worker_that_hangs_is_left_out_of_the_sum(
+    workers: Workers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gathered, "PATIENCE", 2.0)
+    os.kill(workers.processes[1], signal.SIGSTOP)
+    try:
+        whole = metrics(workers)
+    finally:
+        os.kill(workers.processes[1], signal.SIGCONT)
+    assert 'realizer_worker_sessions{worker="0"}' in whole
+    assert 'realizer_worker_sessions{worker="1"}' not in whole
+
+
+def test_the_sum_is_for_those_who_have_the_token() -> None:
+    async def test() -> None:
+        there = await Workers(Settings(port=0, voice="silent", workers=2, token="Xk-secret-7")).start()
+        try:
+            with pytest.raises(urllib.error.HTTPError, match="401") as refused:
+                await asyncio.to_thread(metrics, there)
+            assert b"REALIZER_TOKEN" in refused.value.read()
+            refused.value.close()
+            for query, headers in (("?token=Xk-secret-7", {}), ("", {"Authorization": "Bearer Xk-secret-7"})):
+                whole = await asyncio.to_thread(metrics, there, query, headers)
+                assert whole['realizer_worker_sessions{worker="1"}'] == 0
+            # Both workers have refused one.
+            assert whole["realizer_refused_total"] == 2
+        finally:
+            await there.close()
+
+    played(test())
 
 
 def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(workers: Workers) -> None:
