@@ -17,7 +17,7 @@ from bml_schema import Block, Feedback
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle import idle_channels
+from realizer.animation.idle import Idle, idle_face
 from realizer.animation.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
 from realizer.animation.targets import AU_NAMES, axis
 from realizer.arrays import Float64
@@ -278,29 +278,29 @@ class Player:
                 last `due`.
         """
         times = np.asarray(times, np.float64)
-        channels = self._channels(float(times[0]), float(times[-1]), character) if len(times) else []
-        return blend(channels, times, self.rules)
+        if not len(times):
+            return blend([], times, self.rules)
+        channels, idle = self._moving(float(times[0]), float(times[-1]), character)
+        return blend(channels, times, self.rules, idle)
 
-    def _channels(self, first: float, last: float, character: int) -> list[Channel]:
+    def _moving(self, first: float, last: float, character: int) -> tuple[list[Channel], Idle | None]:
         """All that moves a face between two times."""
         blocks = self._blocks.cast.of(character)
         asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
         asked += [Asked(c.span[0], c) for c in self._characters[character].channels()]
         channels = [c for _, c in asked if c.span[0] <= last and c.span[1] >= first]
-        if self.idle:
-            seed = self.world.seed + 7919 * character
-            said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
-            talks = [
-                Talk(s.start + at, s.until, part)
-                for s in said
-                for at, part in s.utterance.parts or [(0.0, s.utterance)]
-            ]
-            near = [
-                t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
-            ]
-            channels += idle_channels(first, last, seed, phrase_ends(talks))
-            channels += prosody_channels(near, first, last, seed, asked)
-        return channels
+        if not self.idle:
+            return channels, None
+        seed = self.world.seed + 7919 * character
+        said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
+        talks = [
+            Talk(s.start + at, s.until, part)
+            for s in said
+            for at, part in s.utterance.parts or [(0.0, s.utterance)]
+        ]
+        near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
+        channels += prosody_channels(near, first, last, seed, asked)
+        return channels, idle_face(first, last, seed, phrase_ends(talks))
 
     @property
     def end(self) -> float:
@@ -334,17 +334,18 @@ class Player:
 
     def _face_state(self, now: float, character: int) -> dict[str, Any]:
         times = np.array([now])
-        channels = self._channels(now, now, character)
+        channels, idle = self._moving(now, now, character)
         fap_names = list(axis())[len(AU_NAMES()) : len(AU_NAMES()) + 68]
         layers = {}
         for layer in Layer:
-            own = blend([c for c in channels if c.layer is layer], times)
+            alone = idle if layer is Layer.IDLE else None
+            own = blend([c for c in channels if c.layer is layer], times, idle=alone)
             # Below 0.005 nothing is seen of an AU, and of a FAP below half a unit.
             values = zip(fap_names, own.faps[0].tolist(), strict=True)
             faps = {name: round(value) for name, value in values if abs(value) >= 0.5}
             if (aus := _up(own)) or faps:
                 layers[layer.name.lower()] = {"aus": aus, "faps": faps}
-        shown = _up(blend(channels, times, self.rules))
+        shown = _up(blend(channels, times, self.rules, idle))
         return {"character": self._characters[character].id, "aus": shown, "layers": layers}
 
     # inside -------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable
 from functools import cache
 
@@ -9,11 +10,11 @@ import numpy as np
 
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.curves import sample, weights
+from realizer.animation.curves import Samples, in_order, sample, samples, weights
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle import Blink
-from realizer.animation.targets import AU_NAMES, axis, presence, region
-from realizer.arrays import Bool, Float64
+from realizer.animation.idle import Idle
+from realizer.animation.targets import AU_NAMES, au, axis, presence, region
+from realizer.arrays import Float32, Float64, Index
 from realizer.tables.cooccurrence import Rules
 
 __all__ = ["blend"]
@@ -22,7 +23,9 @@ __all__ = ["blend"]
 OVER = (Layer.FAPS, Layer.DIRECT)
 
 
-def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = None) -> AUFrames:
+def blend(
+    channels: Iterable[Channel], times: Float64, rules: Rules | None = None, idle: Idle | None = None
+) -> AUFrames:
     """What all channels show together.
 
     Column by column of the axis:
@@ -31,8 +34,8 @@ def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = Non
     - BASE states add up, so that one which is faded out while another rises passes smoothly into it; the
       part of a region that the GAZE layer has taken (its presence) is taken from them.
     - GAZE: where several gazes claim a region together more than once, each gets its share of it.
-    - IDLE: the part of its motion and of its blinks that base states have taken does not show. A blink comes
-      whole or not at all, as it is when it begins.
+    - IDLE: the part of its motion and of its blinks that the presences "motion" and "blinks" have taken does
+      not show. A blink comes whole or not at all, as it is when it begins.
     - FAPs add up; presences add up to at most 1.
     - FAPS, and above it DIRECT: as far as such a channel is there, it replaces all that lies below; of a FAP
       that is also what AUs ask of it (`AUFrames.held`). Several in one layer that are there more than once
@@ -44,114 +47,162 @@ def blend(channels: Iterable[Channel], times: Float64, rules: Rules | None = Non
         channels: any number, any order; times on the same clock as `times`.
         times: (n,) seconds, any order.
         rules: which AUs a face can show together; None: all of them.
+        idle: what the face does by itself between the first and the last of the times.
     """
-    times = np.asarray(times, np.float64)
+    asked = np.asarray(times, np.float64)
+    order = in_order(asked)
+    times = asked if order is None else asked[order]
     alive = _alive(channels, times)
     # Only the columns that something moves are worked on; `place` says where each of them stands.
-    columns = sorted({channel.target.column for channel in alive})
+    moved = {channel.target.column for channel in alive}
+    if idle is not None:
+        moved |= {*idle.motion.columns, *_lids()}
+    columns = sorted(moved)
     place = {column: i for i, column in enumerate(columns)}
-    sampled = sample(alive, times)
-    _take_idle(sampled, alive)
-    sums = _sums()[columns]
-    shape = (len(columns), len(times))
-    base, gaze, over = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for channel, row in zip(alive, sampled, strict=True):
-        i = place[channel.target.column]
-        if channel.layer in OVER:
-            continue
-        if channel.layer is Layer.BASE:
-            base[i] += row
-        elif channel.layer is Layer.GAZE and sums[i]:
-            gaze[i] += row
-        elif sums[i]:
-            over[i] += row
-        else:
-            np.maximum(over[i], row, out=over[i])
-    for name, aus in _regions().items():
-        if (taken := place.get(axis()[name].column)) is not None:
-            share = gaze[taken].copy()
-            part = [place[column] for column in (*aus, axis()[name].column) if column in place]
-            gaze[part] /= np.maximum(share, 1.0)
-            base[part] *= 1.0 - np.minimum(share, 1.0)
-    over += gaze
-    # Base states and expressions: the stronger one shows; rotations add up.
-    values = np.where(sums[:, None], base + over, np.maximum(base, over))
-    held = np.zeros(shape)
-    for layer in OVER:
-        rows = [k for k, channel in enumerate(alive) if channel.layer is layer]
-        _override(values, held, place, [alive[k] for k in rows], sampled[rows], times)
+    values, base, gaze = _layers(alive, place, times)
+    if idle is not None:
+        _add_idle(values, idle, alive, place, times)
+    if gaze is not None:
+        _share(gaze, base, place)
+        values += gaze
+    if base is not None:
+        # Base states and expressions: the stronger one shows; rotations add up.
+        adds = np.array([_sums()[column] for column in columns])[:, None]
+        values = np.where(adds, base + values, np.maximum(base, values))
+    held = _override(values, alive, place, times)
     # The FAPs between AUs and presences have limits of their own.
-    faps = np.array([0 <= column - len(AU_NAMES()) < 68 for column in columns], bool)
-    np.clip(values, 0.0, 1.0, out=values, where=~faps[:, None])
-    frames = np.zeros((len(times), len(axis())), np.float32)
-    frames[:, columns] = values.T
-    if not held[faps].any():
-        return AUFrames(times, frames, rules)
-    of_faps = np.zeros((len(times), 68), np.float32)
-    of_faps[:, np.array(columns)[faps] - len(AU_NAMES())] = held[faps].T
-    return AUFrames(times, frames, rules, of_faps)
+    first, last = (bisect_left(columns, len(AU_NAMES()) + count) for count in (0, 68))
+    for limited in (values[:first], values[last:]):
+        np.clip(limited, 0.0, 1.0, out=limited)
+    frames = _by_column(values, columns, len(axis()), order)
+    if held is None or not held[first:last].any():
+        return AUFrames(asked, frames, rules, None, tuple(columns))
+    faps = [column - len(AU_NAMES()) for column in columns[first:last]]
+    return AUFrames(asked, frames, rules, _by_column(held[first:last], faps, 68, order), tuple(columns))
 
 
 def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
     if not len(times):
         return []
-    first, last = float(np.min(times)), float(np.max(times))
-    alive = []
-    for channel in channels:
-        begin, end = channel.span
-        if begin <= last and end >= first:
-            alive.append(channel)
-    return alive
+    first, last = times[0], times[-1]
+    return [channel for channel in channels if channel.span[0] <= last and channel.span[1] >= first]
 
 
-def _take_idle(sampled: Float64, channels: list[Channel]) -> None:
-    """Take from the idle channels what the presences "motion" and "blinks" say, in place, of their rows."""
-    lids, moves = presence("blinks").column, presence("motion").column
-    taking = [channel for channel in channels if channel.target.column == lids]
-    motion = [i for i, channel in enumerate(channels) if channel.target.column == moves]
-    if not taking and not motion:
-        return
-    blinks = [(i, channel) for i, channel in enumerate(channels) if isinstance(channel, Blink)]
-    begins = np.array([blink.times[0] for _, blink in blinks])
-    kept = 1.0 - np.minimum(sample(taking, begins).sum(axis=0), 1.0)
-    for (i, blink), part in zip(blinks, kept, strict=True):
-        sampled[i] *= part > blink.draw
-    still = 1.0 - np.minimum(sampled[motion].sum(axis=0), 1.0)
-    for i, channel in enumerate(channels):
-        if channel.layer is Layer.IDLE and not isinstance(channel, Blink):
-            sampled[i] *= still
+def _layers(
+    channels: list[Channel], place: dict[int, int], times: Float64
+) -> tuple[Float64, Float64 | None, Float64 | None]:
+    """(c, n) each of the columns in `place`: expressions, base states and gazes (None: there are none).
+
+    Expressions are all that neither is one of the others nor replaces what lies below.
+    """
+    own = [channel for channel in channels if channel.layer not in OVER]
+    has = [Layer.EXPRESSION, *sorted({channel.layer for channel in own} & {Layer.BASE, Layer.GAZE})]
+    whole = np.zeros((len(has), len(place), len(times)))
+    rows, adds = np.empty(len(own), np.intp), np.empty(len(own), bool)
+    for k, channel in enumerate(own):
+        column, layer = channel.target.column, channel.layer
+        apart = layer is Layer.BASE or (layer is Layer.GAZE and _sums()[column])
+        rows[k] = (has.index(layer) if apart else 0) * len(place) + place[column]
+        adds[k] = apart or _sums()[column]
+    found = samples(own, times)
+    values = _kept(found, own, channels, times)
+    at, adding = found.spread(rows * len(times)) + found.frames, found.spread(adds)
+    np.add.at(whole.reshape(-1), at[adding], values[adding])
+    np.maximum.at(whole.reshape(-1), at[~adding], values[~adding])
+    layers = dict(zip(has, whole, strict=True))
+    return layers[Layer.EXPRESSION], layers.get(Layer.BASE), layers.get(Layer.GAZE)
+
+
+def _by_column(rows: Float64, columns: list[int], count: int, order: Index | None) -> Float32:
+    """(n, count) float32 that has rows (m, n) as its columns, and n in the order they were asked for.
+
+    In memory it lies column by column, as it is worked on.
+    """
+    whole = np.zeros((count, rows.shape[1]), np.float32)
+    if order is None:
+        whole[columns] = rows
+    else:
+        whole[np.array(columns)[:, None], order] = rows
+    return whole.T
+
+
+def _share(gaze: Float64, base: Float64 | None, place: dict[int, int]) -> None:
+    """Give each gaze its part of a region that several take, and take it from the base states, in place."""
+    for name, aus in _regions().items():
+        if (taken := place.get(axis()[name].column)) is not None:
+            share = gaze[taken].copy()
+            part = [place[column] for column in (*aus, axis()[name].column) if column in place]
+            gaze[part] /= np.maximum(share, 1.0)
+            if base is not None:
+                base[part] *= 1.0 - np.minimum(share, 1.0)
+
+
+def _add_idle(
+    values: Float64, idle: Idle, channels: list[Channel], place: dict[int, int], times: Float64
+) -> None:
+    """Let the face do what it does by itself, as far as it is not kept from it, in place."""
+    blinks = idle.blinks
+    if fewer := [channel for channel in channels if channel.target.column == presence("blinks").column]:
+        blinks = blinks.kept(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
+    shut = blinks.at(times)
+    for lid in _lids():
+        np.maximum(values[place[lid]], shut, out=values[place[lid]])
+    moved = idle.motion.at(times)
+    if (still := _still(channels, times)) is not None:
+        moved *= still
+    values[[place[column] for column in idle.motion.columns]] += moved
+
+
+def _kept(found: Samples, own: list[Channel], channels: list[Channel], times: Float64) -> Float64:
+    """(e,) the values that were found, of the idle layer what its presence leaves."""
+    idle = [channel.layer is Layer.IDLE for channel in own]
+    if any(idle) and (still := _still(channels, times)) is not None:
+        return found.values * np.where(found.spread(np.array(idle)), still[found.frames], 1.0)
+    return found.values
+
+
+def _still(channels: list[Channel], times: Float64) -> Float64 | None:
+    """(n,) how much of idle motion the presence "motion" leaves; None: all of it."""
+    column = presence("motion").column
+    taking = [channel for channel in channels if channel.target.column == column]
+    return 1.0 - np.minimum(sample(taking, times).sum(axis=0), 1.0) if taking else None
 
 
 def _override(
-    values: Float64,
-    held: Float64,
-    place: dict[int, int],
-    channels: list[Channel],
-    sampled: Float64,
-    times: Float64,
-) -> None:
-    """Lay the channels of a layer over `values` (columns that are moved, n), in place, and so `held`."""
-    if not channels:
-        return
-    there, shown = np.zeros_like(values), np.zeros_like(values)
-    for channel, value, weight in zip(channels, sampled, weights(channels, times), strict=True):
-        i = place[channel.target.column]
-        there[i] += weight
-        shown[i] += value
-    shown /= np.maximum(there, 1.0)
-    left = 1.0 - np.minimum(there, 1.0)
-    values *= left
-    values += shown
-    held[:] = 1.0 - (1.0 - held) * left
+    values: Float64, channels: list[Channel], place: dict[int, int], times: Float64
+) -> Float64 | None:
+    """Lay the channels that replace what lies below over `values` (c, n), in place.
+
+    Returns:
+        (c, n) 0..1 how far it was replaced; None: nowhere.
+    """
+    held: Float64 | None = None
+    for layer in OVER:
+        if over := [channel for channel in channels if channel.layer is layer]:
+            rows = [place[channel.target.column] for channel in over]
+            there, shown = np.zeros_like(values), np.zeros_like(values)
+            np.add.at(there, rows, weights(over, times))
+            np.add.at(shown, rows, sample(over, times))
+            shown /= np.maximum(there, 1.0)
+            left = 1.0 - np.minimum(there, 1.0)
+            values *= left
+            values += shown
+            held = 1.0 - left if held is None else 1.0 - (1.0 - held) * left
+    return held
 
 
 @cache
-def _sums() -> Bool:
-    """(n_targets,) True where channels add up."""
-    sums = np.ones(len(axis()), bool)
+def _lids() -> tuple[int, ...]:
+    """The columns that a blink closes."""
+    return tuple(lid.column for lid in au(45))
+
+
+@cache
+def _sums() -> tuple[bool, ...]:
+    """Of each column whether channels add up there."""
     known = tables.by_number(tables.action_units())
-    sums[: len(AU_NAMES())] = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
-    return sums
+    aus = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
+    return (*aus, *(True for _ in range(len(aus), len(axis()))))
 
 
 @cache

@@ -7,15 +7,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from realizer.animation.rounds import Rounds
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Bool, Float32
+from realizer.arrays import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
-__all__ = ["Shown", "cooccur"]
-
-Index = npt.NDArray[np.intp]
+__all__ = ["Bounds", "Shown", "bounds", "cooccur"]
 
 
 class Shown(NamedTuple):
@@ -41,14 +39,14 @@ def cooccur(aus: Float32, rules: Rules) -> Shown:
         aus: (n_au, n) float32 intensities 0..1, rows named by `AU_NAMES()`.
         rules: the rules; domination eq. 5.2, 5.5, 5.7, 5.8; exclusion eq. 5.9; opposition eq. 5.10.
     """
-    compiled = _compile(_Key(rules))
-    left = _least(aus, compiled.taking)
-    first, second = compiled.opposed
-    if aus[first].any() and aus[second].any():
-        left[first] = np.minimum(left[first], np.maximum(aus[first] - aus[second], 0))
-        left[second] = np.minimum(left[second], np.maximum(aus[second] - aus[first], 0))
-    shown = np.minimum(left, _least(aus, compiled.holding))
-    return Shown(shown, left - shown)
+    live = np.flatnonzero(aus.any(axis=1))
+    known = bounds(rules, tuple(live.tolist()))
+    asked = aus[live]
+    moving = known.moving(asked)
+    shown, held = np.zeros_like(aus), np.zeros_like(aus)
+    shown[live] = known.scored(asked, moving)
+    held[live] = moving - shown[live]
+    return Shown(shown, held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,34 +67,92 @@ class Terms:
     low: Float32
     high: Float32
 
+    def among(self, row: Index) -> Bound | None:
+        """What bounds units that may be up; None: nothing does.
+
+        Args:
+            row: (n_au,) where the row of each of them stands, -1 for units that are not up.
+        """
+        up = row >= 0
+        strong: Bool = up[self.rows[0]] | up[self.rows[1]]
+        terms = np.flatnonzero(up[self.weaker] & strong[self.stronger].all(axis=0))
+        if not len(terms):
+            return None
+        rounds = Rounds.of(self.weaker[terms])
+        used, stronger = np.unique(self.stronger[:, terms[rounds.order]], return_inverse=True)
+        one, other = row[self.rows[:, used]]
+        return Bound(
+            row[rounds.groups],
+            rounds,
+            stronger.reshape(2, -1),
+            np.stack([np.where(one < 0, other, one), np.where(other < 0, one, other)]),
+            self.start[used],
+            self.low[used],
+            self.high[used],
+        )
+
 
 @dataclass(frozen=True, eq=False)
-class Compiled:
-    """`taking` takes from the face, `holding` from the score alone; `opposed` (2, k) rows face each other."""
+class Bound:
+    """`Terms` of some units, in their rows; terms in the order of `rounds`, `units` as its groups."""
 
-    taking: Terms
-    holding: Terms
+    units: Index
+    rounds: Rounds
+    stronger: Index
+    rows: Index
+    start: Float32
+    low: Float32
+    high: Float32
+
+    def lower(self, left: Float32, aus: Float32) -> None:
+        """Leave of `left` (u, n), in place, what `aus` (u, n) let it have."""
+        value = np.maximum(aus[self.rows[0]], aus[self.rows[1]])  # (k, n): of two sides the stronger
+        half = np.minimum(value, np.float32(0.5))
+        value -= half
+        value *= self.high
+        half *= self.low
+        half += self.start
+        half += value
+        degree = np.minimum(half[self.stronger[0]], half[self.stronger[1]])
+        most = self.rounds.reduced(degree, np.maximum)
+        left[self.units] = np.minimum(left[self.units], 1 - most)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """The rules for some units, each a row of whole arrays: `taking` takes from the face, `holding` from the
+    score alone; `opposed` (2, k) rows face each other."""
+
+    taking: Bound | None
+    holding: Bound | None
     opposed: Index
 
-
-def _least(aus: Float32, terms: Terms) -> Float32:
-    """(n_au, n): what the terms leave of each unit."""
-    left = aus.copy()
-    up: Bool = np.asarray(aus.any(axis=1), bool)
-    strong: Bool = np.asarray(up[terms.rows].any(axis=0), bool)
-    live = np.flatnonzero(up[terms.weaker] & strong[terms.stronger].all(axis=0))
-    if not len(live):
+    def moving(self, asked: Float32) -> Float32:
+        """(u, n) what moves the face of units that are asked for (u, n), also where it is not scored."""
+        if self.taking is None and not self.opposed.size:
+            return asked
+        left = asked.copy()
+        if self.taking is not None:
+            self.taking.lower(left, asked)
+        if self.opposed.size:
+            first, second = self.opposed
+            more = asked[first] - asked[second]
+            left[first] = np.minimum(left[first], np.maximum(more, 0))
+            left[second] = np.minimum(left[second], np.maximum(-more, 0))
         return left
-    value = np.maximum(aus[terms.rows[0]], aus[terms.rows[1]])  # (k, n): of two sides the stronger
-    half = np.minimum(value, np.float32(0.5))
-    degree = terms.start + terms.low * half + terms.high * (value - half)
-    first, second = terms.stronger[:, live]
-    bound = 1 - np.minimum(degree[first], degree[second])
-    weaker = terms.weaker[live]
-    begin = np.flatnonzero(np.diff(weaker, prepend=-1))
-    which = weaker[begin]
-    left[which] = np.minimum(left[which], np.minimum.reduceat(bound, begin, axis=0))
-    return left
+
+    def scored(self, asked: Float32, moving: Float32) -> Float32:
+        """(u, n) what a coder would score of units that are asked for, of which `moving` (u, n) is left."""
+        if self.holding is None:
+            return moving
+        left = moving.copy()
+        self.holding.lower(left, asked)
+        return left
+
+
+def bounds(rules: Rules, live: tuple[int, ...]) -> Bounds:
+    """What the rules say of the units of which these rows, rising, may be other than 0."""
+    return _bounds(_Key(rules), live)
 
 
 class _Key:
@@ -112,8 +168,17 @@ class _Key:
         return isinstance(other, _Key) and other.rules is self.rules
 
 
+# Sessions move the same few sets of units again and again; 5 kB each.
+@lru_cache(maxsize=512)
+def _bounds(key: _Key, live: tuple[int, ...]) -> Bounds:
+    taking, holding, opposed = _compile(key)
+    row = np.full(len(AU_NAMES()), -1)
+    row[list(live)] = np.arange(len(live))
+    return Bounds(taking.among(row), holding.among(row), row[opposed[:, (row[opposed] >= 0).all(axis=0)]])
+
+
 @lru_cache(maxsize=8)
-def _compile(key: _Key) -> Compiled:
+def _compile(key: _Key) -> tuple[Terms, Terms, Index]:
     rules = key.rules
     opposed = [
         (row, _rows(rule.stronger[0].au, side)[0])
@@ -121,7 +186,7 @@ def _compile(key: _Key) -> Compiled:
         if rule.kind == "opposition"
         for row, side in _sides(rule.weaker)
     ]
-    return Compiled(
+    return (
         _terms([rule for rule in rules.rules if rule.kind in ("domination", "exclusion")], rules),
         _terms([rule for rule in rules.rules if rule.kind == "inclusion"], rules),
         np.array(opposed, np.intp).reshape(-1, 2).T,

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from realizer.animation.channel import Channel, Gain, Joint
-from realizer.arrays import Float64
+from realizer.arrays import Float64, Index
 
-__all__ = ["CURVES", "gain_at", "sample", "smooth", "weights"]
+__all__ = ["CURVES", "Samples", "gain_at", "in_order", "sample", "samples", "smooth", "weights"]
+
+Values = TypeVar("Values", Float64, Index)
 
 # From this many keys on, a linear channel (lips: 100 keys a second) is interpolated on its own.
 MANY_KEYS = 32
@@ -23,7 +28,12 @@ def smooth(u: Float64) -> Float64:
 
     Source: Flash & Hogan (1985), in one dimension.
     """
-    return u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    rest = 6.0 * u
+    rest -= 15.0
+    rest *= u
+    rest += 10.0
+    rest *= u * u * u
+    return rest
 
 
 def linear(u: Float64) -> Float64:
@@ -34,10 +44,28 @@ def linear(u: Float64) -> Float64:
 CURVES: Mapping[str, Callable[[Float64], Float64]] = {"linear": linear, "smooth": smooth}
 
 
+class Samples(NamedTuple):
+    """What channels show where they show anything, end to end: frames of one channel, then of another one.
+
+    Attributes:
+        channels: (p,) the channel of each piece; one may have two pieces, of which the later one counts.
+        counts: (p,) how many frames it has.
+        frames: (e,) which frames they are.
+        values: (e,) float64 what is shown there.
+    """
+
+    channels: Index
+    counts: Index
+    frames: Index
+    values: Float64
+
+    def spread(self, of_channel: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """(e,) of each value what (m,) has of its channel."""
+        return of_channel[self.channels].repeat(self.counts)
+
+
 def sample(channels: Sequence[Channel], times: Float64) -> Float64:
     """The value of every channel at every time.
-
-    The cost grows with the frames that lie inside keys, not with channels x frames.
 
     Args:
         channels: m channels.
@@ -50,28 +78,17 @@ def sample(channels: Sequence[Channel], times: Float64) -> Float64:
     Raises:
         KeyError: a curve that is not in `CURVES`.
     """
-    order = None if np.all(times[1:] >= times[:-1]) else np.argsort(times, kind="stable")
-    if order is not None:
-        times = times[order]
+    order = in_order(times)
+    found = samples(channels, times if order is None else times[order])
     values = np.zeros((len(channels), len(times)))
-    by_curve: dict[str, list[int]] = {}
-    for i, channel in enumerate(channels):
-        if channel.curve == "linear" and len(channel.times) >= MANY_KEYS:
-            right = channel.values[-1] if channel.holds else 0.0
-            values[i] = np.interp(times, channel.times, channel.values, left=0.0, right=right)
-        else:
-            by_curve.setdefault(channel.curve, []).append(i)
-    for curve, rows in by_curve.items():
-        _fill(values, rows, [channels[i] for i in rows], times, CURVES[curve])
-    for i, channel in enumerate(channels):
-        if channel.gains:
-            values[i] *= gain_at(channel.gains, times)
-        if channel.joint is not None:
-            values[i] += _healing(channel.joint, times)
-        _window(values[i], channel, times)
-    if order is not None:
-        values[:, order] = values.copy()
+    frames = found.frames if order is None else order[found.frames]
+    values[found.spread(np.arange(len(channels))), frames] = found.values
     return values
+
+
+def in_order(times: Float64) -> Index | None:
+    """(n,) where each of the times (n,) stands once they are sorted; None where they are."""
+    return None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")
 
 
 def weights(channels: Sequence[Channel], times: Float64) -> Float64:
@@ -83,38 +100,117 @@ def weights(channels: Sequence[Channel], times: Float64) -> Float64:
     return np.clip(sample([channel.share for channel in channels], times), 0.0, 1.0)
 
 
-def _fill(
-    values: Float64,
-    rows: Sequence[int],
-    channels: Sequence[Channel],
-    times: Float64,
-    shape: Callable[[Float64], Float64],
-) -> None:
-    """Write channels of one curve into their rows of `values` (m, n), in place; `times` rise.
+def samples(channels: Sequence[Channel], times: Float64) -> Samples:
+    """As `sample`, where the cost grows with the frames that lie inside keys, not with channels x frames.
 
-    All segments of all channels are laid end to end. Segment s runs from key s to key s + 1 and holds the
-    frames first[s] <= frame < last[s]; after a channel's last key a segment without slope follows, with the
+    Args:
+        channels: m channels.
+        times: (n,) seconds, not falling.
+    """
+    by_curve: dict[str, list[int]] = {}
+    changed: list[int] = []
+    found: list[Samples] = []
+    for i, channel in enumerate(channels):
+        if channel.curve == "linear" and len(channel.times) >= MANY_KEYS:
+            found.append(_interpolated(i, channel, times))
+        else:
+            by_curve.setdefault(channel.curve, []).append(i)
+        if channel.gains or channel.joint is not None or channel.until < np.inf:
+            changed.append(i)
+    for curve, rows in by_curve.items():
+        found.append(_between(np.array(rows), [channels[i] for i in rows], times, CURVES[curve]))
+    whole = found[0] if len(found) == 1 else _joined(found)
+    return _changed(whole, channels, changed, times) if changed else whole
+
+
+def _joined(parts: Sequence[Samples]) -> Samples:
+    none = np.zeros(0, np.intp)
+    columns = zip(Samples(none, none, none, np.zeros(0)), *parts, strict=True)
+    return Samples(*(np.concatenate(column) for column in columns))
+
+
+def _interpolated(number: int, channel: Channel, times: Float64) -> Samples:
+    first = times.searchsorted(channel.times[0])
+    last = len(times) if channel.holds else times.searchsorted(channel.times[-1], "right")
+    values = np.interp(times[first:last], channel.times, channel.values)
+    return Samples(np.array([number]), np.array([len(values)]), np.arange(first, last), values)
+
+
+def _between(
+    numbers: Index, channels: Sequence[Channel], times: Float64, shape: Callable[[Float64], Float64]
+) -> Samples:
+    """Channels of one curve.
+
+    All segments of all channels are laid end to end. Segment s runs from key s to key s + 1 and holds
+    `frames[s]` frames from first[s] on; after a channel's last key a segment without slope follows, with the
     one frame that is exactly there, or all the rest where the channel holds.
     """
-    counts = np.array([len(channel.times) for channel in channels])
     keys = np.concatenate([channel.times for channel in channels])
     value = np.concatenate([channel.values for channel in channels])
-    ends = np.cumsum(counts) - 1  # of each channel's last key
-    holds = np.array([channel.holds for channel in channels])
-    first = np.searchsorted(times, keys, side="left")
-    last = np.append(first[1:], 0)
-    last[ends] = np.where(holds, len(times), np.searchsorted(times, keys[ends], side="right"))
-    gap, step = np.diff(keys, append=0.0), np.diff(value, append=0.0)
-    gap[ends], step[ends] = 1.0, 0.0
-    lengths = np.maximum(last - first, 0)
-    gap[gap <= 0.0] = 1.0  # two keys at one time: no frame lies between them
+    sizes = np.array([len(channel.times) for channel in channels])
+    stops = sizes.cumsum()
+    ends = stops - 1
+    first = times.searchsorted(keys)
+    last = times.searchsorted(keys[ends], "right")
+    last[[channel.holds for channel in channels]] = len(times)
+    frames = _steps(first, ends)
+    frames[ends] = last - first[ends]
+    if frames.min() < 0:  # keys that fall, by a rounding where they were worked out: at one time
+        rising = [replace(channel, times=np.maximum.accumulate(channel.times)) for channel in channels]
+        return _between(numbers, rising, times, shape)
+    length = _steps(keys, ends)
+    length[length <= 0.0] = 1.0  # after the last key, and between two at one time, where no frame lies
 
-    total = int(lengths.sum())
-    segment = np.repeat(np.arange(len(keys)), lengths)
-    frame = np.arange(total) - np.repeat(np.cumsum(lengths) - lengths - first, lengths)
-    row = np.repeat(np.asarray(rows), counts)
-    u = (times[frame] - keys[segment]) / gap[segment]
-    values[row[segment], frame] = value[segment] + step[segment] * shape(u)
+    before = frames.cumsum()
+    before -= frames
+    first_of = first[stops - sizes]
+    first -= before
+    frame = first.repeat(frames)
+    frame += np.arange(len(frame))
+    passed = times[frame]
+    passed -= keys.repeat(frames)
+    passed /= length.repeat(frames)
+    way = shape(passed)
+    way *= _steps(value, ends).repeat(frames)
+    way += value.repeat(frames)
+    return Samples(numbers, last - first_of, frame, way)
+
+
+def _steps(values: Values, ends: Index) -> Values:
+    """(k,) from each of the values (k,) to the next one, 0 at `ends`: the last of each channel."""
+    found = np.empty_like(values)
+    np.subtract(values[1:], values[:-1], out=found[:-1])
+    found[ends] = 0
+    return found
+
+
+def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int], times: Float64) -> Samples:
+    """With gains, and what the channels `changed` have to do with those before and after them; in place."""
+    stops = dict(zip(found.channels.tolist(), found.counts.cumsum().tolist(), strict=True))
+    counts = dict(zip(found.channels.tolist(), found.counts.tolist(), strict=True))
+    gains: dict[tuple[Gain, ...], Float64] = {}  # what is cut off together has the same
+    more = [found]
+    for i in changed:
+        channel, joint = channels[i], channels[i].joint
+        part = slice(stops[i] - counts[i], stops[i])
+        frames, values = found.frames[part], found.values[part]
+        if joint is not None:  # it heals beyond its keys too
+            row = np.zeros(len(times))
+            row[frames] = values
+            values[:] = 0.0
+            frames, values = np.arange(len(times)), row
+            more.append(Samples(np.array([i]), np.array([len(times)]), frames, values))
+        if channel.gains:
+            if channel.gains not in gains:
+                gains[channel.gains] = gain_at(channel.gains, times)
+            values *= gains[channel.gains][frames]
+        shown = times[frames]
+        if joint is not None:
+            values += _healing(joint, shown)
+            values[shown < joint.at] = 0.0
+        if channel.until < np.inf:
+            values[shown >= channel.until] = 0.0
+    return found if len(more) == 1 else _joined(more)
 
 
 def _healing(joint: Joint, times: Float64) -> Float64:
@@ -122,14 +218,6 @@ def _healing(joint: Joint, times: Float64) -> Float64:
     passed = times - joint.at
     left = 1.0 - smooth(np.clip(passed / joint.length, 0.0, 1.0))
     return (joint.value + joint.slope * passed) * left
-
-
-def _window(row: Float64, channel: Channel, times: Float64) -> None:
-    """Take away, in place, what another channel shows."""
-    if channel.until < np.inf:
-        row[times >= channel.until] = 0.0
-    if channel.joint is not None:
-        row[times < channel.joint.at] = 0.0
 
 
 def gain_at(gains: Sequence[Gain], times: Float64) -> Float64:

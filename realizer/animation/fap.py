@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
 
 import numpy as np
 
 from realizer import tables
+from realizer.animation.demand import Asking, Demand
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.mapping import FapMapping, standard
-from realizer.animation.targets import axis, presence
-from realizer.arrays import Float32
+from realizer.animation.targets import AU_NAMES, axis, presence
+from realizer.arrays import Float32, Index
 
 __all__ = ["to_fap"]
 
@@ -37,40 +39,94 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     Returns:
         n frames; the mask is the same for all frames of one mapping.
     """
+    count = len(AU_NAMES())
+    live = frames.live
+    given = tuple(column - count for column in live if count <= column < count + 68)
     demand = (mapping or standard()).demand
-    aus = frames.moving
-    positive, negative = demand.extremes(aus)
-    _close_lids(positive, negative, demand.closed)
-    values = positive + negative
-    _combine(values, aus)
-    for upper, lower in LIDS:
-        values[lower] = np.minimum(values[lower], APERTURE - values[upper])
-    own, least, most = _limits()
-    lips = frames.values[:, presence("lips").column]
-    if lips.any():
-        values *= 1.0 - own[:, None] * lips
+    plan = _plan(demand, frames.live_aus, given)
+    aus = frames.moving_rows
+    raised, lowered = plan.asking.of(aus)
+    values = np.zeros((len(plan.faps), len(frames.times)), np.float32)
+    values[: len(raised)] = raised
+    for upper, lids, closed in plan.lids:
+        # What holds an eye open goes as far as its upper lid closes: wide eyes blink shut.
+        lowered[lids] *= 1 - np.minimum(raised[upper] / closed, 1)
+    values[: len(lowered)] -= lowered
+    for unit, other, fap, value in plan.combinations:
+        values[fap] += value * np.minimum(aus[unit], aus[other])
+    for upper, lower in plan.gaps:
+        np.minimum(values[lower], APERTURE - values[upper], out=values[lower])
+    if (lips := presence("lips").column) in live:
+        values *= 1.0 - plan.own * frames.values[:, lips]
     if frames.held is not None:
-        values *= 1.0 - frames.held.T
-    faps = np.clip(values.T + frames.faps, least, most)
+        values *= 1.0 - frames.held.T[plan.faps]
+    if given:
+        values[plan.given] += frames.faps.T[list(given)]
+    np.clip(values, plan.least, plan.most, out=values)
     # What a client sets directly counts too, wherever the mapping does not reach.
-    mask = demand.mask | faps.any(axis=0)
-    return FAPFrames(frames.times, np.ascontiguousarray(faps, np.float32), mask)
+    mask = demand.mask.copy()
+    mask[plan.faps[plan.beyond]] = values[plan.beyond].any(axis=1)
+    whole = np.zeros((68, len(frames.times)), np.float32)
+    whole[plan.faps] = values
+    return FAPFrames(frames.times, np.ascontiguousarray(whole.T), mask)
 
 
-def _close_lids(positive: Float32, negative: Float32, closed: Float32) -> None:
-    """Take away what holds an eye open as far as its upper lid closes, in place: wide eyes blink shut."""
-    for upper, lower in LIDS:
-        if closed[upper] > 0 and negative[[upper, lower]].any():
-            open_ = 1 - np.minimum(positive[upper] / closed[upper], 1)
-            negative[upper] *= open_
-            negative[lower] *= open_
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """What there is to do for some action units and FAPs: rows of arrays, and rows of those.
+
+    Attributes:
+        asking: what the units ask.
+        faps: (f,) the columns (FAP - 1) that change, those of `asking` first.
+        lids: of each eye that may close: the upper lid, what holds lids open, and how far that lid closes.
+        combinations: two units, and the FAP that they move more together, by how much.
+        gaps: upper and lower lid of each eye.
+        given: the FAPs that did not come from action units.
+        beyond: the FAPs that are not in the mask of the mapping.
+        own, least, most: (f, 1) how much of a FAP speech owns, its least and its most value.
+    """
+
+    asking: Asking
+    faps: Index
+    lids: tuple[tuple[int, list[int], np.float32], ...]
+    combinations: tuple[tuple[int, int, int, float], ...]
+    gaps: tuple[tuple[int, int], ...]
+    given: Index
+    beyond: Index
+    own: Float32
+    least: Float32
+    most: Float32
 
 
-def _combine(values: Float32, aus: Float32) -> None:
-    """Add what two units show only together, in place: as much of it as the weaker one is there."""
-    for unit, other, fap, value in _combinations():
-        if aus[unit].any() and aus[other].any():
-            values[fap] += value * np.minimum(aus[unit], aus[other])
+# Sessions move the same few sets of units again and again; 10 kB each.
+@lru_cache(maxsize=512)
+def _plan(demand: Demand, live: tuple[int, ...], given: tuple[int, ...]) -> _Plan:
+    asking = demand.among(live)
+    unit = {column: row for row, column in enumerate(live)}
+    together = [row for row in _combinations() if row[0] in unit and row[1] in unit]
+    moved = {*asking.faps.tolist(), *given, *(fap for *_, fap, _ in together)}
+    eyes = [pair for pair in LIDS if not moved.isdisjoint(pair)]
+    moved |= {lid for pair in eyes for lid in pair}
+    faps = [*asking.faps.tolist(), *sorted(moved - {*asking.faps.tolist()})]
+    row = {fap: k for k, fap in enumerate(faps)}
+    lids = ((pair[0], [row[lid] for lid in pair if row[lid] < len(asking.lowering)]) for pair in eyes)
+    own, least, most = (limit[faps][:, None] for limit in _limits())
+    return _Plan(
+        asking=asking,
+        faps=np.array(faps, np.intp),
+        lids=tuple(
+            (row[upper], some, demand.closed[upper])
+            for upper, some in lids
+            if row[upper] < len(asking.lowering) and demand.closed[upper] > 0
+        ),
+        combinations=tuple((unit[one], unit[other], row[fap], value) for one, other, fap, value in together),
+        gaps=tuple((row[upper], row[lower]) for upper, lower in eyes),
+        given=np.array([row[fap] for fap in given], np.intp),
+        beyond=np.array([row[fap] for fap in faps if not demand.mask[fap]], np.intp),
+        own=own,
+        least=least,
+        most=most,
+    )
 
 
 @cache

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from realizer.animation.cooccurrence import Shown, cooccur
+from realizer.animation.cooccurrence import Bounds, bounds
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Bool, Float32, Float64, Int32
 from realizer.tables.cooccurrence import Rules
@@ -27,12 +28,14 @@ class AUFrames:
         rules: which AUs a face can show together; None: all of them.
         held: (n, 68) float32, 0..1: how far a FAP is what `values` say, so that no AU has a say in it; None:
             AUs have theirs everywhere.
+        columns: the columns that may be other than 0, rising; None: it is looked up where that is of use.
     """
 
     times: Float64
     values: Float32
     rules: Rules | None = None
     held: Float32 | None = None
+    columns: tuple[int, ...] | None = None
 
     @classmethod
     def joined(cls, windows: Sequence[AUFrames]) -> AUFrames:
@@ -43,12 +46,28 @@ class AUFrames:
             held = np.concatenate(
                 [n if w.held is None else w.held for w, n in zip(windows, none, strict=True)]
             )
+        columns = None
+        if all(window.columns is not None for window in windows):
+            columns = tuple(sorted({column for window in windows for column in window.live}))
         return cls(
             np.concatenate([window.times for window in windows]),
             np.concatenate([window.values for window in windows]),
             windows[0].rules,
             held,
+            columns,
         )
+
+    @cached_property
+    def live(self) -> tuple[int, ...]:
+        """The columns that may be other than 0, rising."""
+        if self.columns is not None:
+            return self.columns
+        return tuple(np.flatnonzero(self.values.any(axis=0)).tolist())
+
+    @cached_property
+    def live_aus(self) -> tuple[int, ...]:
+        """Those that are AUs."""
+        return self.live[: bisect_left(self.live, len(AU_NAMES()))]
 
     @property
     def asked(self) -> Float32:
@@ -58,18 +77,31 @@ class AUFrames:
     @property
     def aus(self) -> Float32:
         """(n, n_au) float32, 0..1: the AUs that the face shows; columns named by `AU_NAMES()`."""
-        return self.asked if self._shown is None else np.ascontiguousarray(self._shown.aus.T)
+        if self._bounds is None:
+            return self.asked
+        whole = np.zeros((len(self.times), len(AU_NAMES())), np.float32)
+        whole[:, self.live_aus] = self._bounds.scored(self._asked_rows, self.moving_rows).T
+        return whole
 
     @property
     def moving(self) -> Float32:
         """(n_au, n) float32, 0..1: what moves the face, also where another unit's score covers it."""
-        return (
-            np.ascontiguousarray(self.asked.T) if self._shown is None else self._shown.aus + self._shown.held
-        )
+        whole = np.zeros((len(AU_NAMES()), len(self.times)), np.float32)
+        whole[list(self.live_aus)] = self.moving_rows
+        return whole
 
     @cached_property
-    def _shown(self) -> Shown | None:
-        return None if self.rules is None else cooccur(np.ascontiguousarray(self.asked.T), self.rules)
+    def moving_rows(self) -> Float32:
+        """(u, n) float32: the rows of `moving` that are `live_aus`."""
+        return self._asked_rows if self._bounds is None else self._bounds.moving(self._asked_rows)
+
+    @cached_property
+    def _asked_rows(self) -> Float32:
+        return self.values.T[list(self.live_aus)]
+
+    @cached_property
+    def _bounds(self) -> Bounds | None:
+        return None if self.rules is None else bounds(self.rules, self.live_aus)
 
     @property
     def faps(self) -> Float32:

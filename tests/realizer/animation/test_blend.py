@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from realizer.animation.blend import OVER, blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap import to_fap
-from realizer.animation.idle import Blink, Fewer
+from realizer.animation.idle import Blinks, Fewer, Idle, Motion, idle_face
 from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
 from realizer.arrays import Float64
 
@@ -127,26 +127,66 @@ def test_what_takes_idle_motion_leaves_what_is_asked_for() -> None:
     assert value_of(face, NOD) == pytest.approx(0.4 * 0.25 + 0.2)
 
 
-def blink(draw: float) -> Blink:
-    times, values = np.array([1.0, 1.1, 1.2, 1.3]), np.array([0.0, 1.0, 1.0, 0.0])
-    return Blink(au(45)[0], times, values, layer=Layer.IDLE, draw=draw)
+def lid_of(taking: Channel, draw: float, time: float) -> float:
+    """How far a lid is shut, where a blink with this draw would come from 1 to 1.3 s."""
+    still = Motion((NOD.column,), ONE[None], np.zeros((1, 1)), np.zeros(1, int), ONE, np.zeros((1, 1)))
+    idle = Idle(Blinks(np.array([1.0]), np.array([draw])), still)
+    return float(blend([taking], np.array([time]), idle=idle).values[0, au(45)[0].column])
 
 
 @pytest.mark.parametrize(("taken", "comes"), [(0.0, True), (0.25, True), (0.5, False), (1.0, False)])
 def test_a_blink_comes_whole_or_not_at_all(taken: float, comes: bool) -> None:
-    face = [blink(0.6), still(presence("blinks"), taken, Layer.BASE)]
-    assert value_of(face, au(45)[0], 1.15) == comes
+    assert lid_of(still(presence("blinks"), taken, Layer.BASE), 0.6, 1.1) == comes
 
 
 def test_a_blink_that_has_begun_ends_as_it_was_whatever_window_is_looked_at() -> None:
-    lid = au(45)[0]
     soon = Channel(
         presence("blinks"), np.array([1.05, 1.1]), np.array([0.0, 1.0]), layer=Layer.BASE, holds=True
     )
-    assert value_of([blink(0.0), soon], lid, 1.15) == 1
+    assert lid_of(soon, 0.0, 1.1) == 1
     # What took it when it began has gone before this window, and counts.
     gone = Fewer(presence("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, holds=True).faded(1.02, 1.1)
-    assert value_of([blink(0.0), gone], lid, 1.15) == 0
+    assert lid_of(gone, 0.0, 1.11) == 0
+
+
+def test_idle_motion_is_taken_as_far_as_a_document_asks() -> None:
+    idle, moves = (
+        idle_face(0.0, 5.0, 3),
+        [column for column, _ in enumerate(axis()) if column < len(AU_NAMES())],
+    )
+    moves = [column for column in moves if column not in {lid.column for lid in au(45)}]
+    alone, less, still_ = (
+        blend([still(presence("motion"), taken, Layer.BASE)], TIMES, idle=idle).values[:, moves]
+        for taken in (0.0, 0.75, 1.0)
+    )
+    assert alone.max() > 0.005
+    np.testing.assert_allclose(less, alone / 4, atol=1e-6)
+    assert not still_.any()
+
+
+def test_what_a_document_asks_is_laid_on_idle_motion() -> None:
+    idle = idle_face(0.0, 5.0, 3)
+    alone, both = (blend(some, TIMES, idle=idle).values for some in ([], [still(NOD, 0.25, Layer.HEAD)]))
+    np.testing.assert_allclose(both[:, NOD.column], alone[:, NOD.column] + 0.25, atol=1e-6)
+    np.testing.assert_array_equal(np.delete(both, NOD.column, 1), np.delete(alone, NOD.column, 1))
+
+
+@given(many, st.randoms(use_true_random=False))
+def test_the_order_of_times_does_not_matter(given: list[Channel], random: st.DataObject) -> None:
+    order = list(range(len(TIMES)))
+    random.shuffle(order)  # type: ignore[attr-defined]
+    idle = idle_face(0.0, 5.0, 1)
+    whole, other = blend(given, TIMES, idle=idle), blend(given, TIMES[order], idle=idle)
+    np.testing.assert_array_equal(whole.values[order], other.values)
+    np.testing.assert_array_equal(to_fap(whole).values[order], to_fap(other).values)
+    np.testing.assert_array_equal(other.times, TIMES[order])
+
+
+@given(many)
+def test_all_other_columns_than_those_that_may_move_are_0(given: list[Channel]) -> None:
+    frames = blend(given, TIMES)
+    assert frames.columns is not None
+    assert not np.delete(frames.values, frames.columns, axis=1).any()
 
 
 def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:

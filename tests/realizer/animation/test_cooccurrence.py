@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realizer.animation.cooccurrence import cooccur
+from realizer.animation.cooccurrence import bounds, cooccur
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Float32
 from realizer.tables.cooccurrence import Rule, rules
@@ -109,3 +109,12 @@ def test_a_hair_more_or_less_never_makes_a_jump(aus: Float32, step: Float32) -> 
 def test_what_is_asked_of_the_mirrored_face_is_shown_mirrored(aus: Float32) -> None:
     twin = [NAMES.index(name.translate(str.maketrans("LR", "RL"))) for name in NAMES]
     assert np.array_equal(cooccur(aus[twin], rules()).aus, cooccur(aus, rules()).aus[twin])
+
+
+@given(INTENSITIES)
+def test_it_makes_no_difference_which_units_that_are_not_up_are_looked_at(aus: Float32) -> None:
+    known = bounds(rules(), tuple(range(len(NAMES))))
+    moving = known.moving(aus)
+    result = cooccur(aus, rules())
+    np.testing.assert_array_equal(moving, result.aus + result.held)
+    np.testing.assert_array_equal(known.scored(aus, moving), result.aus)

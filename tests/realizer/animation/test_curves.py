@@ -128,3 +128,25 @@ def test_a_channel_that_goes_on_in_anothers_place_joins_it_in_value_and_slope(
     assert sample(pair, healed).sum(axis=0) == pytest.approx(sample([new], healed)[0])
     before = np.linspace(0, at, 7)[:-1]
     assert sample(pair, before).sum(axis=0) == pytest.approx(sample([old], before)[0])
+
+
+def test_keys_that_fall_by_a_rounding_stand_at_one_time() -> None:
+    keys, values = np.array([0.0, 1.0, 1.0 - 1e-9, 2.0]), np.array([0.0, 0.2, 0.8, 0.0])
+    falling = Channel(TARGET, keys, values, curve="linear")
+    assert sample([falling], np.array([0.5, 1.0 - 5e-10, 1.0, 1.5]))[0] == pytest.approx([0.1, 0.2, 0.8, 0.4])
+
+
+def test_each_of_many_channels_is_as_it_is_alone() -> None:
+    times = np.linspace(0.0, 3.0, 40)
+    keys = np.linspace(0.5, 2.0, MANY_KEYS)
+    many = [
+        Channel(TARGET, np.array([0.1, 0.9, 1.4]), np.array([0.0, 1.0, 0.0])),
+        Channel(TARGET, keys, keys / 2, curve="linear", holds=True),
+        Channel(TARGET, np.array([0.3]), np.array([0.6]), holds=True).faded(1.0, 2.0),
+        Channel(TARGET, np.array([0.0, 2.0]), np.array([0.0, 0.7]), joint=Joint(0.7, 0.2, 0.1, 0.4)),
+        Channel(TARGET, np.array([0.0, 2.0]), np.array([0.3, 0.7]), curve="linear", until=1.2),
+        Channel(TARGET, np.array([5.0, 6.0]), np.array([0.3, 0.7])),
+    ]
+    for channel, row in zip(many, sample(many, times), strict=True):
+        np.testing.assert_array_equal(row, sample([channel], times)[0])
+    assert not sample(many, times)[-1].any()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap import to_fap
-from realizer.animation.idle import idle_channels
+from realizer.animation.idle import idle_face
 from realizer.animation.prosody import Asked, Talk, phrase_ends, prosody_channels
 from realizer.animation.targets import AU_NAMES, au, fap
 from realizer.arrays import Float64
@@ -229,8 +229,7 @@ def test_who_is_interrupted_keeps_still_soon_and_without_a_jump(seed: int, now: 
 
 
 def blinks(seed: int, until: float, talks: Sequence[Talk]) -> Float64:
-    channels = idle_channels(0.0, until, seed, phrase_ends(talks))
-    return np.sort([float(c.times[0]) for c in channels if c.target.column == LID])
+    return np.sort(idle_face(0.0, until, seed, phrase_ends(talks)).blinks.onsets)
 
 
 @given(SEEDS, st.lists(st.floats(0.2, 4.0), max_size=5))

@@ -1,0 +1,49 @@
+"""Frames know which of their columns may move."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.animation.fap import to_fap
+from realizer.animation.frames import AUFrames
+from realizer.animation.targets import AU_NAMES, au, axis, fap
+from realizer.arrays import Float32
+from realizer.tables.cooccurrence import rules
+
+SMILE, BROW = au(12, "LEFT")[0].column, au(1, "LEFT")[0].column
+
+
+def rows(*columns: int) -> Float32:
+    values = np.zeros((3, len(axis())), np.float32)
+    values[:, columns] = np.array([[0.25], [0.5], [0.75]])
+    return values
+
+
+def test_columns_that_are_not_named_are_looked_up() -> None:
+    assert AUFrames(np.arange(3.0), rows(SMILE, fap(3).column)).live == (SMILE, fap(3).column)
+    assert AUFrames(np.arange(3.0), rows()).live == ()
+
+
+def test_it_makes_no_difference_whether_more_columns_are_named_than_move() -> None:
+    named = AUFrames(np.arange(3.0), rows(SMILE), rules(), columns=tuple(range(len(axis()))))
+    found = AUFrames(np.arange(3.0), rows(SMILE), rules())
+    np.testing.assert_array_equal(named.aus, found.aus)
+    np.testing.assert_array_equal(named.moving, found.moving)
+    np.testing.assert_array_equal(to_fap(named).values, to_fap(found).values)
+    np.testing.assert_array_equal(to_fap(named).mask, to_fap(found).mask)
+
+
+def test_joined_windows_may_move_what_any_of_them_may() -> None:
+    smile, brow, unknown = (
+        AUFrames(np.arange(3.0), rows(column), columns=columns)
+        for column, columns in ((SMILE, (SMILE,)), (BROW, (BROW,)), (BROW, None))
+    )
+    assert AUFrames.joined([smile, brow]).columns == (BROW, SMILE)
+    assert AUFrames.joined([smile, unknown]).columns is None
+    assert AUFrames.joined([smile, unknown]).live == (BROW, SMILE)
+
+
+def test_what_moves_has_a_row_for_each_action_unit() -> None:
+    frames = AUFrames(np.arange(3.0), rows(SMILE), rules())
+    assert frames.moving.shape == (len(AU_NAMES()), 3)
+    np.testing.assert_array_equal(frames.moving.T, frames.asked)
