@@ -251,20 +251,20 @@ def _mean(keys: Any, picture: Any) -> None:
 
 
 def _lay(picture: Any, behind: Any, out: Any) -> None:
-    """Premultiplied pixels over opaque ones, a channel at a time."""
+    """Premultiplied pixels over opaque ones."""
     height, width = picture.shape
-    byte = np.uint32(255)
     for y in range(height):
         for x in range(width):
-            pixel = picture[y, x]
-            rest = byte - (pixel >> np.uint32(24))
-            red, green, blue = (
-                pixel & byte,
-                (pixel >> np.uint32(8)) & byte,
-                (pixel >> np.uint32(16)) & byte,
-            )
-            if rest > 0:
-                red += (behind[y, x, 0] * rest + 127) // 255
-                green += (behind[y, x, 1] * rest + 127) // 255
-                blue += (behind[y, x, 2] * rest + 127) // 255
-            out[y, x, 0], out[y, x, 1], out[y, x, 2] = min(red, 255), min(green, 255), min(blue, 255)
+            # Signed and all of one kind: what mixes them with unsigned numbers is worked out as floats.
+            pixel = np.int64(picture[y, x])
+            rest = 255 - (pixel >> 24)
+            if rest == 255:
+                for channel in range(3):
+                    out[y, x, channel] = behind[y, x, channel]
+            elif rest == 0:
+                for channel in range(3):
+                    out[y, x, channel] = np.uint8(pixel >> 8 * channel)
+            else:
+                for channel in range(3):
+                    shows = (np.int64(behind[y, x, channel]) * rest + 127) // 255
+                    out[y, x, channel] = min((pixel >> 8 * channel & 255) + shows, 255)

@@ -63,7 +63,11 @@ class Wrinkles:
         self._drives = sorted({d for strip in drawn for d in strip.drives}, key=lambda d: (d.a, d.b, d.full))
         place = {drive: k for k, drive in enumerate(self._drives)}
         self._corners: Int32 = _joined([s.corners for s in drawn], (0, 3)).astype(np.int32)
-        self._weights: Float32 = _joined([s.weights for s in drawn], (0, 3)).astype(np.float32)[..., None]
+        self._weights: Float32 = _joined([s.weights for s in drawn], (0, 3)).astype(np.float32)
+        self._by_corner = [
+            (np.ascontiguousarray(corner), weight[:, None])
+            for corner, weight in zip(self._corners.T, self._weights.T, strict=True)
+        ]
         self._lift = np.float32(LIFT * size)
         # Points x drives: how much a drive darkens a point.
         self._tone: Float32 = np.zeros((len(self._corners), len(self._drives)), np.float32)
@@ -82,7 +86,7 @@ class Wrinkles:
         `points` are three vertices and the weights of the first two, `drives` two vertices, their distance at
         rest and the changes at which a furrow begins and is deepest, `tones` [drive, tone] pairs a point.
         """
-        corners = np.hstack([self._corners, np.round(self._weights[:, :2, 0], 4)])
+        corners = np.hstack([self._corners, np.round(self._weights[:, :2], 4)])
         return {
             "lift": float(self._lift),
             "shade": SHADE.tolist(),
@@ -103,14 +107,13 @@ class Wrinkles:
         amounts = np.array([drive(vertices) for drive in self._drives], np.float32)
         if not self.count or not amounts.any():
             return np.zeros((self.count, 3), np.float32), np.zeros((self.count, 3), np.float32)
-        points = (vertices[self._corners] * self._weights).sum(axis=1)
-        points += self._lift * (normals[self._corners] * self._weights).sum(axis=1)
-        tone = self._tone @ amounts
-        skin = (colours[self._corners] * self._weights).sum(axis=1)
-        shaded = skin * (
-            1 - np.where(tone > 0, tone, 0)[:, None] * SHADE + np.where(tone < 0, -tone, 0)[:, None]
-        )
-        return points, np.minimum(shaded, 1)
+        # A row a vertex with all that is wanted of it, and a corner at a time: three rows a point, added up.
+        skin = np.hstack([vertices + self._lift * normals, colours])
+        parts = [skin.take(corner, axis=0) * weight for corner, weight in self._by_corner]
+        points: Float32 = parts[0] + parts[1] + parts[2]
+        tone = (self._tone @ amounts)[:, None]
+        shade = np.where(tone > 0, 1 - tone * SHADE, 1 - tone)
+        return points[:, :3], np.minimum(points[:, 3:] * shade, 1)
 
 
 @dataclass(frozen=True, eq=False)
