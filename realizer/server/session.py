@@ -20,28 +20,22 @@ from realizer.server.connection import STUCK, Connection
 from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.feedback_log import FeedbackLog
+from realizer.server.greeting import greeting
 from realizer.server.inbox import name_of
 from realizer.server.intake import Intake
 from realizer.server.journal import JournalError, Lost
 from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.notes import Notes
-from realizer.server.limits import MAX_CHARACTERS, too_long
+from realizer.server.limits import too_long
 from realizer.server.messages import (
-    MAX_CONTROL,
-    MAX_FPS,
-    PICTURES,
-    STREAMS,
-    Capabilities,
     ErrorMessage,
     Gap,
     Hello,
-    Limits,
     Ping,
     StateQuery,
     Subscribe,
     Unsubscribe,
-    Welcome,
     parse_control,
 )
 from realizer.server.streams import EPSILON
@@ -414,35 +408,7 @@ class Session:
 
     def welcome(self, connection: int, now: float) -> None:
         """Tell a client where it is and what there is."""
-        s = self.settings
-        limits = Limits(
-            message=s.max_message,
-            document=s.max_document,
-            control=MAX_CONTROL,
-            behaviours=s.max_behaviours,
-            elements=s.max_elements,
-            duration=s.max_duration,
-            speech=s.max_speech,
-            blocks=s.max_blocks,
-            characters=MAX_CHARACTERS,
-            connections=s.max_connections,
-            rate=s.max_rate,
-            picture=s.max_size,
-            pixels=s.max_pixels,
-            fps=MAX_FPS,
-            keep=s.keep,
-        )
-        streams = {stream: list(encodings) for stream, encodings in STREAMS.items()}
-        reply = Welcome(
-            session=self.id,
-            time=now - self.opened,
-            seq=self.log.newest,
-            capabilities=Capabilities(
-                streams=streams, pictures=list(PICTURES), fps=s.fps, **self.capabilities
-            ),
-            limits=limits,
-        )
-        self.reply(connection, reply)
+        self.reply(connection, greeting(self, now - self.opened))
 
     def move(self, connection: int, session: str, seen: int | None) -> None:
         """A client asks for another session."""

@@ -216,10 +216,3 @@ def test_times_are_told_to_the_microsecond(drive) -> None:
     assert pong["time"] == state["time"] == welcome["time"] == 0.333333
     (block,) = state["blocks"]
     assert (block["start"], block["end"]) == (0.333333, 0.45679)
-
-
-def test_a_client_is_told_every_limit_it_can_meet(drive) -> None:
-    limits = {"max_elements": 7, "max_duration": 8, "max_speech": 9, "max_rate": 10, "max_pixels": 1000}
-    (welcome,) = drive(**limits).send({"type": "hello"}).of("welcome")
-    told = {f"max_{name}": value for name, value in welcome["limits"].items()}
-    assert limits.items() <= told.items()

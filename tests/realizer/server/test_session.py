@@ -618,13 +618,6 @@ def test_a_named_session_is_kept_for_a_while() -> None:
 # control ----------------------------------------------------------------------------------------
 
 
-def test_hello_is_answered_with_what_there_is(driver) -> None:
-    (welcome,) = driver.send({"type": "hello"}).of("welcome")
-    assert welcome["session"] == "test"
-    assert "mesh" in welcome["capabilities"]["streams"]
-    assert welcome["limits"]["document"] == 2**20
-
-
 def test_another_version_is_refused(driver) -> None:
     (error,) = driver.send({"type": "hello", "version": 7}).of("error")
     assert (error["where"], "got 7" in error["message"]) == ("hello.version", True)
