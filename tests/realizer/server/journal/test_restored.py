@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import sqlite3
 import subprocess
 import sys
 import time
@@ -12,10 +14,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from redis import Redis
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
+from realizer.server.journal.notes import ENTRIES
 from realizer.server.serve import Server
 from realizer.settings import Settings
 from tests.told import feedback, numbers
@@ -93,6 +97,55 @@ def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(w
         undisturbed = asyncio.run(whole(url))
     # Which is told first of two that have nothing to do with each other depends on when messages came.
     assert sorted(points(first + rest)) == sorted(points(undisturbed))
+
+
+def in_a_checkpoint(where: str, session: str) -> bool:
+    """Whether the journal has one of a session, which stays whose it is."""
+    if where.startswith("redis://"):
+        with Redis.from_url(where) as store:
+            return bool(store.hexists(f"realizer:{{{session}}}:parts", "state"))
+    with contextlib.closing(sqlite3.connect(where)) as file:
+        return file.execute("SELECT 1 FROM parts WHERE session = ?", (session,)).fetchone() is not None
+
+
+def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outlived_its_blocks(
+    where: str,
+) -> None:
+    hold = json.dumps({"type": "set", "aus": {"12L": 0.5}})
+    tied = '<bml id="c"><head id="n" lexeme="NOD" start="a:n:end+120"/></bml>'
+
+    async def before(url: str, service: subprocess.Popen[str]) -> list[str]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=long", max_queue=None) as client:
+            for message in (SCENE, hold, FIRST):
+                await client.send(message)
+            told = await feedback(client, "a:end")
+            for _ in range(ENTRIES):
+                await client.send(SCENE)
+            while not in_a_checkpoint(where, "long"):  # the face comes to rest
+                await client.send('{"type": "ping"}')
+                await client.recv()
+            await client.send(tied)
+            await client.send(NEXT.replace("APPEND", "MERGE"))
+            told += await feedback(client, "b:start")
+            service.kill()
+            return told + await feedback(client, "never")
+
+    async def after(url: str, seen: int) -> tuple[list[str], list[str], dict[str, float]]:
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=long&seen={seen}") as client:
+            rest = await feedback(client, "b:end")
+            await client.send('{"type": "state"}')
+            state = json.loads(await client.recv())
+        async with asyncio.timeout(LIMIT), connect(f"{url}?session=long&seen=0") as client:
+            return rest, await feedback(client, "b:end"), state["characters"][0]["aus"]
+
+    with serving(where) as (url, service):
+        first = asyncio.run(before(url, service))
+    with serving(where) as (url, _):
+        rest, again, held = asyncio.run(after(url, numbers(first)[-1]))
+    assert numbers(first + rest) == list(range(1, len(first + rest) + 1))
+    assert again == first + rest
+    assert held["12L"] == 0.5
+    assert not any("warningFeedback" in text for text in again)  # the points of what has gone are known
 
 
 def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_and_in_order(
@@ -191,12 +244,11 @@ def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_mor
                 await client.send(block)
                 told = await feedback(client, "b:n:end")
             step[0] = -3600.0  # what has passed since is not known
-            async with Server(settings) as server:
-                async with connect(f"{server.url}?session=s&seen=1") as first:
-                    seen = numbers(told)[-1]
-                    async with connect(f"{server.url}?session=s&seen={seen}") as second:
-                        rest = await feedback(second, "b:end")
-                    others = await feedback(first, "b:end")
+            async with Server(settings) as server, connect(f"{server.url}?session=s&seen=1") as first:
+                seen = numbers(told)[-1]
+                async with connect(f"{server.url}?session=s&seen={seen}") as second:
+                    rest = await feedback(second, "b:end")
+                others = await feedback(first, "b:end")
         assert numbers(told + rest) == list(range(1, len(told + rest) + 1))
         assert others == told[1:] + rest
 

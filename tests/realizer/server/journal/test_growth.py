@@ -1,0 +1,173 @@
+"""A session that lives long grows neither its journal nor the time in which another process takes it over."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from realizer.server.effects import Send, Speak
+from realizer.server.journal import Journal, JournalError, Kept, journal_at
+from realizer.server.journal.checkpoint import MOST_TOLD, restore
+from realizer.server.journal.notes import ENTRIES, Notes
+from realizer.server.journal.replay import restored
+from realizer.server.session import Session
+from realizer.server.wire import ClipPiece, pack_clip
+from realizer.settings import Settings
+from tests.interleavings import Memory, spoken
+from tests.told import numbers
+
+SETTINGS = Settings(voice="silent")
+DOCUMENTS = 2_000
+APART = 6.0  # s; the face is still between two of them
+TALK = '<bml id="b"><speech id="s"><text>Yes</text></speech></bml>'
+WAIT = '<bml id="b"><wait id="w" duration="0.5"/></bml>'
+
+
+def opened(journal: Journal | None) -> Session:
+    session = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
+    session.notes = Notes("long", journal)
+    session.notes.begin(0.0)
+    session.connect(1, 0.0)
+    return session
+
+
+def play(session: Session, message: str | bytes, begin: float, until: float) -> None:
+    """A message comes, and what follows from it is done as a shell does it."""
+    session.receive(1, message, begin)
+    now = begin
+    while True:
+        for effect in session.outgoing():
+            if isinstance(effect, Speak):
+                session.spoken(effect.id, spoken(effect), now)
+                break
+        else:
+            due = session.next_deadline()
+            if due is None or due > until:
+                return
+            now = max(now, due)
+            session.tick(now)
+
+
+def talked(session: Session, documents: int) -> float:
+    """Let a session play so many; when it has."""
+    for k in range(documents):
+        play(session, TALK if k % 100 == 0 else WAIT, APART * k, APART * (k + 1))
+    return APART * documents
+
+
+def test_after_thousands_of_documents_there_are_no_more_entries_than_after_hundreds(where: str) -> None:
+    journal = journal_at(where)
+    session = opened(journal)
+    most = size = 0
+    for k in range(DOCUMENTS):
+        play(session, TALK if k % 100 == 0 else WAIT, APART * k, APART * (k + 1))
+        if k % 50 == 49:
+            kept = journal.take("long")
+            assert kept is not None
+            most = max(most, len(kept.entries))
+            size = max(size, sum(map(len, kept.parts.values())))
+    assert most < ENTRIES + 20
+    assert size < 2**20
+    assert session.log.newest > 4 * DOCUMENTS
+    kept = journal.take("long")
+    assert kept is not None
+    again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
+    at, owed = restored(again, kept, spoken)
+    assert not owed
+    assert at <= APART * DOCUMENTS
+    for one in (session, again):
+        play(one, WAIT, APART * DOCUMENTS, APART * (DOCUMENTS + 1))
+    assert again.log.since(again.log.newest - 5) == session.log.since(session.log.newest - 5)
+    assert again.log.newest == session.log.newest
+    journal.end("long")
+
+
+def test_the_file_of_a_journal_does_not_grow_with_what_was_done(tmp_path: Path) -> None:
+    path = tmp_path / "journal.db"
+    session = opened(journal_at(str(path)))
+    pages = []
+    for k in range(600):
+        play(session, WAIT, APART * k, APART * (k + 1))
+        if k % 200 == 199:
+            with sqlite3.connect(path) as file:
+                pages.append(file.execute("PRAGMA page_count").fetchone()[0])
+            file.close()
+    assert pages[2] == pages[1]
+
+
+def test_a_client_that_missed_more_than_a_checkpoint_has_is_told_of_a_gap() -> None:
+    journal = Memory()
+    session = opened(journal)
+    end = talked(session, 400)
+    kept = journal.take("long")
+    assert kept is not None
+    assert len(json.loads(kept.parts["state"])["told"]) <= MOST_TOLD
+    again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
+    restored(again, kept, spoken)
+    again.connect(9, end, seen=1)
+    gap, *rest = [str(effect.data) for effect in again.outgoing() if isinstance(effect, Send)]
+    told = json.loads(gap)
+    assert (told["type"], told["seen"]) == ("gap", 1)
+    assert told["first"] > 2
+    assert numbers(rest) == list(range(told["first"], again.log.newest + 1))
+
+
+def test_a_clip_is_written_once_and_goes_with_its_session() -> None:
+    journal = Memory()
+    session = opened(journal)
+    sounds = []
+    for k in range(4):
+        session.receive(1, pack_clip(ClipPiece(f"c{k % 2}", 0, 8000, bytes([k, 1]) * 800)), APART * k)
+        talked_until = APART * k
+        for _ in range(ENTRIES):
+            session.receive(1, '{"type": "scene", "objects": null}', talked_until)
+        session.rest(talked_until + 1)
+        kept = journal.take("long")
+        assert kept is not None
+        assert journal.compacted == k + 1
+        sounds.append({name: text for name, text in kept.parts.items() if name != "state"})
+    assert [sorted(parts) for parts in sounds] == [["clip:c0"], *3 * [["clip:c0", "clip:c1"]]]
+    assert sounds[0]["clip:c0"] == sounds[1]["clip:c0"] != sounds[2]["clip:c0"]
+    assert sounds[2]["clip:c1"] is sounds[1]["clip:c1"]  # it was not written again
+
+
+def test_while_a_block_waits_or_a_speech_is_open_nothing_is_left_out() -> None:
+    preplanned = '<bml id="p" xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true"/>'
+    for holds, ends in (
+        (preplanned, '{"type": "stop"}'),
+        (
+            '{"type": "speech", "id": "turn", "append": "Well. "}',
+            '{"type": "speech", "id": "turn", "close": true}',
+        ),
+    ):
+        journal = Memory()
+        session = opened(journal)
+        play(session, holds, 0.0, 100.0)
+        for _ in range(ENTRIES):
+            play(session, '{"type": "scene", "objects": null}', 100.0, 100.0)
+        session.rest(200.0)
+        assert not journal.compacted
+        play(session, ends, 200.0, 300.0)
+        session.rest(300.0)
+        assert journal.compacted == 1
+
+
+@pytest.mark.parametrize(
+    ("state", "why"),
+    [
+        ("{", "Expecting property name"),
+        ("[]", "TypeError"),
+        ("{}", "KeyError: 'version'"),
+        ('{"version": 2}', "wanted one of version 1, got 2"),
+        ('{"version": 1}', "KeyError"),
+    ],
+)
+def test_a_checkpoint_that_cannot_be_read_is_no_session(state: str, why: str) -> None:
+    session = Session("s", SETTINGS, 0.0, named=True)
+    with pytest.raises(JournalError, match=f"the checkpoint of session s.*{why}"):
+        restore(session, {"state": state})
+    with pytest.raises(JournalError, match="the checkpoint of session s"):
+        restored(session, Kept(0.0, [], {"clip:c": "{}"}), spoken)
