@@ -53,11 +53,11 @@ class Lane:
         members = self.members
         return members[0][1].next if len(members) == 1 else min(s.next for _, s in members)
 
-    def send(self, now: float, effects: list[Effect]) -> None:
-        """All that is due, to everybody who has not got it."""
-        timeline = self.timeline
-        newest, oldest = last_at(now, timeline.fps), first_at(now - LATE, timeline.fps)
-        window = timeline.window(max(self.next, oldest), newest)
+    def send(self, newest: int, now: float, effects: list[Effect]) -> None:
+        """All up to `newest`, to everybody who has not got it."""
+        timeline, first = self.timeline, self.next
+        oldest = first if first == newest else first_at(now - LATE, timeline.fps)
+        window = timeline.window(max(first, oldest), newest)
         for connection, s in self.members:
             if s.next < oldest:
                 connection.dropped += oldest - s.next
@@ -167,8 +167,9 @@ class Broadcast:
     def frames_due(self, now: float, effects: list[Effect]) -> None:
         """Every frame of fap, au, arkit and mesh whose time has come."""
         for lane in self._lanes:
-            if lane.next <= last_at(now, lane.timeline.fps):
-                lane.send(now, effects)
+            newest = last_at(now, lane.timeline.fps)
+            if lane.next <= newest:
+                lane.send(newest, now, effects)
 
     @property
     def next_frame(self) -> float:

@@ -136,10 +136,8 @@ class Window:
 
     def message(self, wanted: Wanted, frame: int) -> str | bytes:
         """One of its frames as a WebSocket message."""
-        if wanted.stream != "mesh":
-            strip = self._strip(wanted)
-            if wanted.encoding == "binary":
-                return strip[frame - self.first]
+        if wanted.encoding == "binary" and wanted.stream != "mesh":
+            return self._strip(wanted)[frame - self.first]
         key = (wanted.stream, wanted.encoding, wanted.asked, wanted.name)
         number, message = self._latest.get(key, (None, b""))
         if number != frame:
