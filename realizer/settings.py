@@ -6,7 +6,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,6 +17,8 @@ __all__ = ["Settings", "SettingsError", "raises"]
 
 T = TypeVar("T")
 PREFIX = "REALIZER_"
+# Read elsewhere: where faces lie and are made, what draws.
+OTHERS = frozenset({"REALIZER_DRAW", "REALIZER_FACES", "REALIZER_HEAD_DATA", "REALIZER_NO_PAGE"})
 SECRET = 32  # characters; HS256 is as strong as that (RFC 7518, 3.2)
 
 
@@ -30,9 +32,10 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
     def read(value: Any) -> Any:
         try:
             number = kind(value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ValueError(wanted) from None
-        if isinstance(value, bool) or not math.isfinite(number) or not low <= number <= high:
+        cut = kind is int and isinstance(value, float) and number != value
+        if isinstance(value, bool) or cut or not math.isfinite(number) or not low <= number <= high:
             raise ValueError(wanted)
         return number
 
@@ -165,6 +168,13 @@ def _word_of(*words: str) -> Callable[[Any], str]:
     return read
 
 
+def _meant(name: str, known: Iterable[str]) -> str | None:
+    """The setting that somebody has written wrong; None where it is none of ours."""
+    from difflib import get_close_matches
+
+    return next(iter(get_close_matches(name, known, n=1, cutoff=0.8)), None)
+
+
 def _optional(read: Callable[[Any], T]) -> Callable[[Any], T | None]:
     return lambda value: None if value is None or value == "" else read(value)
 
@@ -272,12 +282,14 @@ class Settings:
         1_800.0, _number(float, 1, 1e9), "seconds that one block is planned to last, from its start"
     )
     max_blocks: int = _setting(
-        1_000, _number(int, 1, 10**6), "blocks playing or waiting in one session, and messages with more"
+        1_000,
+        _number(int, 1, 10**6),
+        "blocks playing or waiting in one session, and messages that wait with more",
     )
     max_connections: int = _setting(
         2_000, _number(int, 1, 10**6), "connections open from one address, at each door"
     )
-    max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service")
+    max_sessions: int = _setting(5_000, _number(int, 1, 10**6), "sessions of the service, in each worker")
     max_address_sessions: int = _setting(
         2_000, _number(int, 1, 10**6), "sessions that one address has opened and that still live"
     )
@@ -345,8 +357,13 @@ class Settings:
             except (OSError, tomllib.TOMLDecodeError) as error:
                 raise SettingsError(f"{file}: {error}") from None
         for name, value in environment.items():
-            if name.startswith(PREFIX) and name.removeprefix(PREFIX).lower() in known:
-                values[name.removeprefix(PREFIX).lower()] = value
+            if name.startswith(PREFIX) and name not in OTHERS:
+                setting = name.removeprefix(PREFIX).lower()
+                if setting in known:
+                    values[setting] = value
+                elif meant := _meant(setting, known):
+                    # What was to be closed by it would stand open.
+                    raise SettingsError(f"variable {name}: wanted {PREFIX}{meant.upper()}?")
         values |= {name: value for name, value in (flags or {}).items() if value is not None}
         if unknown := sorted(values.keys() - known):
             raise SettingsError(f"setting {unknown[0]}: wanted one of {', '.join(sorted(known))}")

@@ -28,6 +28,36 @@ def test_a_wrong_value_says_which_and_what_came() -> None:
         Settings.read(environment={"REALIZER_PORT": "70000"})
 
 
+def test_a_part_of_a_whole_number_is_not_cut_off(tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    for value in ("1.5", "inf", "true"):
+        file.write_text(f"max_blocks = {value}\n")
+        with pytest.raises(SettingsError, match=r"max_blocks: wanted a whole number 1\.\.1e\+06"):
+            Settings.read(file=file, environment={})
+    file.write_text("max_blocks = 7.0\n")
+    assert Settings.read(file=file, environment={}).max_blocks == 7
+
+
+@pytest.mark.parametrize(
+    ("variable", "meant"),
+    [("TOKN", "TOKEN"), ("MAX_MEMROY", "MAX_MEMORY"), ("JWTKEY", "JWT_KEY"), ("ORIGIN", "ORIGINS")],
+)
+def test_a_variable_that_was_written_wrong_leaves_no_door_open(variable: str, meant: str) -> None:
+    with pytest.raises(SettingsError, match=rf"variable REALIZER_{variable}: wanted REALIZER_{meant}\?"):
+        Settings.read(environment={f"REALIZER_{variable}": "x"})
+
+
+def test_a_variable_that_is_no_setting_is_somebody_elses() -> None:
+    others = (
+        "REALIZER_FACES",
+        "REALIZER_DRAW",
+        "REALIZER_HEAD_DATA",
+        "REALIZER_NO_PAGE",
+        "REALIZER_BUILD_HOST",
+    )
+    assert Settings.read(environment=dict.fromkeys(others, "x")) == Settings()
+
+
 def test_an_unknown_name_in_the_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "realizer.toml"
     file.write_text("prot = 1\n")
@@ -67,6 +97,10 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
         ("max_memory", "1"),
         ("max_rate", "0"),
         ("max_blocks", "-1"),
+        ("max_blocks", "1.5"),
+        ("max_elements", "many"),
+        ("max_duration", "inf"),
+        ("max_address_sessions", "0"),
     ],
 )
 def test_what_cannot_be_is_refused_with_what_was_wanted(name: str, value: str) -> None:
