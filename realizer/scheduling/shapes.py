@@ -5,6 +5,7 @@ What hangs together without a contradiction keeps its preferred gaps; only the r
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
 from realizer.scheduling.ties import Ties
 
-__all__ = ["Shapes", "settle", "shapes_of", "warm_up"]
+__all__ = ["Shapes", "hang", "settle", "shapes_of", "warm_up"]
 
 # Lengths that meet as closely as this count as fitting exactly.
 FITS = 1e-9  # s
@@ -41,7 +42,11 @@ class Shapes:
 def shapes_of(model: Model) -> Shapes:
     """The shapes of all behaviours, each at its least squares, inequalities aside."""
     size = len(model.first)
-    ties, strained, held_at = _hang(model)
+    tied = model.tied
+    # The first point of a behaviour is so long after the root of the class of one of its points.
+    ahead = (model.shift[tied] - model.chain[tied]).tolist()
+    knots = zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True)
+    ties, strained, held_at = hang(size, knots)
     label, base = np.arange(size + 1), np.zeros(size + 1)
     touched = _each(model.owner[model.tied], size)
     label[touched] = [ties.find(b) for b in touched.tolist()]
@@ -69,21 +74,25 @@ def shapes_of(model: Model) -> Shapes:
     return shapes
 
 
-def _hang(model: Model) -> tuple[Ties, list[int], list[tuple[int, float]]]:
+def hang(
+    size: int, knots: Iterable[tuple[int, int, float]]
+) -> tuple[Ties, list[int], list[tuple[int, float]]]:
     """Hang behaviours on each other at their preferred lengths.
+
+    Args:
+        size: how many there are.
+        knots: of each tied point its behaviour, the root of its class, and how long after that the first
+            point of the behaviour is.
 
     Returns:
         ties between behaviours (of their first points), the behaviours that do not fit, and for each point at
         a fixed time (behaviour, seconds of its first point).
     """
-    ties = Ties(len(model.first))
+    ties = Ties(size)
     strained: list[int] = []
     held: list[tuple[int, float]] = []
-    tied = model.tied
-    ahead = (model.shift[tied] - model.chain[tied]).tolist()
     hook: dict[int, tuple[int, float]] = {}
-    for b, root, start in zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True):
-        # The first point of b is `start` after the class's root.
+    for b, root, start in knots:
         if root == ORIGIN:
             held.append((b, start))
             continue

@@ -13,6 +13,7 @@ import numpy as np
 
 from realizer.arrays import Float64
 from realizer.scheduling.clash import Clash, Link, Web
+from realizer.scheduling.direct import direct
 from realizer.scheduling.groups import Group, groups_of, slides
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.paths import components, raise_levels
@@ -22,6 +23,9 @@ from realizer.scheduling.shortest import shortest
 from realizer.scheduling.squeeze import squeeze
 
 __all__ = ["Solution", "solve"]
+
+# Points up to which plain floats are quicker than arrays.
+FEW = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,8 @@ def solve(problem: Problem) -> Solution | list[Clash]:
 
     The clashes that are returned have to be resolved; there may be more behind them.
     """
+    if len(problem.owner) <= FEW and (found := direct(problem)) is not None:
+        return Solution(np.array(found[0]), found[1])
     model = model_of(problem)
     if isinstance(model, list):
         return model

@@ -5,13 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from realizer.arrays import Float64
 
 __all__ = ["Clause", "Schedule", "Timing", "Warning"]
+
+
+class Lists(NamedTuple):
+    """The numbers of a Timing of k points as plain floats.
+
+    Attributes:
+        chain: (k,) seconds after the first point when every gap has its preferred length.
+        slack: (k,) the same for 1 / stiffness: how much a unit of force lengthens what lies between.
+        least, most: (k-1,) of each gap.
+        fits: at their preferred lengths all gaps are as long as they must be, as those of what is rigid are.
+    """
+
+    chain: tuple[float, ...]
+    slack: tuple[float, ...]
+    least: tuple[float, ...]
+    most: tuple[float, ...] | None
+    rigid: bool
+    fits: bool
 
 
 @dataclass(frozen=True)
@@ -50,6 +68,22 @@ class Timing:
             object.__setattr__(self, name, value)
         if self.most is not None and not (self.most >= self.least).all():
             raise ValueError(f"most: wanted at least {self.least.tolist()}, got {self.most.tolist()}")
+
+    @cached_property
+    def lists(self) -> Lists:
+        """The same in plain floats."""
+        slack = np.ones(len(self.points) - 1) if self.rigid else 1.0 / self.stiffness
+        fits = bool((self.preferred >= np.maximum(self.least, 0.0)).all())
+        if self.most is not None:
+            fits = fits and bool((self.preferred <= self.most).all())
+        return Lists(
+            (0.0, *np.cumsum(self.preferred).tolist()),
+            (0.0, *np.cumsum(slack).tolist()),
+            tuple(self.least.tolist()),
+            None if self.most is None else tuple(self.most.tolist()),
+            self.rigid,
+            self.rigid or fits,
+        )
 
 
 @dataclass(frozen=True)
