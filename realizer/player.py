@@ -284,11 +284,10 @@ class Player:
         return blend(channels, times, self.rules, idle)
 
     def _moving(self, first: float, last: float, character: int) -> tuple[list[Channel], Idle | None]:
-        """All that moves a face between two times."""
+        """All that moves a face between two times, and perhaps some more."""
         blocks = self._blocks.cast.of(character)
-        asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
-        asked += [Asked(c.span[0], c) for c in self._characters[character].channels()]
-        channels = [c for _, c in asked if c.span[0] <= last and c.span[1] >= first]
+        own = self._characters[character].channels()
+        channels = [c for p in blocks for c in p.moving()] + own
         if not self.idle:
             return channels, None
         seed = self.world.seed + 7919 * character
@@ -299,7 +298,10 @@ class Player:
             for at, part in s.utterance.parts or [(0.0, s.utterance)]
         ]
         near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
-        channels += prosody_channels(near, first, last, seed, asked)
+        if near:
+            asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
+            asked += [Asked(c.span[0], c) for c in own]
+            channels += prosody_channels(near, first, last, seed, asked)
         return channels, idle_face(first, last, seed, phrase_ends(talks))
 
     @property

@@ -21,6 +21,8 @@ __all__ = ["blend"]
 
 # What replaces what lies below, the upper one last.
 OVER = (Layer.FAPS, Layer.DIRECT)
+# What is worked out apart from the others, where it adds up.
+APART = (Layer.BASE, Layer.GAZE)
 
 
 def blend(
@@ -84,8 +86,9 @@ def blend(
 def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
     if not len(times):
         return []
-    first, last = times[0], times[-1]
-    return [channel for channel in channels if channel.span[0] <= last and channel.span[1] >= first]
+    first, last = float(times[0]), float(times[-1])
+    spans = ((channel, channel.span) for channel in channels)
+    return [channel for channel, (begin, end) in spans if begin <= last and end >= first]
 
 
 def _layers(
@@ -96,21 +99,28 @@ def _layers(
     Expressions are all that neither is one of the others nor replaces what lies below.
     """
     own = [channel for channel in channels if channel.layer not in OVER]
-    has = [Layer.EXPRESSION, *sorted({channel.layer for channel in own} & {Layer.BASE, Layer.GAZE})]
-    whole = np.zeros((len(has), len(place), len(times)))
-    rows, adds = np.empty(len(own), np.intp), np.empty(len(own), bool)
-    for k, channel in enumerate(own):
+    layers = {Layer.EXPRESSION: 0}
+    rows, adds, sums = [], [], _sums()
+    for channel in own:
         column, layer = channel.target.column, channel.layer
-        apart = layer is Layer.BASE or (layer is Layer.GAZE and _sums()[column])
-        rows[k] = (has.index(layer) if apart else 0) * len(place) + place[column]
-        adds[k] = apart or _sums()[column]
-    found = samples(own, times)
-    values = _kept(found, own, channels, times)
-    at, adding = found.spread(rows * len(times)) + found.frames, found.spread(adds)
-    np.add.at(whole.reshape(-1), at[adding], values[adding])
-    np.maximum.at(whole.reshape(-1), at[~adding], values[~adding])
-    layers = dict(zip(has, whole, strict=True))
-    return layers[Layer.EXPRESSION], layers.get(Layer.BASE), layers.get(Layer.GAZE)
+        adds.append(layer is Layer.BASE or sums[column])
+        apart = layer if adds[-1] and layer in APART else Layer.EXPRESSION
+        rows.append(layers.setdefault(apart, len(layers)) * len(place) + place[column])
+    whole = np.zeros((len(layers), len(place), len(times)))
+    if own:
+        found = samples(own, times)
+        values = _kept(found, own, channels, times)
+        at = found.spread(np.array(rows) * len(times))
+        at += found.frames
+        adding = found.spread(np.array(adds))
+        some, others = np.flatnonzero(adding), np.flatnonzero(~adding)
+        np.add.at(whole.reshape(-1), at[some], values[some])
+        np.maximum.at(whole.reshape(-1), at[others], values[others])
+    one, base, gaze = (
+        whole[layers[layer]] if layer in layers else None for layer in (Layer.EXPRESSION, *APART)
+    )
+    assert one is not None
+    return one, base, gaze
 
 
 def _by_column(rows: Float64, columns: list[int], count: int, order: Index | None) -> Float32:
@@ -129,12 +139,14 @@ def _by_column(rows: Float64, columns: list[int], count: int, order: Index | Non
 def _share(gaze: Float64, base: Float64 | None, place: dict[int, int]) -> None:
     """Give each gaze its part of a region that several take, and take it from the base states, in place."""
     for name, aus in _regions().items():
-        if (taken := place.get(axis()[name].column)) is not None:
-            share = gaze[taken].copy()
-            part = [place[column] for column in (*aus, axis()[name].column) if column in place]
+        if (taken := place.get(axis()[name].column)) is None:
+            continue
+        share = gaze[taken].copy()
+        part = [place[column] for column in (*aus, axis()[name].column) if column in place]
+        if share.max() > 1.0:
             gaze[part] /= np.maximum(share, 1.0)
-            if base is not None:
-                base[part] *= 1.0 - np.minimum(share, 1.0)
+        if base is not None:
+            base[part] *= 1.0 - np.minimum(share, 1.0)
 
 
 def _add_idle(

@@ -132,13 +132,13 @@ class Bounds:
         if self.taking is None and not self.opposed.size:
             return asked
         left = asked.copy()
-        if self.taking is not None:
-            self.taking.lower(left, asked)
         if self.opposed.size:
             first, second = self.opposed
             more = asked[first] - asked[second]
-            left[first] = np.minimum(left[first], np.maximum(more, 0))
-            left[second] = np.minimum(left[second], np.maximum(-more, 0))
+            left[first] = np.maximum(more, 0)
+            left[second] = np.maximum(-more, 0)
+        if self.taking is not None:
+            self.taking.lower(left, asked)
         return left
 
     def scored(self, asked: Float32, moving: Float32) -> Float32:

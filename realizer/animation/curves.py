@@ -152,7 +152,8 @@ def _between(
     ends = stops - 1
     first = times.searchsorted(keys)
     last = times.searchsorted(keys[ends], "right")
-    last[[channel.holds for channel in channels]] = len(times)
+    if any(holds := [channel.holds for channel in channels]):
+        last[holds] = len(times)
     frames = _steps(first, ends)
     frames[ends] = last - first[ends]
     if frames.min() < 0:  # keys that fall, by a rounding where they were worked out: at one time

@@ -168,6 +168,14 @@ class Asking:
     raising: Index
     lowering: Index
 
+    def raises(self, fap: int) -> bool:
+        """Whether anything raises a FAP (column), and it does not turn."""
+        return 3 * fap + RAISES in self.strongest.groups
+
+    def lowers(self, fap: int) -> bool:
+        """Whether anything lowers a FAP (column), and it does not turn."""
+        return 3 * fap + LOWERS in self.strongest.groups
+
     def of(self, aus: Float32) -> tuple[Float32, Float32]:
         """What AUs (u, n) ask of `faps`.
 

@@ -50,7 +50,9 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     values[: len(raised)] = raised
     for upper, lids, closed in plan.lids:
         # What holds an eye open goes as far as its upper lid closes: wide eyes blink shut.
-        lowered[lids] *= 1 - np.minimum(raised[upper] / closed, 1)
+        left = 1 - np.minimum(raised[upper] / closed, 1)
+        for lid in lids:
+            lowered[lid] *= left
     values[: len(lowered)] -= lowered
     for unit, other, fap, value in plan.combinations:
         values[fap] += value * np.minimum(aus[unit], aus[other])
@@ -62,10 +64,12 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
         values *= 1.0 - frames.held.T[plan.faps]
     if given:
         values[plan.given] += frames.faps.T[list(given)]
-    np.clip(values, plan.least, plan.most, out=values)
+    np.maximum(values, plan.least, out=values)
+    np.minimum(values, plan.most, out=values)
     # What a client sets directly counts too, wherever the mapping does not reach.
     mask = demand.mask.copy()
-    mask[plan.faps[plan.beyond]] = values[plan.beyond].any(axis=1)
+    if len(plan.beyond):
+        mask[plan.faps[plan.beyond]] = values[plan.beyond].any(axis=1)
     whole = np.zeros((68, len(frames.times)), np.float32)
     whole[plan.faps] = values
     return FAPFrames(frames.times, np.ascontiguousarray(whole.T), mask)
@@ -109,15 +113,14 @@ def _plan(demand: Demand, live: tuple[int, ...], given: tuple[int, ...]) -> _Pla
     moved |= {lid for pair in eyes for lid in pair}
     faps = [*asking.faps.tolist(), *sorted(moved - {*asking.faps.tolist()})]
     row = {fap: k for k, fap in enumerate(faps)}
-    lids = ((pair[0], [row[lid] for lid in pair if row[lid] < len(asking.lowering)]) for pair in eyes)
     own, least, most = (limit[faps][:, None] for limit in _limits())
     return _Plan(
         asking=asking,
         faps=np.array(faps, np.intp),
         lids=tuple(
-            (row[upper], some, demand.closed[upper])
-            for upper, some in lids
-            if row[upper] < len(asking.lowering) and demand.closed[upper] > 0
+            (row[pair[0]], lids, demand.closed[pair[0]])
+            for pair in eyes
+            if asking.raises(pair[0]) and (lids := [row[lid] for lid in pair if asking.lowers(lid)])
         ),
         combinations=tuple((unit[one], unit[other], row[fap], value) for one, other, fap, value in together),
         gaps=tuple((row[upper], row[lower]) for upper, lower in eyes),

@@ -28,8 +28,9 @@ __all__ = ["Blinks", "Fewer", "Idle", "Motion", "PhraseEnd", "idle_face"]
 # s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
 BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
 # s: a lid closes faster than it opens; 0.05 s shut is at least one frame at 25 fps. 0.3 s in all.
-BLINK_TIMES = (0.0, 0.08, 0.13, 0.3)
-BLINK_VALUES = (0.0, 1.0, 1.0, 0.0)
+BLINK_TIMES = np.array([0.0, 0.08, 0.13, 0.3])
+BLINK_VALUES = np.array([0.0, 1.0, 1.0, 0.0])
+BLINK = float(BLINK_TIMES[-1])
 
 # Small head motion, ours: a new pose every 1.9 s, up to so many degrees each way. AUs: (negative, positive).
 SWAY_PERIOD = 1.9  # s
@@ -52,7 +53,7 @@ class Fewer(Channel):
     @cached_property
     def span(self) -> tuple[float, float]:
         first, last = super().span
-        return first, last + BLINK_TIMES[-1]
+        return first, last + BLINK
 
 
 class PhraseEnd(NamedTuple):
@@ -82,8 +83,8 @@ class Blinks:
     def at(self, times: Float64) -> Float64:
         """(n,) 0..1: how far the lids are shut at times (n,), not falling."""
         shut = np.zeros(len(times))
-        for onset in self.onsets.tolist():
-            first, last = times.searchsorted((onset, onset + BLINK_TIMES[-1]))
+        firsts, lasts = times.searchsorted(self.onsets), times.searchsorted(self.onsets + BLINK)
+        for onset, first, last in zip(self.onsets.tolist(), firsts.tolist(), lasts.tolist(), strict=True):
             seen = shut[first:last]
             np.maximum(seen, np.interp(times[first:last] - onset, BLINK_TIMES, BLINK_VALUES), out=seen)
         return smooth(shut)
@@ -225,13 +226,13 @@ def _blinks(start: float, end: float, seed: int, ends: Sequence[PhraseEnd]) -> B
     count = 64
     while (drawn := _drawn(seed, count))[0, -1] <= end + moved:
         count *= 2
-    first, last = drawn[0].searchsorted((start - BLINK_TIMES[-1] - moved, end + moved), "right")
+    first, last = drawn[0].searchsorted((start - BLINK - moved, end + moved), "right")
     onsets, draws, late = drawn[:, first:last]
     if ends:
         onsets = np.array(
             [_placed(at, part, ends) for at, part in zip(onsets.tolist(), late.tolist(), strict=True)]
         )
-        seen = (onsets + BLINK_TIMES[-1] >= start) & (onsets <= end)
+        seen = (onsets + BLINK >= start) & (onsets <= end)
         onsets, draws = onsets[seen], draws[seen]
     return Blinks(onsets, draws)
 
