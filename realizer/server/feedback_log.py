@@ -60,5 +60,6 @@ class FeedbackLog:
 
     def since(self, seq: int) -> list[str]:
         """The kept messages from `seq` on, in order."""
-        skipped = max(0, seq - self.first)
-        return [text for _, text in islice(self._kept, skipped, None)]
+        # From the end, where that nearly always is.
+        newest = islice(reversed(self._kept), max(0, self.newest - seq + 1))
+        return [text for _, text in newest][::-1]
