@@ -6,7 +6,7 @@ import asyncio
 import itertools
 from collections.abc import Callable, Hashable
 from heapq import heapify, heappop, heappush
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 __all__: list[str] = []
 
@@ -16,7 +16,20 @@ T = TypeVar("T", bound=Hashable)
 STEP = 0.001  # s
 # How long things are woken one after the other before the loop looks for messages again.
 TURN = 0.004  # s
+NEVER = float("inf")
 _Entry = tuple[float, int, T]
+
+
+class Timers(Protocol):
+    """What is wanted of an event loop."""
+
+    def time(self) -> float:
+        """Seconds."""
+        ...
+
+    def call_at(self, when: float, callback: Callable[[], None]) -> asyncio.TimerHandle:
+        """Call it then."""
+        ...
 
 
 class Alarms(Generic[T]):
@@ -27,28 +40,28 @@ class Alarms(Generic[T]):
         wake: (thing, the time it was set to); what it raises ends nothing but that call.
     """
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, wake: Callable[[T, float], None]) -> None:
+    def __init__(self, loop: Timers, wake: Callable[[T, float], None]) -> None:
         self._loop = loop
         self._wake = wake
         self._numbers = itertools.count()
         self._set: dict[T, _Entry[T]] = {}
         self._heap: list[_Entry[T]] = []  # and such as have been set anew since
         self._timer: asyncio.Handle | None = None
-        self._rings = float("inf")  # when the timer is due
+        self._rings = NEVER  # when the timer is due
         self._ringing = False
         self._closed = False
 
-    def set(self, thing: T, when: float | None) -> None:
-        """Wake it at `when` instead of whatever was set before; None: not at all.
+    def set(self, thing: T, when: float) -> None:
+        """Wake it at `when` instead of whatever was set before; infinite: not at all.
 
         One that is due already is left alone: who is set anew in quick succession is not put off for ever.
         """
         known = self._set.get(thing)
         if known is not None:
-            if when is not None and (known[0] == when or known[0] <= min(when, self._loop.time())):
+            if when < NEVER and (known[0] == when or known[0] <= min(when, self._loop.time())):
                 return
             del self._set[thing]
-        if when is None or self._closed:
+        if when == NEVER or self._closed:
             return
         entry = self._set[thing] = (when, next(self._numbers), thing)
         heappush(self._heap, entry)
@@ -74,7 +87,7 @@ class Alarms(Generic[T]):
 
     def _ring(self) -> None:
         """Wake all that are due, as long as it is our turn."""
-        self._timer, self._rings, self._ringing = None, float("inf"), True
+        self._timer, self._rings, self._ringing = None, NEVER, True
         now = self._loop.time()
         over = now + TURN
         try:

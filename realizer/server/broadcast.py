@@ -41,21 +41,17 @@ class Lane:
 
     Attributes:
         members: who, with what of them.
+        next: the first frame that somebody has not got.
     """
 
-    def __init__(self, timeline: Timeline) -> None:
+    def __init__(self, timeline: Timeline, members: list[tuple[Connection, FrameSubscription]]) -> None:
         self.timeline = timeline
-        self.members: list[tuple[Connection, FrameSubscription]] = []
+        self.members = members
+        self.next = min(s.next for _, s in members)
 
-    @property
-    def next(self) -> int:
-        """The first frame that somebody has not got."""
-        members = self.members
-        return members[0][1].next if len(members) == 1 else min(s.next for _, s in members)
-
-    def send(self, newest: int, now: float, effects: list[Effect]) -> None:
+    def send(self, newest: int, now: float, sends: list[Send]) -> None:
         """All up to `newest`, to everybody who has not got it."""
-        timeline, first = self.timeline, self.next
+        timeline, first, self.next = self.timeline, self.next, newest + 1
         oldest = first if first == newest else first_at(now - LATE, timeline.fps)
         window = timeline.window(max(first, oldest), newest)
         for connection, s in self.members:
@@ -66,7 +62,7 @@ class Lane:
                 connection.dropped += max(0, newest + 1 - s.next)
             else:
                 for number in range(s.next, newest + 1):
-                    effects.append(Send(connection.id, window.message(s, number)))
+                    sends.append(Send(connection.id, window.message(s, number)))
             s.next = max(s.next, newest + 1)
         window.settle()
 
@@ -142,34 +138,39 @@ class Broadcast:
 
     def gets(self, connections: Iterable[Connection]) -> None:
         """Who gets what from now on."""
-        lanes: dict[Timeline, Lane] = {}
+        lanes: dict[Timeline, list[tuple[Connection, FrameSubscription]]] = {}
         self._plan_takers, self._sound_takers, self._picture_takers = [], [], []
         for connection in connections:
             for s in connection.subscriptions.values():
                 if isinstance(s, FrameSubscription):
-                    lanes.setdefault(s.timeline, Lane(s.timeline)).members.append((connection, s))
+                    lanes.setdefault(s.timeline, []).append((connection, s))
                 elif isinstance(s, SoundSubscription):
                     self._sound_takers.append((connection, s))
                 elif isinstance(s, PlanSubscription):
                     self._plan_takers.append((connection, s))
                 else:
                     self._picture_takers.append(s)
-        self._lanes = list(lanes.values())
+        self._lanes = [Lane(timeline, members) for timeline, members in lanes.items()]
 
     def due(self, now: float, effects: list[Effect]) -> None:
         """Every frame, packet and drawing whose time has come, to those of the last `gets`."""
         self._send_plans(self._plan_takers, now, effects)
         for connection, sound in self._sound_takers:
             self._send_packets(connection, sound, now, effects)
-        self.frames_due(now, effects)
+        effects += self.frames_due(now)[0]
         self._draw(self._picture_takers, now, effects)
 
-    def frames_due(self, now: float, effects: list[Effect]) -> None:
-        """Every frame of fap, au, arkit and mesh whose time has come."""
+    def frames_due(self, now: float) -> tuple[list[Send], float]:
+        """Every frame of fap, au, arkit and mesh whose time has come, and when the next one's comes."""
+        sends: list[Send] = []
+        soonest = math.inf
         for lane in self._lanes:
-            newest = last_at(now, lane.timeline.fps)
+            fps = lane.timeline.fps
+            newest = last_at(now, fps)
             if lane.next <= newest:
-                lane.send(newest, now, effects)
+                lane.send(newest, now, sends)
+            soonest = min(soonest, lane.next / fps)
+        return sends, soonest
 
     @property
     def next_frame(self) -> float:

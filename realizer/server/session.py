@@ -294,14 +294,13 @@ class Session:
         if not self.closed and self._work(t, reads):
             self._tell(t, "tick")
 
-    def frames(self, now: float) -> list[Effect] | None:
-        """What `tick` would have done where nothing is due but frames; None where it must be asked."""
+    def frames(self, now: float) -> tuple[list[Send], float] | None:
+        """These and the `next_due` after them where nothing else is due; None where `tick` is wanted."""
         t = now - self.opened
         if self._calm is None or t + EPSILON >= self._calm:
             return None
-        effects: list[Effect] = []
-        self.broadcast.frames_due(t, effects)
-        return effects
+        sends, following = self.broadcast.frames_due(t)
+        return sends, min(self._calm, following) + self.opened
 
     def rest(self, now: float) -> None:
         """Keep the journal short, where it has grown; what is due is told first."""
@@ -340,24 +339,23 @@ class Session:
 
     def next_deadline(self) -> float | None:
         """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
-        return float("-inf") if self.reads else self.next_due()
+        due = float("-inf") if self.reads else self.next_due()
+        return None if due == float("inf") else due
 
-    def next_due(self) -> float | None:
-        """When something is due that is no document; None where nothing is."""
+    def next_due(self) -> float:
+        """When something is due that is no document, on the caller's clock; infinite where nothing is."""
         if self.closed:
-            return None
+            return float("inf")
         other = self._calm
         if other is None:
             asked = self.intake.orders.deadline()
-            self.broadcast.gets(self._connections.values())
             due = [self.player.next_change(), self.broadcast.next_other]
             other = min(due if asked is None else [*due, asked])
             # Speeches that last and clients that are slow are looked at with every frame.
             slow = any(connection.slow for connection in self._connections.values())
             if not (self.reads or slow or self.intake.speeches.lasting):
                 self._calm = other
-        first = min(other, self.broadcast.next_frame)
-        return None if first == float("inf") else first + self.opened
+        return min(other, self.broadcast.next_frame) + self.opened
 
     @property
     def busy(self) -> bool:

@@ -285,19 +285,20 @@ class Shell:
         now = self._loop.time()
         self.metrics.late.observe(now - when)
         try:
-            frames = session.frames(now)
+            found = session.frames(now)
         except Exception:
             self._fail(session)
             return
-        if frames is None:
+        if found is None:
             self._work(session, now, reads=False)
             return
-        for effect in frames:
-            self._do(session, effect)
-        for number in session.connections:
-            if (waiting := self._clients[number].waiting) > SLOW:
+        frames, due = found
+        for number, data in frames:
+            client = self._clients[number]
+            client.send(data)
+            if (waiting := client.waiting) > SLOW:
                 session.backlog(number, waiting)
-        self._alarms.set(session, session.next_due())
+        self._alarms.set(session, due)
 
     def _read(self) -> None:
         """Read or plan one document of one session; whatever is due in others comes before the next."""
