@@ -6,6 +6,7 @@ import asyncio
 import heapq
 import itertools
 from collections.abc import Callable
+
 from hypothesis import given
 from hypothesis import strategies as st
 
