@@ -107,18 +107,20 @@ def samples(channels: Sequence[Channel], times: Float64) -> Samples:
         channels: m channels.
         times: (n,) seconds, not falling.
     """
-    by_curve: dict[str, list[int]] = {}
+    by_curve: dict[str | None, list[int]] = {}  # those of many keys by themselves
     changed: list[int] = []
-    found: list[Samples] = []
     for i, channel in enumerate(channels):
-        if channel.curve == "linear" and len(channel.times) >= MANY_KEYS:
-            found.append(_interpolated(i, channel, times))
-        else:
-            by_curve.setdefault(channel.curve, []).append(i)
+        many = channel.curve == "linear" and len(channel.times) >= MANY_KEYS
+        by_curve.setdefault(None if many else channel.curve, []).append(i)
         if channel.gains or channel.joint is not None or channel.until < np.inf:
             changed.append(i)
+    found: list[Samples] = []
     for curve, rows in by_curve.items():
-        found.append(_between(np.array(rows), [channels[i] for i in rows], times, CURVES[curve]))
+        some = [channels[i] for i in rows]
+        if curve is None:
+            found.append(_interpolated(np.array(rows), some, times))
+        else:
+            found.append(_between(np.array(rows), some, times, CURVES[curve]))
     whole = found[0] if len(found) == 1 else _joined(found)
     return _changed(whole, channels, changed, times) if changed else whole
 
@@ -129,11 +131,25 @@ def _joined(parts: Sequence[Samples]) -> Samples:
     return Samples(*(np.concatenate(column) for column in columns))
 
 
-def _interpolated(number: int, channel: Channel, times: Float64) -> Samples:
-    first = times.searchsorted(channel.times[0])
-    last = len(times) if channel.holds else times.searchsorted(channel.times[-1], "right")
-    values = np.interp(times[first:last], channel.times, channel.values)
-    return Samples(np.array([number]), np.array([len(values)]), np.arange(first, last), values)
+def _interpolated(numbers: Index, channels: Sequence[Channel], times: Float64) -> Samples:
+    """Linear channels of many keys: how many there are in all does not matter."""
+    first = times.searchsorted([channel.times[0] for channel in channels])
+    last = times.searchsorted([channel.times[-1] for channel in channels], "right")
+    last[[channel.holds for channel in channels]] = len(times)
+    spans = zip(first.tolist(), last.tolist(), channels, strict=True)
+    values = [np.interp(times[a:b], channel.times, channel.values) for a, b, channel in spans]
+    counts = last - first
+    return Samples(numbers, counts, _ranges(first, counts), np.concatenate(values))
+
+
+def _ranges(first: Index, counts: Index) -> Index:
+    """From each of `first` (k,) on so many whole numbers as `counts` (k,) says, end to end."""
+    start = counts.cumsum()
+    start -= counts
+    np.subtract(first, start, out=start)
+    found = start.repeat(counts)
+    found += np.arange(len(found))
+    return found
 
 
 def _between(
@@ -162,19 +178,14 @@ def _between(
     length = _steps(keys, ends)
     length[length <= 0.0] = 1.0  # after the last key, and between two at one time, where no frame lies
 
-    before = frames.cumsum()
-    before -= frames
-    first_of = first[stops - sizes]
-    first -= before
-    frame = first.repeat(frames)
-    frame += np.arange(len(frame))
+    frame = _ranges(first, frames)
     passed = times[frame]
     passed -= keys.repeat(frames)
     passed /= length.repeat(frames)
     way = shape(passed)
     way *= _steps(value, ends).repeat(frames)
     way += value.repeat(frames)
-    return Samples(numbers, last - first_of, frame, way)
+    return Samples(numbers, last - first[stops - sizes], frame, way)
 
 
 def _steps(values: Values, ends: Index) -> Values:
