@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -99,7 +97,8 @@ class Worker:
         try:
             realization = self._realize(task)
             files = {
-                f"{task.name}{suffix}": self._encoded(realization, suffix) for suffix in self.options.formats
+                f"{task.name}{suffix}": OUTPUTS[suffix].encode(realization, self._drawing(suffix))
+                for suffix in self.options.formats
             }
         except Exception as error:
             words = str(error) if isinstance(error, RealizerError) else f"{type(error).__name__}: {error}"
@@ -153,12 +152,6 @@ class Worker:
             prosody=o.prosody,
             mapping=o.mapping,
         )
-
-    def _encoded(self, realization: Realization, suffix: str) -> bytes:
-        with tempfile.TemporaryDirectory(prefix="realizer-") as folder:
-            path = Path(folder) / f"output{suffix}"
-            OUTPUTS[suffix].write(realization, path, self._drawing(suffix))
-            return path.read_bytes()
 
     def _drawing(self, suffix: str) -> Drawing:
         """How that output is drawn, by a process that stays."""

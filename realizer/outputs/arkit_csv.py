@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realizer.outputs.arkit import ARKIT_NAMES, ArkitFrames, arkit
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["COLUMNS", "OUTPUTS", "encode_arkit_csv", "write_arkit_csv"]
+__all__ = ["COLUMNS", "OUTPUTS", "encode_arkit_csv"]
 
 _EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
 # In the order of the app's files.
@@ -53,9 +51,8 @@ def encode_arkit_csv(frames: ArkitFrames, fps: float) -> str:
     return buffer.getvalue()
 
 
-def write_arkit_csv(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """The first character's frames."""
-    write_text(path, encode_arkit_csv(arkit(realization.aus, realization.mapping), realization.fps))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_arkit_csv(arkit(realization.aus, realization.mapping), realization.fps).encode()
 
 
 def _timecode(seconds: float, fps: float) -> str:
@@ -67,6 +64,6 @@ def _timecode(seconds: float, fps: float) -> str:
 OUTPUTS = (
     Output(
         ".arkit.csv", "text/csv", "a row a frame: ARKit's 52 weights as Live Link Face writes them",
-        write_arkit_csv,
+        _encode,
     ),
 )  # fmt: skip

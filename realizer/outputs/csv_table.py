@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from realizer.animation.targets import AU_NAMES
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 from realizer.tables import faps
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_csv", "write_csv"]
+__all__ = ["OUTPUTS", "encode_csv"]
 
 
 def encode_csv(realization: Realization) -> str:
@@ -29,8 +27,8 @@ def encode_csv(realization: Realization) -> str:
     return buffer.getvalue()
 
 
-def write_csv(realization: Realization, path: Path, drawing: Drawing) -> None:
-    write_text(path, encode_csv(realization))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_csv(realization).encode()
 
 
-OUTPUTS = (Output(".csv", "text/csv", "a row a frame: time, action units, FAPs", write_csv),)
+OUTPUTS = (Output(".csv", "text/csv", "a row a frame: time, action units, FAPs", _encode),)

@@ -6,7 +6,6 @@ import math
 import re
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,13 +13,12 @@ import numpy as np
 from realizer.animation.fap_clip import FAPClip
 from realizer.animation.viseme_weights import fap_1
 from realizer.arrays import Int32
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode", "write_fap"]
+__all__ = ["OUTPUTS", "encode"]
 
 SMALL = 4096  # what FAPs of the face do not reach; turns do
 
@@ -64,8 +62,8 @@ def _small() -> Any:
     return np.array([str(number) for number in range(-SMALL, SMALL + 1)], object)
 
 
-def write_fap(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """The first character's frames. The name in the header is the first block's id, never the path's.
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    """The first character's frames. The name in the header is the first block's id.
 
     Where visemes are asked for, FAP 1 says what is spoken beside the FAPs that show it.
     """
@@ -75,7 +73,7 @@ def write_fap(realization: Realization, path: Path, drawing: Drawing) -> None:
         mask = clip.mask.copy()
         mask[0] = True
         clip = replace(clip, mask=mask, visemes=fap_1(realization.visemes()))
-    write_text(path, encode(clip))
+    return encode(clip).encode()
 
 
 def _word(name: str) -> str:
@@ -83,4 +81,4 @@ def _word(name: str) -> str:
     return re.sub(r"\s+", "_", name.strip()) or "realizer"
 
 
-OUTPUTS = (Output(".fap", "text/x-fap", "MPEG-4 FAP text 2.1, integers in FAPU", write_fap),)
+OUTPUTS = (Output(".fap", "text/x-fap", "MPEG-4 FAP text 2.1, integers in FAPU", _encode),)

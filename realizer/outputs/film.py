@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -209,9 +210,17 @@ def _av() -> Any:
     return av
 
 
-NEEDS = ("render", "film")
+def _output(suffix: str, media_type: str, says: str) -> Output:
+    def encode(realization: Realization, drawing: Drawing) -> bytes:
+        with TemporaryDirectory(prefix="realizer-") as folder:  # FFmpeg goes back to the front of a film
+            path = Path(folder) / f"film{suffix}"
+            write_film(realization, path, drawing)
+            return path.read_bytes()
+
+    return Output(suffix, media_type, says, encode, ("render", "film"), _draws, save=write_film)
+
 
 OUTPUTS = (
-    Output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC", write_film, NEEDS, _draws),
-    Output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus", write_film, NEEDS, _draws),
+    _output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC"),
+    _output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus"),
 )

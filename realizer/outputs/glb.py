@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from realizer.arrays import Float32
 from realizer.face.glb_file import GlbFile
-from realizer.outputs.files import write_bytes
 from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
 from realizer.outputs.morphs import morphs
 from realizer.outputs.output import Drawing, Output
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_glb", "quaternions", "write_glb"]
+__all__ = ["OUTPUTS", "encode_glb", "quaternions"]
 
 # Nodes by their numbers in the file; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2
@@ -82,9 +80,8 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
     )
 
 
-def write_glb(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """The first character's head."""
-    write_bytes(path, encode_glb(realization.face, realization.poses, realization.fps))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_glb(realization.face, realization.poses, realization.fps)
 
 
 def quaternions(turns: Float32) -> Float32:
@@ -111,6 +108,4 @@ def _material(name: str, roughness: float) -> dict[str, Any]:
     }
 
 
-OUTPUTS = (
-    Output(".glb", "model/gltf-binary", "the head, animated: morph targets, head and eyes", write_glb),
-)
+OUTPUTS = (Output(".glb", "model/gltf-binary", "the head, animated: morph targets, head and eyes", _encode),)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_json", "write_json"]
+__all__ = ["OUTPUTS", "encode_json"]
 
 
 def encode_json(realization: Realization) -> str:
@@ -25,12 +23,12 @@ def encode_json(realization: Realization) -> str:
     return text + "\n"
 
 
-def write_json(realization: Realization, path: Path, drawing: Drawing) -> None:
-    write_text(path, encode_json(realization))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_json(realization).encode()
 
 
 OUTPUTS = (
     Output(
-        ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", write_json, everybody=True
+        ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", _encode, everybody=True
     ),
 )

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from realizer.outputs.files import write_bytes
+
 if TYPE_CHECKING:
     from realizer.realization import Realization
     from realizer.render import Renderer
@@ -57,19 +59,28 @@ class Output:
         suffix: ".fap"; the name in `realizer outputs` is the suffix without its dot.
         media_type: such as "video/mp4".
         says: one line for `realizer outputs`.
-        write: (realization, path, drawing) -> None; `path` may be any place that can be written.
+        encode: (realization, drawing) -> the content of the file.
         needs: the extras to install; () if it always works.
         draws: width and height of its pictures, and whether they may be transparent; None: there are none.
         everybody: whether it holds what all characters do; others hold the face of the first.
+        save: (realization, path, drawing) -> None, of what may be too long to be held: writes it bit by bit.
     """
 
     suffix: str
     media_type: str
     says: str
-    write: Callable[[Realization, Path, Drawing], None]
+    encode: Callable[[Realization, Drawing], bytes]
     needs: tuple[str, ...] = ()
     draws: Callable[[Drawing], tuple[tuple[int, int], bool]] | None = None
     everybody: bool = False
+    save: Callable[[Realization, Path, Drawing], None] | None = None
+
+    def write(self, realization: Realization, path: Path, drawing: Drawing) -> None:
+        """Write the file, whole or not at all; `path` may be any place that can be written."""
+        if self.save is not None:
+            self.save(realization, path, drawing)
+        else:
+            write_bytes(path, self.encode(realization, drawing))
 
     def begin(self, drawing: Drawing, face: str, deformer: str | None = None) -> Drawing:
         """The drawing to hand to `write`; what draws starts now, and gets ready while the rest is planned.

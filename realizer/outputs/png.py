@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realizer.arrays import Float32, UInt8
-from realizer.outputs.files import write_bytes
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "Moment", "encode_png", "moments", "row_at", "write_png"]
+__all__ = ["OUTPUTS", "Moment", "encode_png", "moments", "row_at"]
 
 MOST = 24  # pictures on a sheet
 LEAST = 8  # and so many at least, where there are as many frames
@@ -73,7 +71,7 @@ def encode_png(pixels: UInt8) -> bytes:
     return buffer.getvalue()
 
 
-def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
     """With `drawing.at` the picture of that instant; otherwise the sheet, its pictures at half the size."""
     from realizer.render.sheets import sheet
 
@@ -81,13 +79,12 @@ def write_png(realization: Realization, path: Path, drawing: Drawing) -> None:
     if drawing.at is not None:
         with drawing.renderer(realization, size, alpha=alpha) as renderer:
             (picture,) = renderer.draw(row_at(realization, drawing.at)[None])
-        write_bytes(path, encode_png(picture))
-        return
+        return encode_png(picture)
     shown = moments(realization)
     with drawing.renderer(realization, size, alpha=alpha) as renderer:
         pictures = renderer.draw(realization.poses[[moment.frame for moment in shown]])
     titles = [f"{moment.time:.2f} s" for moment in shown]
-    write_bytes(path, encode_png(sheet(list(pictures), titles, [moment.points for moment in shown])))
+    return encode_png(sheet(list(pictures), titles, [moment.points for moment in shown]))
 
 
 def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
@@ -111,5 +108,5 @@ def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
 
 
 OUTPUTS = (
-    Output(".png", "image/png", "a contact sheet over time, or one instant", write_png, ("render",), _draws),
+    Output(".png", "image/png", "a contact sheet over time, or one instant", _encode, ("render",), _draws),
 )

@@ -6,7 +6,6 @@ import base64
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from realizer.animation.viseme_weights import oculus_visemes
 from realizer.animation.visemes import sounds
 from realizer.outputs import said
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 from realizer.outputs.said import Span
 
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
     from realizer.composition.playing import Speaking
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_talkinghead", "write_talkinghead"]
+__all__ = ["OUTPUTS", "encode_talkinghead"]
 
 RATE = 22050  # Hz; what TalkingHead takes PCM for where nobody says otherwise
 # Ready Player Me's names of these visemes, where they are not those of Oculus.
@@ -60,9 +58,8 @@ def encode_talkinghead(realization: Realization) -> str:
     return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
 
-def write_talkinghead(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """The first character."""
-    write_text(path, encode_talkinghead(realization))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_talkinghead(realization).encode()
 
 
 def _timed(name: str, letter: str, spans: Iterable[Span]) -> dict[str, Any]:
@@ -120,6 +117,6 @@ def _ms(seconds: float) -> float:
 OUTPUTS = (
     Output(
         ".talkinghead.json", "application/json", "words, visemes, face and sound for TalkingHead",
-        write_talkinghead,
+        _encode,
     ),
 )  # fmt: skip

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from realizer.outputs import said
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_textgrid", "write_textgrid"]
+__all__ = ["OUTPUTS", "encode_textgrid"]
 
 DIGITS = 6  # after the point: microseconds
 
@@ -44,9 +42,8 @@ def encode_textgrid(realization: Realization) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_textgrid(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """All characters' words."""
-    write_text(path, encode_textgrid(realization))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_textgrid(realization).encode()
 
 
 def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
@@ -111,7 +108,7 @@ OUTPUTS = (
         ".textgrid",
         "text/x-textgrid",
         "words, phonemes and sync points for Praat",
-        write_textgrid,
+        _encode,
         everybody=True,
     ),
 )

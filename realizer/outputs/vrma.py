@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import combinations
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from realizer.animation.targets import AU_NAMES, au
 from realizer.arrays import Float32, Float64
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
-from realizer.outputs.files import write_bytes
 from realizer.outputs.glb import quaternions
 from realizer.outputs.output import Drawing, Output
 from realizer.tables import read_toml, text_of
@@ -22,7 +20,7 @@ from realizer.tables.lexemes import face_lexemes
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_vrma", "expressions", "write_vrma"]
+__all__ = ["OUTPUTS", "encode_vrma", "expressions"]
 
 FILE = "vrm.toml"
 EXTENSION, VERSION = "VRMC_vrm_animation", "1.0"
@@ -89,9 +87,8 @@ def expressions(realization: Realization) -> dict[str, Float32]:
     return {name: np.clip(weights, 0, 1).astype(np.float32) for name, weights in found.items()}
 
 
-def write_vrma(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """The first character."""
-    write_bytes(path, encode_vrma(realization))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_vrma(realization)
 
 
 def _mixture(shown: Float32) -> Float64:
@@ -148,5 +145,5 @@ def _table() -> dict[str, Any]:
 
 
 OUTPUTS = (
-    Output(".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", write_vrma),
+    Output(".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", _encode),
 )  # fmt: skip

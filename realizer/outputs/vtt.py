@@ -5,17 +5,15 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from realizer.outputs import said
-from realizer.outputs.files import write_text
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_vtt", "write_vtt"]
+__all__ = ["OUTPUTS", "encode_vtt"]
 
 LEAST = 0.001  # s; WebVTT wants every cue to end after it starts, and counts milliseconds
 KINDS = ("word", "phoneme", "sync")  # of cues that start together, in this order
@@ -46,9 +44,8 @@ def encode_vtt(realization: Realization) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def write_vtt(realization: Realization, path: Path, drawing: Drawing) -> None:
-    """All characters' words."""
-    write_text(path, encode_vtt(realization))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_vtt(realization).encode()
 
 
 def _cues(realization: Realization) -> Iterator[_Cue]:
@@ -67,5 +64,5 @@ def _clock(seconds: float) -> str:
 
 
 OUTPUTS = (
-    Output(".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", write_vtt, everybody=True),
+    Output(".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", _encode, everybody=True),
 )

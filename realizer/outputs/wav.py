@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import io
 import wave
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from realizer.arrays import Int16
-from realizer.outputs.files import write_bytes
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_wav", "write_wav"]
+__all__ = ["OUTPUTS", "encode_wav"]
 
 RATE = 22050  # Hz; the rate of espeak-ng's voices, so nothing is resampled
 
@@ -30,8 +28,8 @@ def encode_wav(pcm: Int16, rate: int) -> bytes:
     return buffer.getvalue()
 
 
-def write_wav(realization: Realization, path: Path, drawing: Drawing) -> None:
-    write_bytes(path, encode_wav(realization.sound(RATE), RATE))
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
+    return encode_wav(realization.sound(RATE), RATE)
 
 
-OUTPUTS = (Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", write_wav, everybody=True),)
+OUTPUTS = (Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", _encode, everybody=True),)

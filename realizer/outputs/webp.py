@@ -6,19 +6,17 @@ import io
 import math
 import struct
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realizer.arrays import UInt8
-from realizer.outputs.files import write_bytes
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_webp", "write_webp"]
+__all__ = ["OUTPUTS", "encode_webp"]
 
 PACE = 25  # pictures a second at most: more than that is a film
 QUALITY, METHOD = 75, 4  # 160 kB a second at 512x512
@@ -55,15 +53,14 @@ def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) 
     return b"RIFF" + struct.pack("<I", len(body)) + body
 
 
-def write_webp(realization: Realization, path: Path, drawing: Drawing) -> None:
+def _encode(realization: Realization, drawing: Drawing) -> bytes:
     """Every frame, or at higher rates every second, third, ...: at most 25 pictures a second."""
     step = math.ceil(realization.fps / PACE)
     rows = realization.poses[::step]
     starts = [k * step / realization.fps for k in range(len(rows))]
     size, _ = _draws(drawing)
     with drawing.renderer(realization, size) as renderer:
-        content = encode_webp(renderer.frames(rows), starts, starts[-1] + step / realization.fps)
-    write_bytes(path, content)
+        return encode_webp(renderer.frames(rows), starts, starts[-1] + step / realization.fps)
 
 
 def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
@@ -79,5 +76,5 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 
 OUTPUTS = (
-    Output(".webp", "image/webp", "animated picture without sound", write_webp, ("render",), _draws),
+    Output(".webp", "image/webp", "animated picture without sound", _encode, ("render",), _draws),
 )  # fmt: skip

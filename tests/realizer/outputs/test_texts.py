@@ -15,7 +15,6 @@ import pytest
 from realizer.animation.fap_reader import read_fap
 from realizer.animation.targets import AU_NAMES
 from realizer.outputs import OUTPUTS, Drawing, output_for
-from realizer.outputs.fap_text import write_fap
 from realizer.speech.utterance import Phoneme
 from realizer.tables import faps
 
@@ -102,14 +101,14 @@ def test_fap_1_is_written_where_it_is_asked_for(realization, tmp_path):
     said = replace(speaking, utterance=replace(speaking.utterance, phonemes=sounds))
     spoken = replace(realization, speaking=(said,))
     path = tmp_path / "clip.fap"
-    write_fap(spoken, path, Drawing(visemes=True))
+    OUTPUTS[".fap"].write(spoken, path, Drawing(visemes=True))
     clip = read_fap(path.read_text())
     assert clip.mask[0]
     assert np.array_equal(clip.values, realization.faps.integers())
     assert clip.visemes[round(25 * (said.start + 0.4))].tolist() == [1, 0, 63, 0]
     assert clip.visemes[round(25 * (said.start + 0.65))][0] == 10
     assert clip.visemes[[0, -1]].tolist() == [[0, 0, 63, 0]] * 2
-    write_fap(spoken, path, Drawing())
+    OUTPUTS[".fap"].write(spoken, path, Drawing())
     assert not read_fap(path.read_text()).mask[0]
 
 
