@@ -13,7 +13,7 @@ if [ $# -lt 1 ] || [ $# -gt 2 ]; then
 fi
 target=$1
 # What a service draws, says and keeps; no films, no speech by a neural network, no alignment.
-extras=${2:-speech,render,fast,stomp,cluster}
+extras=${2:-speech,render,fast,stomp,cluster,jwt}
 source=$(dirname "$0")/..
 
 wheels=$(mktemp -d)
