@@ -112,6 +112,33 @@ def test_a_service_can_write_nothing_and_has_no_rights(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", COMPOSE["services"])
+def test_a_service_says_whether_it_is_well_and_fills_neither_the_disk_nor_the_process_table(
+    name: str,
+) -> None:
+    service = COMPOSE["services"][name]
+    # Ours has its check in its image.
+    check = service.get("healthcheck", {"test": ["CMD"]} if name in NODES else None)
+    assert check["test"][0] == "CMD"
+    assert service["restart"] == "unless-stopped"
+    assert service["logging"] == {"driver": "local"}
+    assert 0 < service["pids_limit"] <= 1000
+
+
+def test_the_image_has_a_health_check() -> None:
+    assert re.search(r"^HEALTHCHECK .*\\\n +CMD \[", DOCKERFILE, re.M)
+
+
+def test_the_journal_is_on_a_volume_and_keeps_what_it_was_given() -> None:
+    journal = COMPOSE["services"]["journal"]
+    words = iter(journal["command"][1:])
+    options = {name.removeprefix("--"): value for name, value in zip(words, words, strict=True)}
+    assert options["appendonly"] == "yes"
+    assert options["maxmemory-policy"] == "noeviction"
+    assert journal["volumes"] == ["journal:/data"]
+    assert "journal" in COMPOSE["volumes"]
+
+
+@pytest.mark.parametrize("name", COMPOSE["services"])
 def test_a_service_names_its_image_and_only_what_there_is(name: str) -> None:
     service = COMPOSE["services"][name]
     assert name in NODES or re.fullmatch(r"[a-z/]+:\d+\.\d+[a-z.-]*", service["image"])

@@ -59,8 +59,7 @@ class LocalJournal:
             raise _lost(session)
 
     def take(self, session: str) -> Kept | None:
-        with self._told():
-            # From here on nobody else writes of it.
+        with self._at_once():
             mine = self._file.execute(
                 "UPDATE sessions SET owner = ? WHERE id = ? RETURNING epoch", (self._owner, session)
             ).fetchone()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import secrets
+import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -12,16 +13,22 @@ from realizer.server.journal.entry import Entry, JournalError, Kept, Lost
 __all__ = ["SharedJournal"]
 
 PATIENCE = 1.0  # s for an answer
+# Everybody waits for it meanwhile: who has not answered in that time is not asked again before so long.
+PAUSE = 4.0  # s
 # Sessions whose node died and that nobody came back to are forgotten after so long.
 KEPT = 7 * 24 * 3600  # s
 
 # KEYS: of the head (owner, epoch), of the list of entries, and of the parts by name. Nobody comes between
 # the look and the write, and who restarts the store finds all of a script's writes in its log, or none.
+# An answer may be lost after its write: what is there beyond the entries that its owner knows of, ARGV[3] of
+# them, is what somebody was told could not be kept, and goes.
 ADD = """
 if redis.call('HGET', KEYS[1], 'owner') ~= ARGV[1] then return 0 end
-redis.call('RPUSH', KEYS[2], ARGV[3])
+local known = tonumber(ARGV[3])
+while redis.call('LLEN', KEYS[2]) > known do redis.call('RPOP', KEYS[2]) end
+local count = redis.call('RPUSH', KEYS[2], ARGV[4])
 for _, key in ipairs(KEYS) do redis.call('EXPIRE', key, ARGV[2]) end
-return 1
+return count
 """
 TAKE = """
 if redis.call('EXISTS', KEYS[1]) == 0 then return false end
@@ -54,14 +61,24 @@ class SharedJournal:
     def __init__(self, url: str) -> None:
         try:
             import redis
+            from redis.backoff import NoBackoff
+            from redis.retry import Retry
         except ImportError:
             raise JournalError("a journal in Redis: pip install 'bml-realizer[cluster]'") from None
         self._url = url.rpartition("@")[2]  # a password is nobody's business
         self._owner = secrets.token_hex(8)
+        self._counts: dict[str, int] = {}  # session -> how many entries it has
+        self._pause_ends = 0.0
+        self._late: type[Exception] = redis.TimeoutError
         self._faults: tuple[type[Exception], ...] = (redis.RedisError, OSError)
         try:
             self._store: Any = redis.Redis.from_url(
-                url, socket_timeout=PATIENCE, socket_connect_timeout=PATIENCE, decode_responses=True
+                url,
+                socket_timeout=PATIENCE,
+                socket_connect_timeout=PATIENCE,
+                decode_responses=True,
+                # One that restarts is there again at once, or not at all; a write twice is as one.
+                retry=Retry(NoBackoff(), 1, (redis.ConnectionError,)),
             )
         except ValueError as error:
             raise JournalError(f"the journal {self._url}: {error}") from None
@@ -78,12 +95,15 @@ class SharedJournal:
             pipe.hset(head, mapping={"owner": self._owner, "epoch": repr(epoch)})
             pipe.expire(head, KEPT)
             pipe.execute()
+        self._counts[session] = 0
 
     def add(self, session: str, entry: Entry) -> None:
         with self._told():
-            done = self._add(_keys(session), [self._owner, KEPT, entry.line()])
-        if not done:
+            known = self._counts.get(session, 0)
+            count = self._add(_keys(session), [self._owner, KEPT, known, entry.line()])
+        if not count:
             raise _lost(session)
+        self._counts[session] = count
 
     def take(self, session: str) -> Kept | None:
         with self._told():
@@ -92,6 +112,7 @@ class SharedJournal:
             return None
         epoch, lines, parts = there
         texts = dict(zip(parts[::2], parts[1::2], strict=True))
+        self._counts[session] = len(lines)
         return Kept(float(epoch), [Entry.read(line) for line in lines], texts)
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
@@ -101,8 +122,10 @@ class SharedJournal:
             done = self._compact(_keys(session), [self._owner, KEPT, len(gone), *gone, *new])
         if not done:
             raise _lost(session)
+        self._counts[session] = 0
 
     def end(self, session: str) -> None:
+        self._counts.pop(session, None)
         with contextlib.suppress(JournalError), self._told():
             self._end(_keys(session), [self._owner])
 
@@ -112,8 +135,13 @@ class SharedJournal:
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
+        if time.monotonic() < self._pause_ends:
+            raise JournalError(f"the journal {self._url}: it did not answer, and is asked again in a moment")
         try:
             yield
+        except self._late as error:
+            self._pause_ends = time.monotonic() + PAUSE
+            raise JournalError(f"the journal {self._url}: {error}") from None
         except self._faults as error:
             raise JournalError(f"the journal {self._url}: {error}") from None
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO
 
 import pytest
+import yaml
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 
@@ -156,6 +157,20 @@ def test_an_address_has_its_share_of_connections_and_no_more(
 
     with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log, REALIZER_MAX_CONNECTIONS="2") as at:
         asyncio.run(test(f"ws://{at}/ws?session=one"))
+
+
+def test_the_proxy_is_well_while_a_node_is(nodes: tuple[Node, Node], tmp_path: Path) -> None:
+    services = yaml.safe_load(CONFIGURATION.with_name("compose.yaml").read_text("utf-8"))["services"]
+    _, program, *options = services["proxy"]["healthcheck"]["test"]
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
+    with (tmp_path / "proxy.log").open("w") as log, proxy(nodes, log) as at:
+        check = [program, *(word.replace("127.0.0.1:8765", at) for word in options)]
+        assert any(at in word for word in check)
+        nodes[0].kill()
+        assert subprocess.run(check, check=False).returncode == 0
+        nodes[1].kill()
+        assert subprocess.run(check, check=False).returncode
 
 
 def test_the_numbers_of_a_node_are_not_shown_to_everybody(nodes: tuple[Node, Node], tmp_path: Path) -> None:
