@@ -1,0 +1,192 @@
+"""Prints what journals cost: time of a document, and bytes and time of a takeover after very many of them.
+
+Run: python -m tests.benchmarks.journal [--documents 10000] [--apart 8] [--kinds SQLite Redis record]
+
+A session plays one document after another on a clock of its own, one each `--apart` seconds, of five kinds;
+its voice is silent. Everything is written to each kind of journal in turn: a file (SQLite), Redis where its
+server is installed, both with checkpoints and without, as they were before there were any; and a record, which
+is never made shorter. What is said of a document and of a takeover is CPU time of this process (a Redis server
+has its own); single calls are as they were seen, with the noise of the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import socket
+import statistics
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+from realizer.server.effects import Speak
+from realizer.server.journal import Entry, Journal, Kept, Log, journal_at
+from realizer.server.journal import notes as thresholds
+from realizer.server.journal.folder import FolderJournal
+from realizer.server.journal.notes import Notes
+from realizer.server.journal.replay import restored
+from realizer.server.session import Session
+from realizer.settings import Settings
+from realizer.speech import SilentVoice
+from realizer.speech.fitting import fitted
+from realizer.speech.utterance import Utterance
+
+SETTINGS = Settings(voice="silent")
+DOCUMENTS = (
+    '<bml id="b{k}"><speech id="s"><text>Good morning <sync id="m"/>to you</text></speech>'
+    '<head id="n" lexeme="NOD" stroke="s:m"/></bml>',
+    '<bml id="b{k}"><faceLexeme id="f" lexeme="SMILE" end="2"/><gaze id="g" target="cup" end="1.5"/></bml>',
+    '<bml id="b{k}"><head id="n" lexeme="SHAKE"/></bml>',
+    '<bml id="b{k}"><faceShift id="f" lexeme="RAISE_BROWS" end="1"/></bml>',
+    '<bml id="b{k}"><speech id="s"><text>And who are you, if I may ask?</text></speech></bml>',
+)
+
+
+class Watched:
+    """A journal, and how long each of its calls took."""
+
+    def __init__(self, journal: Journal) -> None:
+        self._journal = journal
+        self.adds: list[float] = []
+        self.compacts: list[float] = []
+        self.begin, self.take, self.end, self.close = journal.begin, journal.take, journal.end, journal.close
+
+    def add(self, session: str, entry: Entry) -> None:
+        with _timed(self.adds):
+            self._journal.add(session, entry)
+
+    def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
+        with _timed(self.compacts):
+            self._journal.compact(session, parts)
+
+
+@contextmanager
+def _timed(spent: list[float]) -> Iterator[None]:
+    began = time.perf_counter()
+    yield
+    spent.append(time.perf_counter() - began)
+
+
+def spoken(order: Speak) -> Utterance:
+    return fitted(SilentVoice(), order.say)
+
+
+def opened() -> Session:
+    return Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
+
+
+def played(documents: int, apart: float, journal: Journal | None, record: Log | None = None) -> float:
+    """CPU milliseconds of a document."""
+    session = opened()
+    session.notes = Notes("long", journal, record)
+    session.notes.begin(0.0)
+    session.connect(1, 0.0)
+    session.receive(1, '{"type":"scene","objects":{"cup":{"x":0.2,"y":-0.1,"z":0.5}}}', 0.0)
+    began = time.process_time()
+    for k in range(documents):
+        session.receive(1, DOCUMENTS[k % len(DOCUMENTS)].replace("{k}", str(k)), apart * k)
+        now = apart * k
+        while True:
+            for effect in session.outgoing():
+                if isinstance(effect, Speak):
+                    session.spoken(effect.id, spoken(effect), now)
+            due = session.next_deadline()
+            if due is None or due > apart * (k + 1):
+                break
+            now = max(now, due)
+            session.tick(now)
+    return 1000 * (time.process_time() - began) / documents
+
+
+def size(kept: Kept) -> int:
+    """Bytes that are kept of the session."""
+    return sum(len(entry.line().encode()) for entry in kept.entries) + sum(
+        len(text.encode()) for text in kept.parts.values()
+    )
+
+
+def report(name: str, where: str, documents: int, apart: float, bare: float) -> None:
+    journal = Watched(journal_at(where))
+    cost = played(documents, apart, journal)
+    began = time.process_time()
+    kept = journal_at(where).take("long")
+    assert kept is not None
+    session = opened()
+    restored(session, kept, spoken)
+    took = time.process_time() - began
+    entries = len(journal.adds) / documents
+    compacts = ""
+    if journal.compacts:
+        median = 1000 * statistics.median(journal.compacts)
+        compacts = f"; {len(journal.compacts)} checkpoints, {median:.1f} ms each to write (median),"
+        compacts += f" {1000 * max(journal.compacts):.1f} at most"
+    print(
+        f"{name}: {cost - bare:+.2f} ms a document ({entries:.1f} entries,"
+        f" {1e6 * statistics.median(journal.adds):.0f} us each); at the end {len(kept.entries)} entries,"
+        f" {size(kept) / 1000:.0f} kB, taken over in {took:.2f} s{compacts}",
+        flush=True,
+    )
+
+
+@contextmanager
+def redis(folder: Path) -> Iterator[str | None]:
+    """The URL of a Redis server of its own that writes each second, as that of docker/ does."""
+    if (program := shutil.which("redis-server")) is None:
+        yield None
+        return
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    command = [program, "--port", str(port), "--bind", "127.0.0.1", "--save", "", "--appendonly", "yes"]
+    with subprocess.Popen([*command, "--dir", str(folder)], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        for line in server.stdout:
+            if "Ready to accept connections" in line:
+                break
+        try:
+            yield f"redis://127.0.0.1:{port}"
+        finally:
+            server.kill()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--documents", type=int, default=10_000)
+    parser.add_argument("--apart", type=float, default=8.0, help="seconds")
+    parser.add_argument("--kinds", nargs="+", default=["SQLite", "Redis", "record"])
+    asked = parser.parse_args()
+    documents, apart = asked.documents, asked.apart
+    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        folder = Path(name)
+        url = stack.enter_context(redis(folder))
+        played(100, apart, None)  # what is loaded late is there
+        bare = played(documents, apart, None)
+        print(f"no journal: {bare:.2f} ms a document", flush=True)
+        never = patch.multiple(thresholds, ENTRIES=10**9, BYTES=10**18)
+        for kind, places in (
+            ("SQLite", (folder / "whole.db", folder / "short.db")),
+            ("Redis", (f"{url}/0", f"{url}/1")),
+        ):
+            if kind not in asked.kinds or (kind == "Redis" and url is None):
+                continue
+            with never:
+                report(f"{kind}, no checkpoints", str(places[0]), documents, apart, bare)
+            report(f"{kind}, checkpoints", str(places[1]), documents, apart, bare)
+        for path in sorted(folder.glob("*.db")):
+            print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
+        if "record" not in asked.kinds:
+            return
+        record = FolderJournal(folder / "records", {})
+        cost = played(documents, apart, None, record)
+        record.close()
+        (path,) = (folder / "records").iterdir()
+        print(f"record: {cost - bare:+.2f} ms a document; {path.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
