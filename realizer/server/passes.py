@@ -113,7 +113,7 @@ def _public(text: str) -> tuple[Any, Sequence[str]]:
         return key, [CURVES[key.curve.name]]
     if isinstance(key, ed25519.Ed25519PublicKey):
         return key, ["EdDSA"]
-    wanted = f"RSA ({BITS} bits or more), of an elliptic curve ({', '.join(CURVES)}) or of Ed25519"
+    wanted = f"of RSA ({BITS} bits or more), of an elliptic curve ({', '.join(CURVES)}) or of Ed25519"
     raise RealizerError(f"setting jwt_key: wanted a public key in PEM (BEGIN PUBLIC KEY), {wanted}")
 
 

@@ -10,6 +10,7 @@ import socket
 from collections.abc import Awaitable, Coroutine
 from types import TracebackType
 
+from realizer.errors import RealizerError
 from realizer.logs import write_json
 from realizer.scheduling import warm_up
 from realizer.server.doors.asap import AsapDoor
@@ -19,7 +20,7 @@ from realizer.server.doors.websocket import WebSocketDoor, lines
 from realizer.server.doors.xface import XfaceDoor
 from realizer.server.doors.xface_player import XfacePlayerDoor
 from realizer.server.shell import Shell
-from realizer.server.workers import READY, Workers, handed
+from realizer.server.workers import FAULT, READY, Workers, handed
 from realizer.settings import Settings
 
 __all__ = ["Server", "run", "serve", "work"]
@@ -38,7 +39,7 @@ async def serve(settings: Settings | None = None) -> None:
 
     Raises:
         OSError: an address cannot be had.
-        RealizerError: something that was asked for is not there.
+        RealizerError: something that was asked for is not there, or a worker lacks something.
     """
     settings = settings or Settings()
     if settings.log == "json":
@@ -60,7 +61,11 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
     if settings.log == "json":
         write_json()
     loop = asyncio.get_running_loop()
-    server = await Server(settings, worker=number).start()
+    try:
+        server = await Server(settings, worker=number).start()
+    except (RealizerError, OSError, ValueError) as error:  # the parent says it, once
+        await loop.sock_sendall(control, FAULT + str(error).encode())
+        return
     gone = asyncio.Event()
 
     def take() -> None:

@@ -20,6 +20,7 @@ from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from urllib.parse import parse_qs
 
+from realizer.errors import RealizerError
 from realizer.server.gathered import gathered, is_for_all
 from realizer.settings import Settings
 
@@ -31,14 +32,14 @@ log = logging.getLogger(__name__)
 PATIENCE, LONGEST = 10.0, 8192  # s, bytes
 # How long a worker that is full is waited for, and how often a request that is not whole is looked at.
 STEP = 0.005  # s
-# What a worker says when its doors are open.
-READY = b"r"
+# What a worker says when its doors are open; and, before the words, when they cannot be.
+READY, FAULT = b"r", b"!"
 # Sessions that other doors than the WebSocket make; these doors are open in the first worker.
 OF_DOORS = re.compile("(asap|xface|stomp)-")
 
 
-class WorkerError(Exception):
-    """A worker that cannot be started; it has said why itself."""
+class WorkerError(RealizerError):
+    """A worker that cannot be started, and why."""
 
 
 def worker_of(session: str, workers: int, settings: Settings) -> int:
@@ -70,7 +71,7 @@ class Workers:
 
         Raises:
             OSError: the address cannot be had.
-            WorkerError: a worker ended before it was ready.
+            WorkerError: a worker lacks something, or ended before it was ready.
         """
         loop = asyncio.get_running_loop()
         found = await loop.getaddrinfo(
@@ -87,8 +88,8 @@ class Workers:
             for number in range(self._settings.workers):
                 self._children.append(self._begin(number))
             for _, control in self._children:
-                if await loop.sock_recv(control, 1) != READY:
-                    raise WorkerError("a worker ended before it was ready")
+                if (words := await _lacks(control)) is not None:
+                    raise WorkerError(words)
         except BaseException:
             await self.close()
             raise
@@ -153,8 +154,9 @@ class Workers:
             log.error("worker %d ended with status %s: its sessions are lost", number, child.exitcode)
             control.close()
             self._children[number] = child, control = self._begin(number)
-            if await loop.sock_recv(control, 1) != READY:
-                await asyncio.sleep(1.0)  # it says itself what it lacks; no more than one try a second
+            if (words := await _lacks(control)) is not None:
+                log.error("worker %d: %s", number, words)
+                await asyncio.sleep(1.0)  # no more than one try a second
 
     async def _accept(self, here: socket.socket) -> None:
         loop = asyncio.get_running_loop()
@@ -214,6 +216,17 @@ async def _first_line(client: socket.socket) -> str:
         if end or not data or len(data) >= LONGEST:
             return line.decode("latin-1")
         await asyncio.sleep(STEP)
+
+
+async def _lacks(control: socket.socket) -> str | None:
+    """Why a worker does not become ready; None once it is."""
+    loop = asyncio.get_running_loop()
+    if (first := await loop.sock_recv(control, 1)) == READY:
+        return None
+    words = b""
+    while first and (more := await loop.sock_recv(control, 4096)):
+        words += more
+    return words.decode() or "a worker ended before it was ready"
 
 
 def handed(control: socket.socket) -> list[socket.socket]:

@@ -260,6 +260,16 @@ def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
         assert service.wait(LIMIT) == 0
 
 
+def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
+        command += ["--workers", "2", "--xface-port", str(taken.getsockname()[1])]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 3
+    (line,) = done.stderr.splitlines()
+    assert "address already in use" in line
+
+
 def test_an_address_that_is_taken_is_said_before_a_worker_starts() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
         asyncio.run(Workers(Settings(port=taken.getsockname()[1], workers=2)).start())
