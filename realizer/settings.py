@@ -220,6 +220,7 @@ class Settings:
         None,
         _optional(_text),
         "a file, or redis://HOST:PORT/N: sessions with a name outlive the service; none: they do not",
+        secret=True,  # a password may be in it
     )
     record: Path | None = _setting(
         None, _optional(Path), "a folder to record all sessions in, for `realizer replay`; none: not recorded"

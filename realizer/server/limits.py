@@ -12,7 +12,7 @@ from realizer.composition.references import abroad
 from realizer.scheduling.timing import Schedule
 from realizer.settings import Settings, raises
 
-__all__ = ["MAX_CHARACTERS", "beyond", "too_large", "too_long", "too_many_pixels", "used_up"]
+__all__ = ["MAX_CHARACTERS", "beyond", "memory", "too_large", "too_long", "too_many_pixels", "used_up"]
 
 MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
 
@@ -76,23 +76,23 @@ def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings) -> st
 
 def used_up(settings: Settings) -> str | None:
     """Why there is no memory for one more session; None where there is."""
-    if settings.max_memory is None or (used := _memory()) <= settings.max_memory:
+    if settings.max_memory is None or (used := memory() / 1e6) <= settings.max_memory:
         return None
     return f"the service uses {used:.0f} MB: wanted at most {settings.max_memory} {raises('max_memory')}"
 
 
-def _memory() -> float:
-    """Megabytes of this process in memory; the most there ever were, or 0, where the system says no more."""
+def memory() -> int:
+    """Bytes of this process in memory; the most there ever were, or 0, where the system says no more."""
     try:
-        return int(MEMORY.read_text("ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        return int(MEMORY.read_text("ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
         pass
     try:
         import resource
     except ImportError:  # Windows
-        return 0.0
+        return 0
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most / 1e6 if sys.platform == "darwin" else most * 1024 / 1e6
+    return most if sys.platform == "darwin" else most * 1024
 
 
 def _longest(block: Block) -> int:

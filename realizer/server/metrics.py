@@ -128,6 +128,7 @@ GAUGES = {
     "blocks_waiting": "Blocks that wait for a voice or to be planned.",
     "blocks_playing": "Blocks that are planned and have not ended.",
     "unsent_bytes": "Bytes that wait for clients to read them.",
+    "memory_bytes": "Bytes of the process that are in memory.",
 }
 COUNTERS = {
     "messages": "Messages that came in.",

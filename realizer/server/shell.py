@@ -22,6 +22,7 @@ from realizer.server.journal import Journal, JournalError, Log, journal_at
 from realizer.server.journal.folder import FolderJournal, head
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.replay import caught_up, restored
+from realizer.server.limits import memory
 from realizer.server.metrics import Metrics
 from realizer.server.session import Session
 from realizer.server.studio import Studio
@@ -139,6 +140,7 @@ class Shell:
                 "blocks_waiting": sum(len(session.intake.preparation) for session in sessions),
                 "blocks_playing": sum(session.player.alive for session in sessions),
                 "unsent_bytes": sum(client.waiting for client in self._clients.values()),
+                "memory_bytes": memory(),
             },
             {"frames_dropped": dropped},
         )

@@ -161,7 +161,9 @@ def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
 
 
 def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
-    settings = Settings(token=TOKEN, stomp_password=TOKEN, jwt_key=SECRET)
+    settings = Settings(
+        token=TOKEN, stomp_password=TOKEN, jwt_key=SECRET, journal=f"redis://:{TOKEN}@127.0.0.1:6379/0"
+    )
     assert TOKEN not in repr(settings)
     assert SECRET not in repr(settings)
     with pytest.raises(SettingsError, match=r"jwt_key: wanted a PEM file .*, got something else"):

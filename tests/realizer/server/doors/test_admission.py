@@ -287,6 +287,7 @@ def test_metrics_count_what_happened() -> None:
         assert values["blocks_playing"] == values["refused_total"] == values["failures_total"] == "0"
         assert int(values["planning_seconds_count"]) >= 1
         assert int(values["lateness_seconds_count"]) >= 2
+        assert 2**20 < int(values["memory_bytes"]) < 2**40
 
     serving(test)
 
