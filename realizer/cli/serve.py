@@ -44,8 +44,8 @@ def limits(command: Callable[..., None]) -> Callable[..., None]:
 @click.option(
     "--jwt-key",
     metavar="FILE|SECRET",
-    help="Beside or instead of --token: a public key in PEM, or a secret (better in REALIZER_JWT_KEY), by which "
-    "JWTs of clients are signed.",
+    help="Beside or instead of --token: a public key in PEM, or a secret (better in REALIZER_JWT_KEY), by "
+    "which JWTs of clients are signed.",
 )
 @click.option("--jwt-audience", metavar="WORD", help="What these must be for, their claim aud.")
 @click.option(

@@ -1,4 +1,4 @@
-"""Tokens that a key has signed: whom they let in, until when, into which sessions; and all that they do not."""
+"""Tokens that a key has signed: whom they let in, until when, into which sessions; and whom they do not."""
 
 from __future__ import annotations
 
