@@ -238,10 +238,13 @@ class Player:
 
     # at rest ------------------------------------------------------------------------------------
 
-    @property
-    def resting(self) -> bool:
-        """Nothing plays, waits or is still to be seen: what is held, the scene and `cast.known` are all."""
-        return self._blocks.resting
+    def resting(self, now: float = float("-inf")) -> bool:
+        """Nothing plays, waits or is still to be seen: what is held, the scene and `cast.known` are all.
+
+        Args:
+            now: what has ended by then does not count, though what is idle goes by it for some seconds.
+        """
+        return self._blocks.resting(now)
 
     @property
     def held_by(self) -> tuple[Character, ...]:

@@ -104,8 +104,9 @@ class Cast:
         return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
 
     def known(self) -> tuple[list[Schedule], Schedule]:
-        """What there is of blocks that are gone, the oldest first, and what is anticipated."""
-        return list(self._past.values()), self._anticipated
+        """When blocks were that have ended, the oldest first, and what is anticipated."""
+        past = self._past | {playing.block.id: playing.schedule for playing in self._ended}
+        return list(past.values())[-PAST:], self._anticipated
 
     def restore(self, past: Iterable[Schedule], anticipated: Schedule) -> None:
         """Know what another cast has known."""

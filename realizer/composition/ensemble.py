@@ -135,10 +135,14 @@ class Ensemble:
     def next_deadline(self) -> float | None:
         return float("-inf") if self.reports else self.course.calendar.next
 
-    @property
-    def resting(self) -> bool:
-        """Nothing plays, waits, is expected or owed, and of what has ended nothing is to be seen."""
-        return not (self.cast.all() or self._expected or self.reports)
+    def resting(self, now: float = -FOREVER) -> bool:
+        """Nothing plays, waits, is expected or owed, and of what has ended nothing is to be seen.
+
+        Args:
+            now: what was gone by then counts as gone, though blinks and nods may still come of it.
+        """
+        seen = any(not playing.done or playing.gone > now for playing in self.cast.all())
+        return not (seen or self._expected or self.reports)
 
     def stirs(self, now: float, before: float) -> bool:
         """Whether `due(now)` or `forget(before)` would have something."""

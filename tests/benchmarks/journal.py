@@ -2,11 +2,11 @@
 
 Run: python -m tests.benchmarks.journal [--documents 10000] [--apart 8] [--kinds SQLite Redis record]
 
-A session plays one document after another on a clock of its own, one each `--apart` seconds, of five kinds;
-its voice is silent. Everything is written to each kind of journal in turn: a file (SQLite), Redis where its
-server is installed, both with checkpoints and without, as they were before there were any; and a record, which
-is never made shorter. What is said of a document and of a takeover is CPU time of this process (a Redis server
-has its own); single calls are as they were seen, with the noise of the machine.
+A session plays one document after another on a clock of its own, one each `--apart` seconds, of five
+kinds; its voice is silent. Everything is written to each kind of journal in turn: a file (SQLite), Redis
+where its server is installed, both with checkpoints and without, as they were before there were any; and a
+record, which is never made shorter. What is said of a document and of a takeover is CPU time of this process
+(a Redis server has its own); single calls are as they were seen, with the noise of the machine.
 """
 
 from __future__ import annotations

@@ -24,13 +24,17 @@ MOST_TOLD, MOST_TEXT = 1000, 2**19
 def checkpoint(session: Session, t: float) -> bool:
     """Let the journal of a session begin anew, if the session is at rest.
 
+    One whose journal is long, as its face never comes to rest, need only have nothing that plays: then a
+    blink or a nod of the next seconds, which goes by what was said last, may be another after a takeover.
+
     Args:
         t: seconds on the session clock; what was due until then was told.
 
     Raises:
         Lost: another process has the session.
     """
-    if not (session.player.resting and session.intake.resting):
+    now = t if session.notes.overgrown else float("-inf")
+    if not (session.intake.resting and session.player.resting(now)):
         return False
     parts: dict[str, str | None] = {STATE: json.dumps(_state(session, t), ensure_ascii=False)}
     parts |= {CLIP + id: text for id, text in session.clips.changes().items()}

@@ -14,6 +14,8 @@ log = logging.getLogger(__name__)
 # A checkpoint is due after so many entries, which are done again in about half a second, or so many bytes.
 ENTRIES = 250
 BYTES = 2**20
+# So many times as much is long.
+LONG = 4
 # And where it could not be written, again after so many.
 AGAIN = 25
 
@@ -55,6 +57,11 @@ class Notes:
     def grown(self) -> bool:
         """A checkpoint is due."""
         return self._entries >= ENTRIES or self._bytes >= BYTES
+
+    @property
+    def overgrown(self) -> bool:
+        """A checkpoint was due long ago."""
+        return self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
 
     def begin(self, epoch: float) -> None:
         """The session is new.

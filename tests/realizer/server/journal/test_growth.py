@@ -6,12 +6,13 @@ import json
 import sqlite3
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from realizer.server.effects import Send, Speak
 from realizer.server.journal import Journal, JournalError, Kept, journal_at
 from realizer.server.journal.checkpoint import MOST_TOLD, restore
-from realizer.server.journal.notes import ENTRIES, Notes
+from realizer.server.journal.notes import ENTRIES, LONG, Notes
 from realizer.server.journal.replay import restored
 from realizer.server.session import Session
 from realizer.server.wire import ClipPiece, pack_clip
@@ -132,6 +133,26 @@ def test_a_clip_is_written_once_and_goes_with_its_session() -> None:
     assert [sorted(parts) for parts in sounds] == [["clip:c0"], *3 * [["clip:c0", "clip:c1"]]]
     assert sounds[0]["clip:c0"] == sounds[1]["clip:c0"] != sounds[2]["clip:c0"]
     assert sounds[2]["clip:c1"] is sounds[1]["clip:c1"]  # it was not written again
+
+
+def test_a_session_whose_face_is_never_still_has_a_checkpoint_where_nothing_plays() -> None:
+    journal, apart = Memory(), 0.75  # s; the next block comes before the last one's blinks are past
+    session = opened(journal)
+    for k in range(LONG * ENTRIES // 2 + 10):
+        play(session, TALK if k % 100 == 0 else WAIT, apart * k, apart * (k + 1))
+    assert journal.compacted == 1
+    kept = journal.take("long")
+    assert kept is not None
+    assert len(kept.entries) < ENTRIES
+    again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
+    restored(again, kept, spoken)
+    tied = '<bml id="c"><head id="n" lexeme="NOD" start="b:w:end+2"/></bml>'
+    for one in (session, again):
+        play(one, tied, apart * k + 0.7, apart * k + 20)
+    assert again.log.newest == session.log.newest
+    assert again.log.since(session.log.newest - 12) == session.log.since(session.log.newest - 12)
+    times = apart * k + 10 + np.arange(50) / 25
+    assert np.array_equal(again.player.frames(times).faps, session.player.frames(times).faps)
 
 
 def test_while_a_block_waits_or_a_speech_is_open_nothing_is_left_out() -> None:
