@@ -61,9 +61,7 @@ def blend(
         moved |= {*idle.motion.columns, *_lids()}
     columns = sorted(moved)
     place = {column: i for i, column in enumerate(columns)}
-    values, base, gaze = _layers(alive, place, times)
-    if idle is not None:
-        _add_idle(values, idle, alive, place, times)
+    values, base, gaze = _layers(alive, idle, place, times)
     if gaze is not None:
         _share(gaze, base, place)
         values += gaze
@@ -74,7 +72,7 @@ def blend(
     held = _override(values, alive, place, times)
     # The FAPs between AUs and presences have limits of their own.
     first, last = (bisect_left(columns, len(AU_NAMES()) + count) for count in (0, 68))
-    for limited in (values[:first], values[last:]):
+    for limited in (values[:first], values[last:]) if first < last else (values,):
         np.clip(limited, 0.0, 1.0, out=limited)
     frames = _by_column(values, columns, len(axis()), order)
     if held is None or not held[first:last].any():
@@ -92,7 +90,7 @@ def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
 
 
 def _layers(
-    channels: list[Channel], place: dict[int, int], times: Float64
+    channels: list[Channel], idle: Idle | None, place: dict[int, int], times: Float64
 ) -> tuple[Float64, Float64 | None, Float64 | None]:
     """(c, n) each of the columns in `place`: expressions, base states and gazes (None: there are none).
 
@@ -107,6 +105,8 @@ def _layers(
         apart = layer if adds[-1] and layer in APART else Layer.EXPRESSION
         rows.append(layers.setdefault(apart, len(layers)) * len(place) + place[column])
     whole = np.zeros((len(layers), len(place), len(times)))
+    if idle is not None:
+        _begin_idle(whole[0], idle, channels, place, times)
     if own:
         found = samples(own, times)
         values = _kept(found, own, channels, times)
@@ -149,20 +149,18 @@ def _share(gaze: Float64, base: Float64 | None, place: dict[int, int]) -> None:
             base[part] *= 1.0 - np.minimum(share, 1.0)
 
 
-def _add_idle(
+def _begin_idle(
     values: Float64, idle: Idle, channels: list[Channel], place: dict[int, int], times: Float64
 ) -> None:
-    """Let the face do what it does by itself, as far as it is not kept from it, in place."""
+    """Write what the face does by itself, as far as `channels` let it, into rows that are still 0."""
     blinks = idle.blinks
     if fewer := [channel for channel in channels if channel.target.column == presence("blinks").column]:
         blinks = blinks.kept(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
-    shut = blinks.at(times)
-    for lid in _lids():
-        np.maximum(values[place[lid]], shut, out=values[place[lid]])
+    values[[place[lid] for lid in _lids()]] = blinks.at(times)
     moved = idle.motion.at(times)
     if (still := _still(channels, times)) is not None:
         moved *= still
-    values[[place[column] for column in idle.motion.columns]] += moved
+    values[[place[column] for column in idle.motion.columns]] = moved
 
 
 def _kept(found: Samples, own: list[Channel], channels: list[Channel], times: Float64) -> Float64:

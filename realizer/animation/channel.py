@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -13,7 +13,7 @@ import numpy as np
 from realizer.animation.targets import Target
 from realizer.arrays import Float64
 
-__all__ = ["Channel", "Gain", "Joint", "Layer"]
+__all__ = ["Channel", "Gain", "Joint", "Layer", "later"]
 
 
 class Layer(IntEnum):
@@ -125,20 +125,13 @@ class Channel:
             source=source,
         )
 
-    def shifted(self, seconds: float, source: str | None = None) -> Channel:
-        """The same channel, later by `seconds`; made by another `source`, if one is given."""
-        changes: dict[str, object] = {"times": self.times + seconds, "until": self.until + seconds}
-        if self.gains:
-            changes["gains"] = tuple(gain.shifted(seconds) for gain in self.gains)
-        if self.joint is not None:
-            changes["joint"] = self.joint.shifted(seconds)
-        if source is not None:
-            changes["source"] = source
-        return self._with(changes)
+    def shifted(self, seconds: float) -> Channel:
+        """The same channel, later by `seconds`."""
+        return later((self,), seconds, self.source)[0]
 
     def named(self, source: str) -> Channel:
         """The same channel, made by `source`."""
-        return self._with({"source": source})
+        return self.changed({"source": source})
 
     def faded(self, begin: float, end: float) -> Channel:
         """The same channel faded out from `begin` to `end`; an earlier fade stays as it is."""
@@ -150,7 +143,7 @@ class Channel:
         """The same channel with one more gain."""
         return replace(self, gains=(*self.gains, gain))
 
-    def _with(self, changes: Mapping[str, object]) -> Channel:
+    def changed(self, changes: Mapping[str, object]) -> Channel:
         """As `replace`, in a tenth of its time: what changes is as sound as what was there."""
         other = object.__new__(type(self))
         fields = other.__dict__
@@ -180,3 +173,20 @@ class Channel:
         if self.joint is not None:
             first, last = self.joint.at, max(last, self.joint.at + self.joint.length)
         return first, min(last, self.gone, self.until)
+
+
+def later(channels: Sequence[Channel], seconds: float, source: str) -> tuple[Channel, ...]:
+    """The same channels later by `seconds`, made by `source`; those that share their times still do."""
+    shifted: dict[int, Float64] = {}
+    found = []
+    for channel in channels:
+        times = shifted.get(id(channel.times))
+        if times is None:
+            times = shifted[id(channel.times)] = channel.times + seconds
+        changes: dict[str, object] = {"times": times, "until": channel.until + seconds, "source": source}
+        if channel.gains:
+            changes["gains"] = tuple(gain.shifted(seconds) for gain in channel.gains)
+        if channel.joint is not None:
+            changes["joint"] = channel.joint.shifted(seconds)
+        found.append(channel.changed(changes))
+    return tuple(found)

@@ -106,14 +106,14 @@ class Bound:
 
     def lower(self, left: Float32, aus: Float32) -> None:
         """Leave of `left` (u, n), in place, what `aus` (u, n) let it have."""
-        value = np.maximum(aus[self.rows[0]], aus[self.rows[1]])  # (k, n): of two sides the stronger
+        value = np.maximum(*aus.take(self.rows, axis=0))  # (k, n): of two sides the stronger
         half = np.minimum(value, np.float32(0.5))
         value -= half
         value *= self.high
         half *= self.low
         half += self.start
         half += value
-        degree = np.minimum(half[self.stronger[0]], half[self.stronger[1]])
+        degree = np.minimum(*half.take(self.stronger, axis=0))
         most = self.rounds.reduced(degree, np.maximum)
         left[self.units] = np.minimum(left[self.units], 1 - most)
 
@@ -133,10 +133,9 @@ class Bounds:
             return asked
         left = asked.copy()
         if self.opposed.size:
-            first, second = self.opposed
-            more = asked[first] - asked[second]
-            left[first] = np.maximum(more, 0)
-            left[second] = np.maximum(-more, 0)
+            pairs = asked.take(self.opposed, axis=0)  # (2, k, n)
+            pairs -= np.minimum(*pairs)
+            left[self.opposed] = pairs
         if self.taking is not None:
             self.taking.lower(left, asked)
         return left

@@ -186,7 +186,7 @@ class Asking:
         if not len(aus):
             none = np.zeros((0, aus.shape[1]), np.float32)
             return none, none
-        lines = aus[self.rows]
+        lines = aus.take(self.rows, axis=0)
         lines *= self.slopes
         for bend in self.bends:
             lines[bend.lines] += bend.slopes * np.maximum(aus[bend.rows] - bend.knots, 0)
@@ -195,4 +195,4 @@ class Asking:
             np.maximum(lines[:pulls], 0, out=lines[:pulls])
         self.strongest.reduced(lines[:pulls], np.maximum)
         turned = self.sums.reduced(lines[pulls + 1 :], np.add)
-        return np.concatenate([lines[self.raising], turned]), lines[self.lowering]
+        return np.concatenate([lines.take(self.raising, axis=0), turned]), lines.take(self.lowering, axis=0)

@@ -97,7 +97,7 @@ class AUFrames:
 
     @cached_property
     def _asked_rows(self) -> Float32:
-        return self.values.T[list(self.live_aus)]
+        return self.values.T.take(self.live_aus, axis=0)
 
     @cached_property
     def _bounds(self) -> Bounds | None:

@@ -117,8 +117,8 @@ class Motion:
         passed[:] = times
         passed -= self.keys.repeat(frames.ravel()).reshape(passed.shape)
         passed /= self._lengths.repeat(frames.ravel()).reshape(passed.shape)
-        moved: Float64 = smooth(passed)[self.way]
-        frames = frames[self.way].ravel()
+        moved = smooth(passed).take(self.way, axis=0)
+        frames = frames.take(self.way, axis=0).ravel()
         moved *= self._steps.repeat(frames).reshape(moved.shape)
         moved += self.poses.repeat(frames).reshape(moved.shape)
         moved[-len(self.points) :] += self.points.repeat(_frames(self.jumps[None], times)[0], axis=1)
@@ -137,11 +137,11 @@ class Motion:
 
 def _frames(keys: Float64, times: Float64) -> Index:
     """(s, k): at how many of the times (n,) each key (s, k) is the newest; the first one before it too."""
-    first = times.searchsorted(keys.ravel()).reshape(keys.shape)
+    first = times.searchsorted(keys)
     first[:, 0] = 0
     frames = np.empty_like(first)
     np.subtract(first[:, 1:], first[:, :-1], out=frames[:, :-1])
-    frames[:, -1] = len(times) - first[:, -1]
+    np.subtract(len(times), first[:, -1], out=frames[:, -1])
     return frames
 
 
