@@ -111,7 +111,7 @@ def expand(node: Gaze, times: Float64, world: World) -> tuple[Channel, ...]:
     return (
         *turn("eyes", keys, eyes, layer=Layer.GAZE, source=node.id),
         *turn("head", keys, head, layer=Layer.GAZE, source=node.id),
-        *_converge(keys, to.inward * EYES_TAKEN, Layer.GAZE, node.id),
+        *_converge(keys, to.inward, Layer.GAZE, node.id),
         *(
             Channel(presence(region), keys, values, layer=Layer.GAZE, source=node.id)
             for region, values in taken.items()
@@ -127,7 +127,7 @@ def expand_shift(node: GazeShift, times: Float64, world: World) -> tuple[Channel
     return (
         *turn("eyes", keys, [REST, to.first, to.eyes], layer=Layer.BASE, holds=True, source=node.id),
         *turn("head", keys, [REST, REST, to.head], layer=Layer.BASE, holds=True, source=node.id),
-        *_converge(keys, to.inward * EYES_TAKEN[:3], Layer.BASE, node.id, holds=True),
+        *_converge(keys, to.inward, Layer.BASE, node.id, holds=True),
     )
 
 
@@ -141,13 +141,12 @@ def _lead(length: float) -> float:
 
 
 def _converge(
-    times: Float64, inward: Float64, layer: Layer, source: str, holds: bool = False
+    times: Float64, inward: float, layer: Layer, source: str, holds: bool = False
 ) -> tuple[Channel, ...]:
-    """AU66 for eyes that turn in by so many degrees each."""
-    if not inward.any():
+    """AU66 for eyes that turn in by so many degrees each, at the first keys of a gaze or all."""
+    if not inward:
         return ()
-    most = poses.units()[66].degrees
-    values = np.minimum(inward / most, 1.0)
+    values = min(inward / poses.units()[66].degrees, 1.0) * EYES_TAKEN[: len(times)]
     return (Channel(au(66)[0], times, values, layer=layer, holds=holds, source=source),)
 
 

@@ -18,6 +18,7 @@ class Calendar:
     """Events that have not happened."""
 
     def __init__(self) -> None:
+        self._first: Event | None = None
         # Number of a block -> its events, the first one last.
         self._events: dict[int, list[Event]] = {}
         # A heap of the first event of each block, and of others that count no more.
@@ -26,12 +27,11 @@ class Calendar:
     @property
     def next(self) -> float | None:
         """When the first is due; None where there is none."""
-        first = self._first()
-        return None if first is None else first.time
+        return None if self._first is None else self._first.time
 
     def due(self, now: float) -> Iterator[Event]:
         """Take what is due out, in order; what is put in meanwhile comes in its turn."""
-        while (first := self._first()) is not None and first.time <= now:
+        while (first := self._first) is not None and first.time <= now:
             events = self._events[first.block]
             events.pop()
             if events:
@@ -39,6 +39,7 @@ class Calendar:
             else:
                 heapq.heappop(self._firsts)
                 del self._events[first.block]
+            self._look()
             yield first
 
     def put(self, playing: Playing, only: Collection[tuple[str, str]] | None = None) -> None:
@@ -59,6 +60,7 @@ class Calendar:
         if len(self._firsts) > 2 * len(self._events) + SPARE:
             self._firsts = [events[-1] for events in self._events.values()]
             heapq.heapify(self._firsts)
+        self._look()
 
     def pending(self, playing: Playing) -> set[tuple[str, str]]:
         """The sync points of a block that have not passed, as (behaviour, sync)."""
@@ -66,14 +68,16 @@ class Calendar:
 
     def drop(self, playing: Playing) -> None:
         """Take out all that is still to happen in a block."""
-        self._events.pop(playing.number, None)
+        if self._events.pop(playing.number, None) is not None:
+            self._look()
 
-    def _first(self) -> Event | None:
-        """What comes first; what was dropped is taken off the top."""
+    def _look(self) -> None:
+        """Find what comes first; what was dropped is taken off the top."""
+        self._first = None
         while self._firsts:
             first = self._firsts[0]
             events = self._events.get(first.block)
             if events and events[-1] is first:
-                return first
+                self._first = first
+                return
             heapq.heappop(self._firsts)
-        return None

@@ -50,9 +50,9 @@ class Cast:
 
     def forget(self, before: float) -> list[Playing]:
         """Drop the blocks of which nothing is to be seen from a time on; returns them."""
+        if self.first_gone >= before:
+            return []
         gone = [p for p in self._ended if p.gone < before]
-        if not gone:
-            return gone
         self._ended = [p for p in self._ended if p.gone >= before]
         self.first_gone = min((p.gone for p in self._ended), default=FOREVER)
         for playing in gone:

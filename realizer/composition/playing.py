@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bml_schema import Block, SyncRef, without
-from realizer.animation.channel import Channel, Gain, Layer
+from realizer.animation.channel import Channel, Gain, Layer, later
 from realizer.animation.joints import joined
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Kind, World
@@ -271,10 +271,9 @@ class Playing:
         if behaviour in self.speech:
             self.speech[behaviour] = replace(self.speech[behaviour], utterance=utterance)
 
-    def _placed(self, behaviour: str, channels: Iterable[Channel]) -> tuple[Channel, ...]:
+    def _placed(self, behaviour: str, channels: Sequence[Channel]) -> tuple[Channel, ...]:
         """Channels of a behaviour on the session clock."""
-        name = f"{self.block.id}:{behaviour}"
-        return tuple([c.shifted(self.start, name) for c in channels])
+        return later(channels, self.start, f"{self.block.id}:{behaviour}")
 
     def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
         """End behaviours at `now`: what is shown relaxes without a jump, what has not begun never comes.

@@ -39,9 +39,11 @@ class Library(Mapping[str, Expression]):
                 notes.append(f"{one.file}: {one.name} takes the place of the shipped {before.name}")
             self._known[key(one.name)] = one
         self.notes = tuple(notes)
+        self._as_written = {one.name: one for one in self._known.values()}
 
     def __getitem__(self, name: str) -> Expression:
-        return self._known[key(name)]
+        # Nearly always it is spelt as it is written here.
+        return self._as_written.get(name) or self._known[key(name)]
 
     def __iter__(self) -> Iterator[str]:
         return (one.name for one in self._known.values())

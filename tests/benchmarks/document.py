@@ -11,9 +11,9 @@ Blocks of cross-linked behaviours (nod, shake, smile, brows, gaze, emotion), eac
     stretch   the longest of what nobody can interrupt: reading, or planning to taking in
 
 Medians over many documents of a session that goes on, in milliseconds; then the least of `together`, which
-other work on the machine disturbs less. `noise` is how much longer than usual the slowest twentieth took of the
-runs of one piece of work that does nothing else, between the documents. `growth` is the exponent of the time in
-the number of behaviours, from 6 to 60: 1 is linear. Measures only; nothing asserts a time.
+other work on the machine disturbs less. `noise` is how much longer than usual the slowest twentieth took of
+the runs of one piece of work that does nothing else, between the documents. `growth` is the exponent of the
+time in the number of behaviours, from 6 to 60: 1 is linear. Measures only; nothing asserts a time.
 """
 
 from __future__ import annotations
