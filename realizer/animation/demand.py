@@ -14,7 +14,7 @@ from realizer.animation.targets import AU_NAMES, axis
 from realizer.arrays import Bool, Float32, Index
 from realizer.tables import AuToFap
 
-__all__ = ["Asking", "Demand"]
+__all__ = ["LOWERS", "RAISES", "Asking", "Demand"]
 
 # What a polyline counts among, of its FAP: those that raise it, those that lower it, those that add up.
 RAISES, LOWERS, TURNS = range(3)
@@ -107,9 +107,12 @@ class Demand:
             sums=sums,
             raising=np.array([at.get(3 * fap + RAISES, none) for fap in faps], np.intp),
             lowering=np.array([at.get(3 * fap + LOWERS, none) for fap in faps], np.intp),
+            sides=frozenset(at),
         )
 
     def _bends(self, lines: Index, row: Index) -> tuple[Bends, ...]:
+        if not self.bends:
+            return ()
         place = {line: i for i, line in enumerate(lines.tolist())}
         found: list[list[tuple[int, int, float, float]]] = []
         for line, before, knot, slope in self.bends:
@@ -157,6 +160,7 @@ class Asking:
         bends: the first ones of all lines, the second ones, ..
         strongest, sums: how lines are taken together: the first of them, and those that turn something.
         raising, lowering: (f - turning,) the lines that raise and lower each FAP most, once that is done.
+        sides: 3 * (FAP - 1) + RAISES or LOWERS of those that something raises or lowers.
     """
 
     faps: Index
@@ -167,14 +171,7 @@ class Asking:
     sums: Rounds
     raising: Index
     lowering: Index
-
-    def raises(self, fap: int) -> bool:
-        """Whether anything raises a FAP (column), and it does not turn."""
-        return 3 * fap + RAISES in self.strongest.groups
-
-    def lowers(self, fap: int) -> bool:
-        """Whether anything lowers a FAP (column), and it does not turn."""
-        return 3 * fap + LOWERS in self.strongest.groups
+    sides: frozenset[int]
 
     def of(self, aus: Float32) -> tuple[Float32, Float32]:
         """What AUs (u, n) ask of `faps`.

@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from realizer import tables
-from realizer.animation.demand import Asking, Demand
+from realizer.animation.demand import LOWERS, RAISES, Asking, Demand
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.targets import AU_NAMES, axis, presence
@@ -120,7 +120,9 @@ def _plan(demand: Demand, live: tuple[int, ...], given: tuple[int, ...]) -> _Pla
         lids=tuple(
             (row[pair[0]], lids, demand.closed[pair[0]])
             for pair in eyes
-            if asking.raises(pair[0]) and (lids := [row[lid] for lid in pair if asking.lowers(lid)])
+            if demand.closed[pair[0]] > 0
+            and 3 * pair[0] + RAISES in asking.sides
+            and (lids := [row[lid] for lid in pair if 3 * lid + LOWERS in asking.sides])
         ),
         combinations=tuple((unit[one], unit[other], row[fap], value) for one, other, fap, value in together),
         gaps=tuple((row[upper], row[lower]) for upper, lower in eyes),

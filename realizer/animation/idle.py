@@ -42,7 +42,7 @@ SACCADE = {(62, 61): 1.4, (63, 64): 0.9}
 # Eyes stay where they look while the head sways: they turn back by as much as it turns (degrees).
 COUNTER = {(52, 51): (61, 62), (53, 54): (64, 63)}
 # Poses are worked out from one multiple of so many to another, and the latest are kept, 5 kB each: sessions
-# of one seed share them, and windows that begin within 8 s of each other.
+# of one seed share them, and windows that begin close to each other.
 BATCH, KEPT = 8, 512
 
 
