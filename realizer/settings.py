@@ -296,7 +296,7 @@ class Settings:
     )
     max_size: int = _setting(2048, _number(int, 16, 16384), "pixels of a picture's longer side")
     max_pixels: float = _setting(
-        125e6, _number(float, 256, 1e12), "pixels a second of one stream of pictures: 1920x1080 at 60"
+        125e6, _number(float, 256, 1e12), "pixels a second of the pictures of one session: 1920x1080 at 60"
     )
     max_speech: int = _setting(20_000, _number(int, 1, 10**7), "characters of one speech in a document")
     max_rate: float = _setting(

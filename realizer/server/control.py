@@ -185,6 +185,10 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
         told |= {"rate": message.rate, "frame": subscription.next, "fps": 50.0}
     elif stream == "video":
         subscription = session.broadcast.pictures(index, fps, _look(session, message, index), t)
+        views = [view for view in session.views(but=old) if view is not subscription.view]
+        beside = sum(view.look.size[0] * view.look.size[1] * view.timeline.fps for view in views)
+        if (beyond := too_many_pixels(message.size, fps, session.settings, beside)) is not None:
+            raise Wrong("fps", beyond)
         told |= {"fps": fps, "frame": subscription.next, "size": message.size}
         told |= {"face": session.face_name(index), "media_type": PICTURES[message.format]}
     else:
@@ -215,8 +219,6 @@ def _look(session: Session, message: Subscribe, index: int) -> Look:
     if not all(16 <= side <= largest for side in message.size):
         words = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {raises('max_size')}"
         raise Wrong("size", words)
-    if (beyond := too_many_pixels(message.size, message.fps or settings.fps, settings)) is not None:
-        raise Wrong("fps", beyond)
     if message.light is not None and message.light not in presets():
         raise Wrong("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
     face = session.face(index)

@@ -65,13 +65,18 @@ def too_long(block: Block, schedule: Schedule, settings: Settings) -> str | None
     return f"{words} {raises('max_duration')}"
 
 
-def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings) -> str | None:
-    """Why pictures of that size are not drawn at that rate; None where they are."""
+def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings, beside: float = 0.0) -> str | None:
+    """Why pictures of that size are not drawn at that rate; None where they are.
+
+    Args:
+        beside: pixels a second of the other pictures of the session; one that several look at counts once.
+    """
     pixels = size[0] * size[1] * fps
-    if pixels <= settings.max_pixels:
+    if pixels + beside <= settings.max_pixels:
         return None
-    words = f"wanted at most {settings.max_pixels:g} pixels a second, got {pixels:g}"
-    return f"{words}, {size[0]}x{size[1]} at {fps:g} fps {raises('max_pixels')}"
+    words = f"wanted at most {settings.max_pixels:g} pixels a second of a session's pictures, got {pixels:g}"
+    more = f" beside {beside:g} of others" if beside else ""
+    return f"{words}, {size[0]}x{size[1]} at {fps:g} fps{more} {raises('max_pixels')}"
 
 
 def used_up(settings: Settings) -> str | None:

@@ -16,7 +16,7 @@ from realizer.player import HISTORY, Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
 from realizer.server.clips import ClipError, Clips
-from realizer.server.connection import STUCK, Connection
+from realizer.server.connection import STUCK, Connection, PictureSubscription, Subscription, View
 from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.feedback_log import FeedbackLog
@@ -152,6 +152,12 @@ class Session:
         """How many frames, pictures and packets a client did not get because it was slow."""
         known = self._connections.get(connection)
         return 0 if known is None else known.dropped
+
+    def views(self, but: Subscription | None = None) -> list[View]:
+        """The pictures that are drawn for its connections, each once; without those of one subscription."""
+        subscriptions = [s for c in self._connections.values() for s in c.subscriptions.values()]
+        looking = [s for s in subscriptions if isinstance(s, PictureSubscription) and s is not but]
+        return list({s.view.key: s.view for s in looking}.values())
 
     def expired(self, now: float) -> bool:
         """Nobody has been here for `settings.keep` seconds."""

@@ -59,7 +59,9 @@ class Limits(Reply):
     connections: int = Field(description="from one address")
     rate: float = Field(description="messages a second that are read from a connection")
     picture: int = Field(description="pixels of a longer side")
-    pixels: float = Field(description="pixels a second of one stream of pictures")
+    pixels: float = Field(
+        description="pixels a second of the pictures of a session, each of which counts once"
+    )
     fps: float = Field(description="frames a second")
     keep: float = Field(description="seconds a named session outlives its connections")
 

@@ -205,6 +205,27 @@ def test_a_speech_that_is_open_is_known_from_its_first_message_on(drive) -> None
     assert not client.of("error")
 
 
+def test_the_pictures_of_a_session_are_bounded_together_and_a_shared_one_counts_once(drive) -> None:
+    driver = drive(max_pixels=64 * 64 * 50)
+    driver.join(2)
+
+    def look(connection: int, **asked) -> str:
+        """The answer to a subscription of pictures, 64 x 64 at 25 a second."""
+        message = {"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 25, **asked}
+        return driver.send(message, connection).json[-1]["type"]
+
+    assert look(1) == look(2) == "subscribed"  # the same picture
+    assert look(2, light="evening") == "subscribed"  # its own, in place of that
+    assert look(1, character="Ada", light="evening") == "subscribed"  # the first and only one there is
+    assert look(2, camera="three-quarter") == "error"  # a third one
+    (error,) = driver.clients[2].of("error")
+    assert error["where"] == "subscribe.fps"
+    assert "REALIZER_MAX_PIXELS" in error["message"]
+    driver.send({"type": "unsubscribe", "stream": "video"})
+    driver.send({"type": "unsubscribe", "stream": "video", "character": "Ada"})
+    assert look(2, camera="three-quarter") == "subscribed"
+
+
 def test_times_are_told_to_the_microsecond(drive) -> None:
     driver = drive()
     driver.run(1 / 3)

@@ -110,6 +110,8 @@ def test_large_pictures_are_drawn_at_a_low_rate_only() -> None:
     words = too_many_pixels((201, 200), 25.0, settings)
     assert words is not None
     assert "201x200 at 25 fps (REALIZER_MAX_PIXELS sets it)" in words
+    assert too_many_pixels((100, 100), 25.0, settings, 750_000) is None
+    assert "beside 750001 of others" in str(too_many_pixels((100, 100), 25.0, settings, 750_001))
 
 
 def test_every_limit_has_words_of_its_own_in_the_settings() -> None:
