@@ -171,7 +171,7 @@ class PredictionFeedback:
                 + _given("bmla:status", block.status)
             )
             if told:
-                writer.name(bmla("status"))  # which declares the prefix
+                writer.prefixes[BMLA] = "bmla"
             times = "" if start is None else f' globalStart="{_seconds(start)}"'
             if end is not None:
                 times += f' globalEnd="{_seconds(end)}"'
@@ -302,12 +302,16 @@ def _whole(value: str) -> int | None:
     return int(value) if value.isdecimal() and len(value) < 20 else None
 
 
+# s; up to here a double tells microseconds apart, so that six digits are what rounding leaves of it.
+_EXACT = 1e9
 _CORE = f' xmlns="{CORE}"'
 _OURS = f' xmlns:realizer="{OWN}"'
 
 
 def _seconds(time: float) -> str:
     """To the microsecond, and never with an exponent."""
+    if -_EXACT < time < _EXACT:
+        return f"{time:.6f}".rstrip("0").rstrip(".")
     return decimal(round(time, 6))
 
 

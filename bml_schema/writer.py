@@ -22,6 +22,7 @@ from bml_schema.nodes import (
 )
 from bml_schema.shape import Attribute, shape_of, sync_ref
 from bml_schema.sync_refs import SyncRef
+from bml_schema.values import decimal
 
 __all__ = ["write"]
 
@@ -122,7 +123,8 @@ class Writer:
             if spec.required or value != spec.default:
                 out += self._attribute(spec, value)
         for point in _ordered(node):
-            out += _value(point, str(node.syncs[point]))
+            ref = node.syncs[point]
+            out += f' {point}="{decimal(ref.offset)}"' if ref.behaviour is None else _value(point, str(ref))
         for name, text in getattr(node, "foreign", {}).items():
             out += _value(self.name(name, attribute=True), text)
         return out

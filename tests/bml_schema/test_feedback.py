@@ -31,6 +31,7 @@ from bml_schema import (
     parse_feedback,
     predicted,
 )
+from bml_schema.values import decimal
 from tests.strategies import blocks, names, xml_text
 
 # Times go out to the microsecond.
@@ -251,3 +252,13 @@ def test_the_end_of_a_block_says_how_far_its_speech_came() -> None:
     assert parse_feedback(told.to_xml(3)) == told
     silent = parse_feedback(BlockProgress(id="b:end", global_time=1.0, said="").to_xml())
     assert (silent.said, silent.last_word) == ("", None)
+
+
+@given(
+    st.floats(-1e12, 1e12)
+    | st.integers(-(10**12), 10**12)
+    | st.integers(-(10**7), 10**7).map(lambda n: n / 2e6)
+)
+def test_times_are_written_to_the_microsecond_as_rounding_has_them(time: float) -> None:
+    told = BlockProgress(id="b:end", global_time=time).to_xml()
+    assert f'globalTime="{decimal(round(float(time), 6))}"' in told
