@@ -25,7 +25,7 @@ from realizer.scheduling.squeeze import squeeze
 __all__ = ["Solution", "solve"]
 
 # Points up to which plain floats are quicker than arrays.
-FEW = 64
+FEW = 128
 
 
 @dataclass(frozen=True, slots=True)
