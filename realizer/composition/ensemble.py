@@ -159,6 +159,12 @@ class Ensemble:
     def _happens(self, event: Event, playing: Playing) -> None:
         block, time = playing.block, event.time
         match event.phase:
+            case Phase.SYNC:
+                self.reports.tell(sync_progress(block, event.name, event.sync, time, playing.start))
+                if event.point == 0:
+                    node = block[event.name]
+                    if (act := self.kinds[node.tag].act) is not None:
+                        self._act(playing, event.name, act(node), time)
             case Phase.START:
                 playing.state = State.IN_EXEC
                 playing.waits.clear()
@@ -168,12 +174,6 @@ class Ensemble:
                     if not self.activate(id, time):
                         text = f"onStart: wanted a block that was preplanned and waits, got {id!r}"
                         self.reports.warn(Warning(block.id, "EXECUTION_FAILURE", text), block.character_id)
-            case Phase.SYNC:
-                self.reports.tell(sync_progress(block, event.name, event.sync, time, playing.start))
-                if event.point == 0:
-                    node = block[event.name]
-                    if (act := self.kinds[node.tag].act) is not None:
-                        self._act(playing, event.name, act(node), time)
             case Phase.SUBSIDES:
                 playing.state = State.SUBSIDING
                 self.reports.tell(prediction(block, playing.schedule, playing.state))
