@@ -177,6 +177,10 @@ class Player:
         """
         self._blocks.anticipate(id, syncs, now)
 
+    def lapse(self, id: str) -> None:
+        """Expect no point of an anticipator any more: nothing alive is tied to it."""
+        self._blocks.cast.lapse([id])
+
     def respeak(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
         """Take what a voice says of its real timing while it speaks: the rest of the block follows.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -118,6 +118,17 @@ class Cast:
         known = {**self._anticipated.behaviours.get(id, {}), **syncs}
         points = {**self._anticipated.points, id: tuple(known)}
         times = {**self._anticipated.times, id: np.array(list(known.values()))}
+        self._anticipated = replace(self._anticipated, points=points, times=times)
+
+    @property
+    def anticipators(self) -> Collection[str]:
+        """The ids of all, the one that was first named first."""
+        return self._anticipated.points.keys()
+
+    def lapse(self, ids: Collection[str]) -> None:
+        """Their points are anticipated no more."""
+        points = {id: names for id, names in self._anticipated.points.items() if id not in ids}
+        times = {id: self._anticipated.times[id] for id in points}
         self._anticipated = replace(self._anticipated, points=points, times=times)
 
     def latest(self, schedule: Schedule) -> Schedule:

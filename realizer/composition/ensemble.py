@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 
 from bml_schema import Block, Feedback
 from realizer.behaviours.kind import Act, Kind, World
@@ -29,6 +30,8 @@ from realizer.speech.utterance import Utterance
 __all__ = ["Ensemble"]
 
 FOREVER = float("inf")
+# More than so many anticipators are forgotten, the oldest first, where no block is tied to them.
+ANTICIPATORS = 2_000
 
 
 class Ensemble:
@@ -247,6 +250,10 @@ class Ensemble:
         tied = [p for p in self.cast.alive() if p.start < FOREVER and id in anticipated(p.block)]
         soonest = {sync: max([now, *(lead(p, id, sync, now) for p in tied)]) for sync in syncs}
         self.cast.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
+        if (beyond := len(self.cast.anticipators) - ANTICIPATORS) > 0:
+            wanted = {id}.union(*(anticipated(p.block) for p in self.cast.alive()))
+            old = (name for name in self.cast.anticipators if name not in wanted)
+            self.cast.lapse(set(islice(old, beyond)))
         for playing in tied:
             self.course.solve_again([playing, *self.course.tied(playing, now)], playing.start, now)
 

@@ -126,7 +126,7 @@ class Speeches:
             self._anticipate(speech, t + OPEN, t)
         elif speech.over:
             if message.close:
-                del self._speeches[message.id]
+                self._forget(message.id)
             return
         elif speech.closed:
             raise SpeechError(
@@ -147,7 +147,7 @@ class Speeches:
         for speech in [s for s in self._speeches.values() if s.connection == connection and not s.closed]:
             speech.close()
             if speech.over:
-                del self._speeches[speech.id]
+                self._forget(speech.id)
 
     def __contains__(self, block: str) -> bool:
         """Whether a block is one of a speech that is not over."""
@@ -235,11 +235,11 @@ class Speeches:
             return feedback, frozenset()
         left = frozenset({*speech.ahead, *speech.owed})
         if feedback.status not in CUT_OFF:
-            del self._speeches[speech.id]
+            self._forget(speech.id)
             return feedback, left
         speech.over = True
         if speech.closed:
-            del self._speeches[speech.id]
+            self._forget(speech.id)
         words = [word for piece in speech.ahead for word in self._words(piece, feedback.global_time)]
         return replace(feedback, said=" ".join([*speech.said, *words])), left
 
@@ -292,6 +292,10 @@ class Speeches:
             return ref
         piece = self._speeches[ref.block or ""].marks.get(ref.sync or "")
         return ref if piece is None else replace(ref, block=piece)
+
+    def _forget(self, id: str) -> None:
+        del self._speeches[id]
+        self._player.lapse(ENDS + id)
 
     def _anticipate(self, speech: _Speech, end: float, t: float) -> None:
         speech.end = end

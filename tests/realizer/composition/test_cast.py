@@ -71,6 +71,18 @@ def test_the_newest_of_an_id_counts() -> None:
     assert schedule.start == 5.0
 
 
+def test_points_that_lapse_are_known_no_more_and_the_others_are() -> None:
+    cast = Cast()
+    for id in ("clock", "music"):
+        cast.anticipate(id, {"beat": 3.0})
+    cast.lapse(["clock", "never"])
+    assert list(cast.anticipators) == ["music"]
+    schedule = cast.schedule_of("anticipators")
+    assert schedule is not None
+    assert schedule.at("music", "beat") == 3.0
+    assert "clock" not in schedule.times
+
+
 def test_anticipated_points_are_those_of_a_block_of_their_own() -> None:
     cast = Cast()
     cast.anticipate("clock", {"beat": 3.0})

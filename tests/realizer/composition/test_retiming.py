@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bml_schema import Block, PredictionFeedback, SyncPointProgress, parse
+from realizer.composition.ensemble import ANTICIPATORS
 from realizer.composition.retiming import touched
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule
@@ -154,6 +155,19 @@ def test_a_behaviour_follows_a_point_that_is_anticipated(stage: Stage) -> None:
     times = stage.times()
     assert times["a:n:stroke"] == pytest.approx(4.0)
     assert times["a:n:start"] < 2.2, "it had begun by then"
+
+
+def test_of_many_anticipators_the_oldest_are_forgotten_but_not_what_a_block_is_tied_to(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
+    stage.send("a", BEAT)
+    for number in range(ANTICIPATORS + 5):
+        stage.player.anticipate(f"other-{number}", {"beat": 9.0}, 0.0)
+    known = stage.player.cast.anticipators
+    assert len(known) == ANTICIPATORS
+    assert {"clock", f"other-{ANTICIPATORS + 4}"} <= set(known)
+    assert "other-0" not in known
+    stage.player.anticipate("clock", {"beat": 4.0}, 1.0)
+    assert stage.times()["a:n:stroke"] == pytest.approx(4.0)
 
 
 def test_what_has_passed_does_not_follow_an_estimate_that_comes_late(stage: Stage) -> None:
