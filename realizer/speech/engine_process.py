@@ -8,8 +8,9 @@ import os
 import subprocess
 import sys
 import threading
+import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -19,6 +20,7 @@ from realizer.errors import VoiceError
 __all__ = ["RUN", "Engine", "EngineProcess"]
 
 RUN = Path(__file__).with_name("engine_worker.py")
+LOOKS = 20  # at a request, in the time it may take
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +52,7 @@ class EngineProcess:
         self._options = options
         self._limit = limit
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._running: _Running | None = None
         self._end: weakref.finalize[..., EngineProcess] | None = None
         self._owner = os.getpid()
         self._hello: dict[str, Any] = {}
@@ -58,8 +60,8 @@ class EngineProcess:
     @property
     def pid(self) -> int | None:
         """The process's id while it runs."""
-        process = self._process
-        return None if process is None else process.pid
+        running = self._running
+        return None if running is None else running.process.pid
 
     def hello(self) -> dict[str, Any]:
         """What the engine said of itself: rate, voices, variants. Starts it if needed.
@@ -79,20 +81,16 @@ class EngineProcess:
             VoiceError: it is not installed, refused, died or hung; the next call starts it afresh.
         """
         with self._lock:
-            process = self._started()
-            watchdog = threading.Timer(self._limit, process.kill)
-            watchdog.daemon = True
-            watchdog.start()
+            running = self._started()
             try:
-                head, body = _exchange(process, request)
+                with running.waiting(self._limit):
+                    head, body = _exchange(running.process, request)
             except (OSError, ValueError) as error:
                 self._stop()
                 raise VoiceError(
                     f"{self._engine.name} ended or did not answer within {self._limit:g} s ({error}); "
                     "the next text starts it again"
                 ) from None
-            finally:
-                watchdog.cancel()
             if head["last"]:
                 self._stop()
         if "error" in head:
@@ -101,18 +99,18 @@ class EngineProcess:
 
     def close(self) -> None:
         """End the process, also under a request of another thread. May be called twice."""
-        process = self._process
-        if process is not None and self._owner == os.getpid():
-            process.kill()  # a request in progress sees the end of the pipe and lets go of the lock
+        running = self._running
+        if running is not None and self._owner == os.getpid():
+            running.process.kill()  # a request in progress sees the end of the pipe and lets go of the lock
         with self._lock:
             self._stop()
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _started(self) -> _Running:
         if self._owner != os.getpid():  # after a fork of ours the process belongs to our parent
-            self._process, self._end, self._owner = None, None, os.getpid()
-        if self._process is not None:
-            if self._process.poll() is None:
-                return self._process
+            self._running, self._end, self._owner = None, None, os.getpid()
+        if self._running is not None:
+            if self._running.process.poll() is None:
+                return self._running
             self._stop()  # it died while nobody asked
         fix = self._engine.missing()
         if fix:
@@ -124,27 +122,61 @@ class EngineProcess:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )
-        self._process = process
-        self._end = weakref.finalize(self, _end, process)
-        watchdog = threading.Timer(self._limit, process.kill)
-        watchdog.daemon = True
-        watchdog.start()
+        self._running = running = _Running(process, self._limit)
+        self._end = weakref.finalize(self, running.end)
         try:
-            hello = json.loads(_pipe(process.stdout).readline())
+            with running.waiting(self._limit):
+                hello = json.loads(_pipe(process.stdout).readline())
         except (OSError, ValueError):
             hello = {"error": "it ended while it started"}
-        finally:
-            watchdog.cancel()
         if "error" in hello:
             self._stop()
             raise VoiceError(f"{self._engine.name} does not start: {hello['error']}")
         self._hello = hello
-        return process
+        return running
 
     def _stop(self) -> None:
-        end, self._process, self._end = self._end, None, None
+        end, self._running, self._end = self._end, None, None
         if end is not None and self._owner == os.getpid():
             end()
+
+
+class _Running:
+    """A process that is killed when it lets somebody wait too long.
+
+    One thread watches for its whole life: one for each request took as long as what surrounds the request.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], limit: float) -> None:
+        self.process = process
+        self._every = limit / LOOKS
+        self._until = float("inf")  # when somebody will have waited too long
+        self._over = threading.Event()
+        threading.Thread(target=self._look, name="watch", daemon=True).start()
+
+    @contextlib.contextmanager
+    def waiting(self, limit: float) -> Iterator[None]:
+        """While the caller waits for it, at most so many seconds."""
+        self._until = time.monotonic() + limit
+        try:
+            yield
+        finally:
+            self._until = float("inf")
+
+    def end(self) -> None:
+        """Kill it and let go of it."""
+        self._over.set()
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):  # what was still to be written has no reader
+                    pipe.close()
+
+    def _look(self) -> None:
+        while not self._over.wait(self._every):
+            if time.monotonic() > self._until:
+                self.process.kill()
 
 
 def _exchange(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
@@ -164,12 +196,3 @@ def _exchange(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tupl
 def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
     assert pipe is not None
     return pipe
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    process.wait()
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with contextlib.suppress(OSError):  # what was still to be written has no reader
-                pipe.close()

@@ -205,10 +205,10 @@ def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
 @pytest.mark.espeak
 def test_an_engine_that_is_killed_while_nobody_asks_costs_nothing(voice: EspeakVoice) -> None:
     voice.say(Say("Before it died."))
-    engine = voice._process._process
+    engine = voice._process._running
     assert engine is not None
-    engine.kill()
-    engine.wait()
+    engine.process.kill()
+    engine.process.wait()
     assert voice.say(Say("After it died.")).duration > 0.5
 
 
