@@ -10,7 +10,10 @@ from typing import Literal, Protocol, get_args
 
 from realizer.errors import RealizerError
 
-__all__ = ["Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost"]
+__all__ = ["KEPT", "Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost"]
+
+# Sessions whose process died and that nobody came back to are forgotten after so long.
+KEPT = 7 * 24 * 3600  # s
 
 # join, leave: of a connection. text, sound: a message of one. spoken: a voice answered. tick: something that
 # waited was read or planned.

@@ -7,8 +7,9 @@ import secrets
 import sqlite3
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from time import time
 
-from realizer.server.journal.entry import Entry, JournalError, Kept, Lost
+from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
 
 __all__ = ["LocalJournal"]
 
@@ -19,6 +20,15 @@ CREATE INDEX IF NOT EXISTS of_session ON entries (session, n);
 CREATE TABLE IF NOT EXISTS parts (
     session TEXT NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL, PRIMARY KEY (session, name)
 );
+"""
+# POSIX seconds at which something was done to each session last.
+LAST = """
+SELECT id, epoch + max(
+    coalesce((SELECT json_extract(line, '$.at') FROM entries
+        WHERE session = id AND json_valid(line) ORDER BY n DESC LIMIT 1), 0),
+    coalesce((SELECT json_extract(text, '$.at') FROM parts
+        WHERE session = id AND name = 'state' AND json_valid(text)), 0)
+) FROM sessions
 """
 # How long a write waits for another worker's.
 BUSY = 2.0  # s
@@ -43,6 +53,10 @@ class LocalJournal:
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
             self._file.executescript(TABLES)
+        with self._at_once():
+            for session, last in self._file.execute(LAST).fetchall():
+                if last < time() - KEPT:
+                    self._forget(session)
 
     def begin(self, session: str, epoch: float) -> None:
         with self._at_once():

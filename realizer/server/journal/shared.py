@@ -8,15 +8,13 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from realizer.server.journal.entry import Entry, JournalError, Kept, Lost
+from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
 
 __all__ = ["SharedJournal"]
 
 PATIENCE = 1.0  # s for an answer
 # Everybody waits for it meanwhile: who has not answered in that time is not asked again before so long.
 PAUSE = 4.0  # s
-# Sessions whose node died and that nobody came back to are forgotten after so long.
-KEPT = 7 * 24 * 3600  # s
 
 # KEYS: of the head (owner, epoch), of the list of entries, and of the parts by name. Nobody comes between
 # the look and the write, and who restarts the store finds all of a script's writes in its log, or none.

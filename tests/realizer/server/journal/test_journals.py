@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from realizer.server.journal import Entry, JournalError, Kept, Lost, journal_at
+from realizer.server.journal.entry import KEPT
 from realizer.server.journal.local import LocalJournal
 
 ENTRIES = [
@@ -22,6 +23,19 @@ ENTRIES = [
 @pytest.fixture
 def session() -> str:
     return f"s-{uuid.uuid4()}"
+
+
+class Clock:
+    """What the journals take for the time."""
+
+    now = 1000.0
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("realizer.server.journal.local.time", lambda: clock.now)
+    return clock
 
 
 def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, session: str) -> None:
@@ -123,6 +137,24 @@ def test_a_journal_that_cannot_be_had_says_so_without_its_password(where: str) -
     with pytest.raises(JournalError, match=r"^the journal \S+: \w") as fault:
         journal_at(where)
     assert "hush" not in str(fault.value)
+
+
+def test_sessions_that_nobody_came_back_to_are_forgotten_in_the_end(tmp_path: Path, clock: Clock) -> None:
+    begin, path = clock.now, str(tmp_path / "journal.db")
+    journal = journal_at(path)
+    for name in ("left", "entry", "checkpoint", "both"):
+        journal.begin(name, begin)
+    journal.add("entry", Entry(100.0, "sound", 1, b"x"))
+    journal.compact("checkpoint", {"state": '{"at": 100.0}', "clip:c": "{}"})
+    journal.compact("both", {"state": '{"at": 50.0}'})
+    journal.add("both", Entry(100.0, "tick"))
+    clock.now = begin + KEPT + 1
+    journal = journal_at(path)
+    assert journal.take("left") is None
+    assert all(journal.take(name) is not None for name in ("entry", "checkpoint", "both"))
+    clock.now = begin + KEPT + 101
+    journal = journal_at(path)
+    assert not any(journal.take(name) for name in ("entry", "checkpoint", "both"))
 
 
 def test_a_file_that_is_no_journal_is_not_written_to(tmp_path: Path) -> None:
