@@ -113,7 +113,7 @@ def _layers(
         at = found.spread(np.array(rows) * len(times))
         at += found.frames
         adding = found.spread(np.array(adds))
-        some, others = np.flatnonzero(adding), np.flatnonzero(~adding)
+        some, others = adding.nonzero()[0], (~adding).nonzero()[0]
         np.add.at(whole.reshape(-1), at[some], values[some])
         np.maximum.at(whole.reshape(-1), at[others], values[others])
     one, base, gaze = (

@@ -112,17 +112,26 @@ class Motion:
 
     def at(self, times: Float64) -> Float64:
         """(m, n) 0..1 at times (n,), not falling, within the span."""
-        frames = _frames(self.keys, times)
-        passed = np.empty((len(self.keys), len(times)))
+        keys, ends = self._ends
+        frames = _frames(keys, ends, times)
+        sways, at_points = frames[: self.keys.size], frames[self.keys.size :]
+        shape = (len(self.keys), len(times))
+        passed = np.empty(shape)
         passed[:] = times
-        passed -= self.keys.repeat(frames.ravel()).reshape(passed.shape)
-        passed /= self._lengths.repeat(frames.ravel()).reshape(passed.shape)
+        passed -= self.keys.repeat(sways).reshape(shape)
+        passed /= self._lengths.repeat(sways).reshape(shape)
         moved = smooth(passed).take(self.way, axis=0)
-        frames = frames.take(self.way, axis=0).ravel()
-        moved *= self._steps.repeat(frames).reshape(moved.shape)
-        moved += self.poses.repeat(frames).reshape(moved.shape)
-        moved[-len(self.points) :] += self.points.repeat(_frames(self.jumps[None], times)[0], axis=1)
+        sways = sways.reshape(self.keys.shape).take(self.way, axis=0).ravel()
+        moved *= self._steps.repeat(sways).reshape(moved.shape)
+        moved += self.poses.repeat(sways).reshape(moved.shape)
+        moved[-len(self.points) :] += self.points.repeat(at_points, axis=1)
         return moved
+
+    @cached_property
+    def _ends(self) -> tuple[Float64, Index]:
+        """All keys, those of the jumps last, and which of them are the last of their kind."""
+        keys = np.concatenate([self.keys.ravel(), self.jumps])
+        return keys, np.append(np.arange(1, len(self.keys) + 1) * self.keys.shape[1], len(keys)) - 1
 
     @cached_property
     def _lengths(self) -> Float64:
@@ -135,13 +144,13 @@ class Motion:
         return np.diff(self.poses, append=self.poses[:, -1:])
 
 
-def _frames(keys: Float64, times: Float64) -> Index:
-    """(s, k): at how many of the times (n,) each key (s, k) is the newest; the first one before it too."""
+def _frames(keys: Float64, ends: Index, times: Float64) -> Index:
+    """(k,): at how many of the times (n,) each key (k,) is the newest; a first one before it too."""
     first = times.searchsorted(keys)
-    first[:, 0] = 0
+    first[ends[:-1] + 1] = first[0] = 0
     frames = np.empty_like(first)
-    np.subtract(first[:, 1:], first[:, :-1], out=frames[:, :-1])
-    np.subtract(len(times), first[:, -1], out=frames[:, -1])
+    np.subtract(first[1:], first[:-1], out=frames[:-1])
+    frames[ends] = len(times) - first[ends]
     return frames
 
 
