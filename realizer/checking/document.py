@@ -11,6 +11,7 @@ from bml_schema.source import Source
 from realizer.behaviours import VOCABULARY
 from realizer.checking.finding import Finding
 from realizer.checking.findings import finding_of
+from realizer.checking.hidden import hidden, told_of, without_faults
 from realizer.pipeline import speak, submitted, warning_of
 from realizer.player import Player
 from realizer.scheduling.timing import Schedule, Warning
@@ -45,10 +46,13 @@ def checked(file: str, source: Source, text: bytes | str, player: Player) -> Ite
         player: gets every block, so that later ones may refer to earlier ones.
     """
     voice = SilentVoice()
-    for item in read(text, VOCABULARY):
+    items = list(read(text, VOCABULARY))
+    for item, whole in zip(items, without_faults(source, items), strict=True):
         if isinstance(item, Block):
             said = speak(player.wants(item), voice)
             schedule, warnings = examine(item, player, said)
+            if whole is not None:
+                warnings += hidden(item, whole, player, replace(player.world, utterances=dict(said)))
             yield Checked(_explained(file, source, warnings), item, schedule, said)
         else:
             yield Checked(_explained(file, source, [warning_of(item)]))
@@ -71,9 +75,7 @@ def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tupl
     for node in block.behaviours:
         kind = player.kinds.get(node.tag)
         faults = kind.check(node, world) if kind is not None else ()
-        where = block.places.get(node.id)
-        place = f"line {where.line}, {where.path}: " if where else ""
-        warnings += [Warning(f"{block.id}:{node.id}", fault.type, place + fault.text) for fault in faults]
+        warnings += [told_of(block, node.id, fault.type, fault.text) for fault in faults]
         if any(fault.fatal for fault in faults):
             bad.add(node.id)
     # What was told must not end the block before its constraints are looked at.

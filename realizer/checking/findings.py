@@ -17,7 +17,7 @@ from realizer.checking.draft import Draft
 from realizer.checking.finding import Finding, Label
 from realizer.scheduling.timing import Warning
 
-__all__ = ["finding_of", "near"]
+__all__ = ["attributes_of", "finding_of", "near"]
 
 _PLACED = re.compile(r"line (\d+)(?:, (/[^\s:]+))?: (.*)", re.DOTALL)
 _LOST = re.compile(r"(.*); with it went (.*)", re.DOTALL)
@@ -69,6 +69,16 @@ def near(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
     by_case = {choice.lower(): choice for choice in choices}
     found = difflib.get_close_matches(word.lower(), by_case, n=1, cutoff=cutoff)
     return by_case[found[0]] if found else None
+
+
+def attributes_of(text: str) -> list[str]:
+    """The names of the attributes that a warning tells of, as they are in its text without place."""
+    lost = _LOST.fullmatch(text)
+    names: list[str] = []
+    for piece in _PIECE.split(lost[1] if lost else text):
+        found = _ATTRIBUTES.fullmatch(piece) or _ATTRIBUTE.fullmatch(piece)
+        names += found[1].split(", ") if found else []
+    return names
 
 
 class _Sentences:
