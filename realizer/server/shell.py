@@ -181,7 +181,13 @@ class Shell:
             if (kept := journal.take(name)) is None:
                 return
             session = self._new(name, 0.0, named=True, epoch=kept.epoch)
-            at, owed = await self._loop.run_in_executor(None, restored, session, kept, self._studio.speak)
+            try:
+                at, owed = await self._loop.run_in_executor(None, restored, session, kept, self._studio.speak)
+            except JournalError:
+                raise
+            except Exception:
+                log.exception("session %s cannot be gone on with", name)
+                raise JournalError(f"session {name} cannot be gone on with: internal error") from None
             session.notes = Notes(name, journal, kept=kept)
             at = caught_up(session, at, seen)
             owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
@@ -331,6 +337,7 @@ class Shell:
         for number in session.connections:
             self._do(session, Close(number, 1011, "internal error"))
         session.close()
+        session.notes.end()  # who does the same again from the journal would fail again
         self._hub.forget(session)
 
     def _do(self, session: Session, effect: Effect) -> None:

@@ -19,8 +19,10 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
+from realizer.server.intake import Intake
 from realizer.server.journal.notes import ENTRIES
 from realizer.server.serve import Server
+from realizer.server.session import Session
 from realizer.settings import Settings
 from tests.told import feedback, numbers
 
@@ -251,6 +253,60 @@ def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_mor
                 others = await feedback(first, "b:end")
         assert numbers(told + rest) == list(range(1, len(told + rest) + 1))
         assert others == told[1:] + rest
+
+    asyncio.run(run())
+
+
+def test_a_session_that_a_fault_of_ours_ended_can_be_begun_anew(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    put = Intake.put
+
+    def faulty(intake: Intake, text: str, t: float) -> None:
+        if "fault" in text:
+            raise ZeroDivisionError
+        put(intake, text, t)
+
+    monkeypatch.setattr(Intake, "put", faulty)
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
+        async with asyncio.timeout(LIMIT), Server(settings) as server:
+            async with connect(f"{server.url}?session=s") as client:
+                await client.send('<bml id="fault"/>')
+                with pytest.raises(ConnectionClosed) as closed:
+                    await drained(client)
+                assert closed.value.rcvd is not None
+                assert closed.value.rcvd.code == 1011
+            async with connect(f"{server.url}?session=s") as client:
+                await client.send(NEXT)
+                assert numbers(await feedback(client, "b:end"))[0] == 1
+
+    asyncio.run(run())
+
+
+def test_what_cannot_be_done_again_is_told_and_is_still_there_for_who_can(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
+        async with asyncio.timeout(LIMIT):
+            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+                await client.send(NEXT)
+                told = await feedback(client, "b:end")
+            async with Server(settings) as server:
+                with monkeypatch.context() as here:
+                    here.setattr(Session, "receive", None)
+                    async with connect(f"{server.url}?session=s&seen=0") as client:
+                        with pytest.raises(ConnectionClosed) as closed:
+                            await drained(client)
+                    assert closed.value.rcvd is not None
+                    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (
+                        1013,
+                        "session s cannot be gone on with: internal error",
+                    )
+                async with connect(f"{server.url}?session=s&seen=0") as client:
+                    assert await feedback(client, "b:end") == told
 
     asyncio.run(run())
 
