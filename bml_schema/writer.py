@@ -20,12 +20,13 @@ from bml_schema.nodes import (
     Description,
     Required,
 )
-from bml_schema.shape import Attribute, shape_of, sync_ref
+from bml_schema.shape import shape_of, sync_ref
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import decimal
 
 __all__ = ["write"]
 
+_IN_CORE = f"{{{CORE}}}"
 _XML = "http://www.w3.org/XML/1998/namespace"
 # Prefixes people know; any other namespace becomes ns1, ns2, ...
 _PREFIXES: Mapping[str, str] = {
@@ -120,8 +121,11 @@ class Writer:
         out = ""
         for spec in shape.attributes.values():
             value = getattr(node, spec.field)
-            if spec.required or value != spec.default:
-                out += self._attribute(spec, value)
+            if value is None or (value == spec.default and not spec.required):
+                continue
+            if value or spec.field != "id":  # the parts of a face may have none
+                text = str(value) if spec.value is sync_ref else spec.value.write(value)
+                out += _value(self.name(spec.name, attribute=True), text)
         for point in _ordered(node):
             ref = node.syncs[point]
             out += f' {point}="{decimal(ref.offset)}"' if ref.behaviour is None else _value(point, str(ref))
@@ -129,18 +133,14 @@ class Writer:
             out += _value(self.name(name, attribute=True), text)
         return out
 
-    def _attribute(self, spec: Attribute, value: Any) -> str:
-        if value is None or (value == "" and spec.field == "id"):
-            return ""
-        label = self.name(spec.name, attribute=True)
-        return _value(label, str(value) if spec.value is sync_ref else spec.value.write(value))
-
     def name(self, clark: str, *, attribute: bool = False) -> str:
         """Clark name -> name with a prefix, which is declared on the root; elements of the core need none."""
         if not clark.startswith("{"):
             return clark
+        if not attribute and clark.startswith(_IN_CORE):
+            return clark[len(_IN_CORE) :]
         space, _, local = clark[1:].rpartition("}")
-        if not space or (space == CORE and not attribute):
+        if not space:
             return local
         if space == _XML:
             return f"xml:{local}"
@@ -177,4 +177,4 @@ def _ordered(node: Any) -> list[str]:
     """The sync points a node gives, in chronological order."""
     syncs: Mapping[str, SyncRef] = getattr(node, "syncs", {})
     known = [p for p in node.sync_points if p in syncs] if syncs else []
-    return known + [p for p in syncs if p not in known]
+    return known if len(known) == len(syncs) else known + [p for p in syncs if p not in known]
