@@ -69,7 +69,7 @@ class Guard:
             except PassError as error:
                 got = str(error)
         wanted = ["that of this service (REALIZER_TOKEN)"] if self._token is not None else []
-        wanted += ["a JWT of its key (REALIZER_JWT_KEY)"] if self._passes is not None else []
+        wanted += ["a JWT of this service's key (REALIZER_JWT_KEY)"] if self._passes is not None else []
         raise HubError(HTTPStatus.UNAUTHORIZED, f"token: wanted {' or '.join(wanted)}, got {got}")
 
     def request(self, target: str, headers: Mapping[str, str], *, later: bool = False) -> Pass | None:

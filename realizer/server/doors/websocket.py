@@ -271,6 +271,7 @@ class WebSocketDoor:
     async def _turn_away(self, socket: ServerConnection, error: HubError) -> None:
         """Say why one who is here already may not stay."""
         self._shell.metrics.counts["refused"] += 1
+        log.info("refused: %s", error, extra={"address": _address(socket), "status": error.status})
         unknown = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
         if unknown:
             where = "hello.token" if error.status == http.HTTPStatus.UNAUTHORIZED else "hello.session"

@@ -103,7 +103,9 @@ def test_a_signed_token_comes_in_the_same_places(both: dict[str, str]) -> None:
 def test_beside_a_key_the_token_of_the_service_opens_everything() -> None:
     g = guard(jwt_key=SECRET, token=TOKEN)
     assert g.request(f"/ws?token={TOKEN}", {}) == Pass()
-    with pytest.raises(HubError, match=r"that of this service .* or a JWT of its key .*, got another one"):
+    with pytest.raises(
+        HubError, match=r"that of this service .* or a JWT of this service's key .*, got another one"
+    ):
         g.request("/ws?token=another", {})
 
 
