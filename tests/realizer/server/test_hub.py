@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from realizer.server import limits
 from realizer.server.effects import Close
@@ -229,3 +232,60 @@ def test_where_memory_is_used_up_no_session_is_opened_and_those_that_play_are_jo
     with pytest.raises(HubError, match="REALIZER_MAX_MEMORY") as caught:
         hub.open(3, "more", 0.0)
     assert caught.value.status == 503
+
+
+MOVES = st.tuples(
+    st.sampled_from(["open", "leave", "hello", "sweep", "fail"]),
+    st.integers(0, 7),  # connection
+    st.sampled_from([None, "a", "b", "c", "d", "e"]),
+    st.sampled_from(["10.0.0.1", "10.0.0.2", ""]),
+)
+
+
+@given(st.lists(MOVES, max_size=60))
+def test_whatever_they_do_nobody_has_more_than_their_share(
+    moves: list[tuple[str, int, str | None, str]],
+) -> None:
+    hub = limited(max_sessions=4, max_address_sessions=2)
+    opened: dict[Session, str] = {}
+    who: dict[int, str] = {}
+    for now, (move, connection, name, address) in enumerate(moves):
+        session = hub.session_of(connection)
+        if move == "open" and session is None:
+            share: bool | None
+            try:
+                joined = hub.open(connection, name, now, visitor=Visitor(address))
+                who[connection] = address
+                opened.setdefault(joined, address)
+            except HubError as full:
+                share = full.status == 429
+            else:
+                share = None
+            if share is not None:
+                # Only where all that could make room have somebody in them.
+                mine = [s for s in hub.sessions.values() if not share or opened[s] == address]
+                assert all(s.empty_since is None for s in mine)
+                assert len(mine) == (2 if share else 4)
+        elif move == "leave":
+            hub.leave(connection, now)
+        elif move == "hello" and session is not None and name is not None:
+            session.receive(connection, f'{{"type":"hello","session":"{name}"}}', now)
+            hub.effects(session, now)
+            there = hub.session_of(connection)
+            assert there is not None
+            opened.setdefault(there, who[connection])
+        elif move == "sweep":
+            hub.sweep(now + 40)
+        elif move == "fail" and session is not None:
+            session.close()
+            hub.forget(session)
+        opened = {s: a for s, a in opened.items() if hub.sessions.get(s.id) is s}
+        shares = Counter(opened.values())
+        assert len(hub.sessions) <= 4
+        assert max(shares["10.0.0.1"], shares["10.0.0.2"]) <= 2
+    for connection in range(8):
+        hub.leave(connection, 1000)
+    hub.sweep(2000)
+    assert not hub.sessions
+    assert not hub._openers
+    assert not hub._opened
