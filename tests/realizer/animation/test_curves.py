@@ -146,7 +146,21 @@ def test_each_of_many_channels_is_as_it_is_alone() -> None:
         Channel(TARGET, np.array([0.0, 2.0]), np.array([0.0, 0.7]), joint=Joint(0.7, 0.2, 0.1, 0.4)),
         Channel(TARGET, np.array([0.0, 2.0]), np.array([0.3, 0.7]), curve="linear", until=1.2),
         Channel(TARGET, np.array([5.0, 6.0]), np.array([0.3, 0.7])),
+        Channel(TARGET, keys, 1 - keys / 4, curve="linear"),
+        Channel(TARGET, keys, keys**2 / 4, curve="linear"),
+        Channel(TARGET, keys + 9.0, keys / 2, curve="linear"),
     ]
     for channel, row in zip(many, sample(many, times), strict=True):
         np.testing.assert_array_equal(row, sample([channel], times)[0])
-    assert not sample(many, times)[-1].any()
+    nothing = [5, -1]
+    assert not sample(many, times)[nothing].any()
+
+
+@given(st.lists(st.floats(-1.0, 4.0), min_size=1, max_size=20))
+def test_a_channel_of_many_keys_is_interpolated_between_them(times: list[float]) -> None:
+    keys = np.linspace(0.5, 2.0, MANY_KEYS) ** 2
+    values = np.sin(9 * keys)
+    both = [Channel(TARGET, keys, values, curve="linear", holds=holds) for holds in (False, True)]
+    ends, stays = sample(both, np.array(times))
+    np.testing.assert_allclose(stays, np.interp(times, keys, values, left=0.0), atol=1e-12)
+    np.testing.assert_allclose(ends, np.interp(times, keys, values, left=0.0, right=0.0), atol=1e-12)
