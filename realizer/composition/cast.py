@@ -14,6 +14,7 @@ __all__ = ["ANTICIPATORS", "Cast"]
 
 # Schedules of blocks that have ended, kept for references to their sync points.
 PAST = 100
+PAST_POINTS = 50_000  # of all of them; the last one is kept in any case
 FOREVER = float("inf")
 # BMLA's name for what is no block: points in time that a client announces.
 ANTICIPATORS = "anticipators"
@@ -35,6 +36,7 @@ class Cast:
         self._alive: dict[str, Playing] = {}  # by id; those that are not done
         self._ended: list[Playing] = []  # those of `_playing` that are done
         self._past: dict[str, Schedule] = {}
+        self._points = 0  # of `_past`
         self._anticipated = Schedule(ANTICIPATORS, {}, {})
 
     def add(self, playing: Playing) -> None:
@@ -56,10 +58,13 @@ class Cast:
         self._ended = [p for p in self._ended if p.gone >= before]
         self.first_gone = min((p.gone for p in self._ended), default=FOREVER)
         for playing in gone:
+            if (old := self._past.pop(playing.block.id, None)) is not None:
+                self._points -= _points(old)
             self._past[playing.block.id] = playing.schedule
+            self._points += _points(playing.schedule)
             del self._playing[playing.number]
-        while len(self._past) > PAST:
-            del self._past[next(iter(self._past))]
+        while len(self._past) > PAST or (self._points > PAST_POINTS and len(self._past) > 1):
+            self._points -= _points(self._past.pop(next(iter(self._past))))
         return gone
 
     def __getitem__(self, number: int) -> Playing:
@@ -105,12 +110,14 @@ class Cast:
 
     def known(self) -> tuple[list[Schedule], Schedule]:
         """When blocks were that have ended, the oldest first, and what is anticipated."""
-        past = self._past | {playing.block.id: playing.schedule for playing in self._ended}
+        ended = {playing.block.id: playing.schedule for playing in self._ended}
+        past = {id: schedule for id, schedule in self._past.items() if id not in ended} | ended
         return list(past.values())[-PAST:], self._anticipated
 
     def restore(self, past: Iterable[Schedule], anticipated: Schedule) -> None:
         """Know what another cast has known."""
         self._past = {schedule.block: schedule for schedule in past}
+        self._points = sum(map(_points, self._past.values()))
         self._anticipated = anticipated
 
     def anticipate(self, id: str, syncs: Mapping[str, float]) -> None:
@@ -138,3 +145,7 @@ class Cast:
             return schedule
         more = tuple(w for w in playing.schedule.warnings if w not in schedule.warnings)
         return replace(playing.schedule, warnings=schedule.warnings + more)
+
+
+def _points(schedule: Schedule) -> int:
+    return sum(map(len, schedule.times.values()))

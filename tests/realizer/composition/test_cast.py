@@ -62,6 +62,27 @@ def test_what_is_forgotten_keeps_its_schedule_for_a_while() -> None:
     assert cast.knew("b0")
 
 
+@pytest.mark.parametrize("anew", [False, True])
+def test_of_very_long_blocks_fewer_schedules_are_kept_but_always_the_last(
+    monkeypatch: pytest.MonkeyPatch, anew: bool
+) -> None:
+    points = 2  # of a <wait>
+    monkeypatch.setattr("realizer.composition.cast.PAST_POINTS", 3 * points)
+    cast = Cast()
+    for n, name in enumerate("abacd"):
+        ended(cast, name, 2.0 * n)
+        cast.forget(2.0 * n + 1.5)
+        if anew:  # as it is after a checkpoint
+            again = Cast()
+            again.restore(*cast.known())
+            cast = again
+    assert [cast.knew(name) for name in "abcd"] == [True, False, True, True]
+    monkeypatch.setattr("realizer.composition.cast.PAST_POINTS", 1)
+    ended(cast, "e", 20.0)
+    cast.forget(30.0)
+    assert [cast.knew(name) for name in "abcde"] == [False, False, False, False, True]
+
+
 def test_the_newest_of_an_id_counts() -> None:
     cast = Cast()
     ended(cast, "a")
