@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import NamedTuple
 
 from realizer import tables
 
@@ -15,8 +15,7 @@ __all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence", "
 PRESENCES = ("lips", "eyes", "head", "blinks", "motion", "successive")
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """One column of the axis.
 
     `name` is "12L" for an AU, "open_jaw" for a FAP, "lips" for a presence, "rank 12" for an AU's place among

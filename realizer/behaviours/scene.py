@@ -104,7 +104,7 @@ def turn(
         for number, sign in zip(sides, (1.0, -1.0), strict=True):
             turned = [max(0.0, sign * angle) for angle in degrees]
             if any(turned):
-                values = np.array(turned) / poses.units()[number].degrees
-                target = au(number)[0]
+                most, target = poses.units()[number].degrees, au(number)[0]
+                values = np.array([angle / most for angle in turned])
                 channels.append(Channel(target, times, values, layer=layer, holds=holds, source=source))
     return tuple(channels)
