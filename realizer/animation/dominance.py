@@ -152,13 +152,20 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     band = np.arange(-rule["neighbours"], rule["neighbours"] + 1)[:, None]
     near = np.searchsorted(track.begin, times, "right") - 1 + band
     beyond = (near < 0) | (near >= len(length))
-    near = np.clip(near, 0, len(length) - 1)
-    fall = rate.take(near)
-    before = fall * np.maximum(core_begin.take(near) - times, 0)
-    after = fall * np.maximum(times - core_end.take(near), 0)
+    near = near.clip(0, len(length) - 1)
+    fall = _taken(rate, near)
+    before = fall * np.maximum(_taken(core_begin, near) - times, 0)
+    after = fall * np.maximum(times - _taken(core_end, near), 0)
     before[beyond] = np.inf
 
     for own, (name, members) in zip(weight, CLASSES.items(), strict=True):
         pace = facts["articulators"][name]
-        d = np.exp(-(pace["before"] * before + pace["after"] * after)) * own.take(near)
-        yield near, d / (d.sum(axis=0) + rule["rest"]), members
+        d = np.exp(-pace["before"] * before - pace["after"] * after)
+        d *= _taken(own, near)
+        d /= d.sum(axis=0) + rule["rest"]
+        yield near, d, members
+
+
+def _taken(values: Float64, near: Index) -> Float64:
+    """`values[..., near]`, of indices that are known to be there: half as long."""
+    return values.take(near, axis=-1, mode="clip")

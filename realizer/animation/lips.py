@@ -55,12 +55,16 @@ def _mouth(track: Track, times: Float64) -> Float64:
     """(10, n) float64: the weighted mean of the sounds around each time; rows `SHAPE`."""
     target = (track.mix @ shape_table()[0]).T * track.size
     target[[SHAPE.index(name) for name in OPENING]] *= track.effort
-    mouth = [
-        np.einsum("kn,kn->n", parts, target[SHAPE.index(member)].take(near))
-        for near, parts, members in dominances(track, times)
-        for member in members
-    ]
-    return np.array(mouth)
+    mouth = np.empty((len(SHAPE), len(times)))
+    for near, parts, members in dominances(track, times):
+        block = _block(members)
+        mouth[block] = np.einsum("kn,skn->sn", parts, target[block].take(near, axis=1, mode="clip"))
+    return mouth
+
+
+def _block(members: Sequence[str]) -> slice:
+    """The rows of a class of articulators."""
+    return slice(SHAPE.index(members[0]), SHAPE.index(members[-1]) + 1)
 
 
 def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, facts: dict[str, Any]) -> None:
@@ -84,7 +88,7 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     for name, members in CLASSES.items():
         limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
         reach = facts["articulators"][name]["smooth"] * facts["rate"]
-        block = slice(column[members[0]], column[members[-1]] + 1)
+        block = _block(members)
         mouth[block] = _smooth(_reachable(mouth[block], times, limit), reach)
     # Lips that press meet; they do not pass through each other.
     least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
@@ -108,7 +112,7 @@ def _smooth(values: Float64, reach: float) -> Float64:
     first, last = values[:, :1], values[:, -1:]
     before, after = values[:, half:0:-1], values[:, -2 : -half - 2 : -1]
     padded = np.hstack((2 * first - before, values, 2 * last - after))
-    return np.array([np.convolve(row, _bell(half), "valid") for row in padded])
+    return np.array([np.correlate(row, _bell(half), "valid") for row in padded])
 
 
 @lru_cache(maxsize=16)

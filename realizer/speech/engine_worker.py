@@ -31,10 +31,9 @@ PARENT_DEATH_SIGNAL = 1  # prctl
 PATIENCE = 5.0  # s between looks at whether the parent is still there
 
 
-def answer(engine: Any, line: bytes, out: int, last: bool = False) -> None:
+def answer(engine: Any, request: dict[str, Any], out: int, last: bool = False) -> None:
     """Serve one request and write the whole answer."""
     try:
-        request = json.loads(line)
         head, body = engine.operations[request["op"]](request)
     except Exception as error:
         head, body = {"error": str(error) or type(error).__name__}, []
@@ -49,14 +48,17 @@ def write(out: int, head: dict[str, Any], body: Sequence[bytes] = ()) -> None:
             data = data[os.write(out, data) :]
 
 
-def requests() -> Iterator[bytes]:
-    """Lines of stdin, until it ends or the parent does."""
+def requests() -> Iterator[dict[str, Any]]:
+    """What stands in the lines of stdin, until it ends or the parent does.
+
+    Read here and not by a fork, where all that is touched for the first time costs.
+    """
     parent = os.getppid()
     pending = b""
     while os.getppid() == parent:
         if b"\n" in pending:
             line, _, pending = pending.partition(b"\n")
-            yield line
+            yield json.loads(line)
         # End of file is not enough: another child of our parent may hold the other end of the pipe.
         elif not hasattr(os, "fork") or select.select([0], [], [], PATIENCE)[0]:
             read = os.read(0, 1 << 16)
@@ -68,13 +70,13 @@ def requests() -> Iterator[bytes]:
 def serve_in_forks(engine: Any, out: int) -> None:
     """One fork a request, so that each starts from the same state."""
     libc = ctypes.CDLL(None) if sys.platform == "linux" else None
-    for line in requests():
+    for request in requests():
         child = os.fork()
         if child == 0:
             if libc is not None:
                 libc.prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
             try:
-                answer(engine, line, out)
+                answer(engine, request, out)
             finally:
                 os._exit(0)
         status = os.waitpid(child, 0)[1]
@@ -109,8 +111,8 @@ def main(arguments: list[str]) -> None:
     if engine.drifts and forks:
         serve_in_forks(engine, out)
         return
-    for line in requests():
-        answer(engine, line, out, last=engine.drifts)
+    for request in requests():
+        answer(engine, request, out, last=engine.drifts)
         if engine.drifts:
             return
 
