@@ -131,9 +131,8 @@ class Player:
             (`speech.fitting`), or with the same ones whose `stretch` is (1, 1).
         """
         character = self._character(block.character_id)
-        world = replace(self.world, utterances=dict(utterances or {}))
-        if self._takes is not None:
-            world = replace(world, takes=partial(self._takes, character))
+        takes = self.world.takes if self._takes is None else partial(self._takes, character)
+        world = replace(self.world, utterances=dict(utterances or {}), takes=takes)
         return self._blocks.submit(block, character, world, now)
 
     def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
