@@ -234,7 +234,7 @@ class Player:
         return self._blocks.next_deadline()
 
     def next_change(self) -> float:
-        """When a call of `due` will next do something: then, or when it can forget; infinite where neither."""
+        """When `due` will next do something: tell, or forget what is past; infinite where neither."""
         first = self._blocks.next_deadline()
         forgets = self._blocks.cast.first_gone + self.history + RELAX + AFTERMATH
         return forgets if first is None else min(first, forgets)
