@@ -392,12 +392,12 @@ class Interleaving:
         kept = self._journal.take(session.id)
         assert kept is not None
         restored(other, kept, spoken)
-        told = [text for _, text in session.log.since(other.log.first)]
         deadline = other.next_deadline()
         while deadline is not None and deadline <= self.now - session.opened:
             other.tick(max(deadline, 0.0))
             deadline = other.next_deadline()
-        again = [text for _, text in other.log.since(1)]
+        first = max(session.log.first, other.log.first)
+        told, again = session.log.since(first), other.log.since(first)
         for here, there in zip(told, again, strict=False):
             assert here == there, f"told {here}, told again {there}"
         assert len(told) == len(again), (told[len(again) :], again[len(told) :])

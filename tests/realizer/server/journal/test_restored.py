@@ -150,6 +150,29 @@ def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outli
     assert not any("warningFeedback" in text for text in again)  # the points of what has gone are known
 
 
+def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("realizer.server.shell.SWEEP", 0.05)
+    where = str(tmp_path / "journal.db")
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=where)
+        async with (
+            asyncio.timeout(LIMIT),
+            Server(settings) as server,
+            connect(f"{server.url}?session=one") as one,
+            connect(f"{server.url}?session=two") as two,
+        ):
+            for client in (one, two):
+                for _ in range(ENTRIES):
+                    await client.send(SCENE)
+            while not (in_a_checkpoint(where, "one") and in_a_checkpoint(where, "two")):
+                await asyncio.sleep(0.01)
+
+    asyncio.run(run())
+
+
 def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_and_in_order(
     where: str,
 ) -> None:
