@@ -149,8 +149,8 @@ class Ensemble:
 
     def stirs(self, now: float, before: float) -> bool:
         """Whether `due(now)` or `forget(before)` would have something."""
-        due = self.next_deadline()
-        return (due is not None and due <= now) or self.cast.first_gone < before
+        due = self.course.calendar.next
+        return (due is not None and due <= now) or self.cast.first_gone < before or bool(self.reports)
 
     def forget(self, before: float) -> bool:
         """Drop blocks of which nothing is to be seen after a time; True where there were some."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from itertools import islice
 
 from bml_schema import Feedback
 
@@ -60,6 +59,5 @@ class FeedbackLog:
 
     def since(self, seq: int) -> list[str]:
         """The kept messages from `seq` on, in order."""
-        # From the end, where that nearly always is.
-        newest = islice(reversed(self._kept), max(0, self.newest - seq + 1))
-        return [text for _, text in newest][::-1]
+        count = min(self.newest - seq + 1, len(self._kept))
+        return [self._kept[n][1] for n in range(-count, 0)]
