@@ -52,6 +52,19 @@ def test_the_same_bytes_whatever_ran_it_and_in_whatever_order(
     assert {"more/said.fap", "more/said.vtt", "manifest.jsonl"} <= contents(tmp_path / "here").keys()
 
 
+@pytest.mark.espeak
+def test_what_is_heard_is_the_same_whatever_ran_it_and_in_whatever_order(talks: Path, tmp_path: Path) -> None:
+    """What espeak-ng says depends on what it said before, but for the pains taken with it."""
+    aloud = Options(formats=(".fap", ".wav"), voice="espeak")
+    for k, words in enumerate(["Oh, hello!", "Who was that?", "Nobody at all."]):
+        (talks / f"said{k}.bml").write_text(f'<bml id="b"><speech id="s"><text>{words}</text></speech></bml>')
+    play(talks, tmp_path / "here", aloud)
+    crew = Processes(aloud, 2)
+    assert len(list(batch(find([str(talks)]), tmp_path / "there", aloud, crew))) == 9
+    assert contents(tmp_path / "here") == contents(tmp_path / "there")
+    assert len({contents(tmp_path / "here")[f"said{k}.wav"] for k in range(3)}) == 3
+
+
 def test_an_interrupted_batch_goes_on_where_it_was(talks: Path, options: Options, tmp_path: Path) -> None:
     play(talks, tmp_path / "whole", options)
     assert len(play(talks, tmp_path / "cut", options, most=2)) == 2
