@@ -101,10 +101,10 @@ def turn(
     """
     channels = []
     for degrees, sides in zip(zip(*turns, strict=True), TURNS[part], strict=True):
-        for number, sign in zip(sides, (1.0, -1.0), strict=True):
-            turned = [max(0.0, sign * angle) for angle in degrees]
-            if any(turned):
-                most, target = poses.units()[number].degrees, au(number)[0]
-                values = np.array([angle / most for angle in turned])
+        for number, sign, most in zip(sides, (1.0, -1.0), (max(degrees), -min(degrees)), strict=True):
+            if most > 0.0:
+                whole = poses.units()[number].degrees
+                values = np.array([max(0.0, sign * angle) / whole for angle in degrees])
+                target = au(number)[0]
                 channels.append(Channel(target, times, values, layer=layer, holds=holds, source=source))
     return tuple(channels)
