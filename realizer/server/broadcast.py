@@ -20,7 +20,7 @@ from realizer.server.connection import (
 from realizer.server.effects import Draw, Effect, Look, Send
 from realizer.server.plans import Plans, message
 from realizer.server.sound import AHEAD, PACKET, Sound
-from realizer.server.streams import EPSILON, Timeline, first_at, last_at
+from realizer.server.streams import EPSILON, Strip, Timeline, first_at, last_at
 from realizer.server.wire import FrameKind, pack
 
 if TYPE_CHECKING:
@@ -48,10 +48,18 @@ class Lane:
         self.timeline = timeline
         self.members = members
         self.next = min(s.next for _, s in members)
+        self._strip: Strip | None = None  # of numbers that only one gets: the next ones are slices of it
 
     def send(self, newest: int, now: float, sends: list[Send]) -> None:
         """All up to `newest`, to everybody who has not got it."""
         timeline, first, self.next = self.timeline, self.next, newest + 1
+        strip = self._strip
+        if strip is not None and first == newest < strip.end and timeline.current:
+            ((connection, s),) = self.members
+            if not connection.slow:
+                sends.append(Send(connection.id, strip[newest]))
+                s.next = newest + 1
+                return
         oldest = first if first == newest else first_at(now - LATE, timeline.fps)
         window = timeline.window(max(first, oldest), newest)
         for connection, s in self.members:
@@ -64,6 +72,8 @@ class Lane:
                 for number in range(s.next, newest + 1):
                     sends.append(Send(connection.id, window.message(s, number)))
             s.next = max(s.next, newest + 1)
+        if len(self.members) == 1 and s.encoding == "binary" and s.stream != "mesh" and not connection.slow:
+            self._strip = window.strip(s)
         window.settle()
 
 
@@ -171,6 +181,11 @@ class Broadcast:
                 lane.send(newest, now, sends)
             soonest = min(soonest, lane.next / fps)
         return sends, soonest
+
+    @property
+    def shows_plans(self) -> bool:
+        """Somebody follows the stream `schedule`."""
+        return bool(self._plan_takers)
 
     @property
     def next_frame(self) -> float:

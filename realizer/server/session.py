@@ -117,8 +117,10 @@ class Session:
         self.log = FeedbackLog(epoch)
         self._effects: list[Effect] = []
         self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
-        # Until then nothing is due but frames, on its own clock; None where that is not known.
+        # Until then nothing is due but frames and what blocks tell as they play, on its own clock; None where
+        # that is not known. And when they tell something.
         self._calm: float | None = None
+        self._tells = 0.0
 
     # connections --------------------------------------------------------------------------------
 
@@ -300,13 +302,26 @@ class Session:
         if not self.closed and self._work(t, reads):
             self._tell(t, "tick")
 
-    def frames(self, now: float) -> tuple[list[Send], float] | None:
-        """These and the `next_due` after them where nothing else is due; None where `tick` is wanted."""
+    def frames(self, now: float) -> tuple[list[Effect], float] | None:
+        """These, and feedback, and the `next_due` after them where nothing else is due.
+
+        Returns:
+            None where `tick` is wanted, which does the same and more.
+        """
         t = now - self.opened
         if self._calm is None or t + EPSILON >= self._calm:
             return None
+        if t + EPSILON >= self._tells:
+            plans = self.player.revision
+            self._publish(t)
+            self._tells = self.player.next_change()
+            if self.player.revision != plans:
+                self._calm = None
         sends, following = self.broadcast.frames_due(t)
-        return sends, min(self._calm, following) + self.opened
+        effects, self._effects = [*self._effects, *sends], []
+        if self._calm is None:
+            return effects, self.next_due()
+        return effects, min(self._calm, self._tells, following) + self.opened
 
     def rest(self, now: float) -> None:
         """Keep the journal short, where it has grown; what is due is told first."""
@@ -354,14 +369,14 @@ class Session:
             return float("inf")
         other = self._calm
         if other is None:
-            asked = self.intake.orders.deadline()
-            due = [self.player.next_change(), self.broadcast.next_other]
-            other = min(due if asked is None else [*due, asked])
-            # Speeches that last and clients that are slow are looked at with every frame.
+            self._tells, asked = self.player.next_change(), self.intake.orders.deadline()
+            other = self.broadcast.next_other if asked is None else min(self.broadcast.next_other, asked)
+            # Speeches that last and clients that are slow are looked at with every frame, plans with whatever
+            # is told.
             slow = any(connection.slow for connection in self._connections.values())
-            if not (self.reads or slow or self.intake.speeches.lasting):
+            if not (self.reads or slow or self.intake.speeches.lasting or self.broadcast.shows_plans):
                 self._calm = other
-        return min(other, self.broadcast.next_frame) + self.opened
+        return min(other, self._tells, self.broadcast.next_frame) + self.opened
 
     @property
     def busy(self) -> bool:

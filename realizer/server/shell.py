@@ -300,11 +300,11 @@ class Shell:
         if found is None:
             self._work(session, now, reads=False)
             return
-        frames, due = found
-        for number, data in frames:
-            client = self._clients[number]
-            client.send(data)
-            if (waiting := client.waiting) > SLOW:
+        effects, due = found
+        for effect in effects:
+            self._do(session, effect)
+        for number in session.connections:
+            if (waiting := self._clients[number].waiting) > SLOW:
                 session.backlog(number, waiting)
         self._alarms.set(session, due)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -49,20 +49,23 @@ def last_at(now: float, fps: float) -> int:
 
 
 class Strip:
-    """The messages of many frames of numbers, made at once: each is a slice."""
+    """The messages of frames `first` .. `end - 1`, which are numbers, made at once: each is a slice."""
 
     def __init__(
         self, kind: FrameKind, first: int, times: Float64, rows: Float32 | Int32, character: int
     ) -> None:
+        self.first, self.end = first, first + len(rows)
         self._bytes, self._size = pack_frames(kind, first, times, rows, character=character)
-        self._dtype = rows.dtype
+        self._dtype: np.dtype[Any] = rows.dtype
 
-    def __getitem__(self, n: int) -> bytes:
-        return self._bytes[n * self._size : (n + 1) * self._size]
+    def __getitem__(self, frame: int) -> bytes:
+        at = (frame - self.first) * self._size
+        return self._bytes[at : at + self._size]
 
-    def row(self, n: int) -> Float32 | Int32:
-        """(k,) what the n-th message holds."""
-        return np.frombuffer(self[n], self._dtype, offset=HEADER.size)
+    def row(self, frame: int) -> Float32 | Int32:
+        """(k,) what the message of a frame holds."""
+        row: Float32 | Int32 = np.frombuffer(self[frame], self._dtype, offset=HEADER.size)
+        return row
 
 
 class Window:
@@ -137,7 +140,7 @@ class Window:
     def message(self, wanted: Wanted, frame: int) -> str | bytes:
         """One of its frames as a WebSocket message."""
         if wanted.encoding == "binary" and wanted.stream != "mesh":
-            return self._strip(wanted)[frame - self.first]
+            return self.strip(wanted)[frame]
         key = (wanted.stream, wanted.encoding, wanted.asked, wanted.name)
         number, message = self._latest.get(key, (None, b""))
         if number != frame:
@@ -145,7 +148,8 @@ class Window:
             self._latest[key] = (frame, message)
         return message
 
-    def _strip(self, wanted: Wanted) -> Strip:
+    def strip(self, wanted: Wanted) -> Strip:
+        """All of its messages of fap, au or arkit."""
         known = self._strips.get((wanted.stream, wanted.asked))
         if known is None:
             rows = self.rows(wanted.stream, wanted.asked)
@@ -157,7 +161,7 @@ class Window:
     def _made(self, wanted: Wanted, frame: int) -> str | bytes:
         """What is not made for the whole window at once: meshes, and all that is JSON."""
         n, time = frame - self.first, frame / self.fps
-        row = self.mesh(n) if wanted.stream == "mesh" else self._strip(wanted).row(n)
+        row = self.mesh(n) if wanted.stream == "mesh" else self.strip(wanted).row(frame)
         if wanted.encoding == "binary":
             return pack(KINDS[wanted.stream], frame, time, row.tobytes(), character=wanted.index)
         values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
@@ -202,12 +206,7 @@ class Timeline:
     def window(self, first: int, last: int) -> Window:
         """A window that holds frames first .. last, and more to come."""
         window = self._window
-        if (
-            window is None
-            or self._revision != self.player.revision
-            or first < window.first
-            or last >= window.end
-        ):
+        if window is None or not self.current or first < window.first or last >= window.end:
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
 
             def aus(times: Float64) -> AUFrames:
@@ -217,6 +216,11 @@ class Timeline:
             self._revision = self.player.revision
         return window
 
+    @property
+    def current(self) -> bool:
+        """What was computed last is still what is planned."""
+        return self._revision == self.player.revision
+
     def forget(self) -> None:
         """Compute anew what comes next: the face has changed."""
         self._window = None
@@ -225,7 +229,7 @@ class Timeline:
 class Wanted(Protocol):
     """What a subscription wants of a window.
 
-    `asked`: AUs as asked for, before the rules of co-occurrence; `name`: of the character, where it was given.
+    `asked`: AUs as asked for, before the rules of co-occurrence; `name`: the character's, where it was given.
     """
 
     stream: str

@@ -94,10 +94,21 @@ class Driver:
         """Tick at every deadline up to `until` (on the session clock)."""
         while (deadline := self.session.next_deadline()) is not None and deadline <= self.opened + until:
             self.now = max(self.now, deadline - self.opened)
-            self.session.tick(self.opened + self.now)
-            self.collect()
+            self.wake()
         self.now = until
         return self.clients[1]
+
+    def wake(self) -> None:
+        """As the shell does it."""
+        found = None if self.session.reads else self.session.frames(self.opened + self.now)
+        if found is None:
+            self.session.tick(self.opened + self.now)
+            self.collect()
+        else:
+            effects, due = found
+            assert due == self.session.next_due()
+            for effect in effects:
+                self.do(effect)
 
     def collect(self) -> None:
         for effect in self.session.outgoing():
