@@ -18,7 +18,7 @@ import statistics
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from unittest.mock import patch
@@ -26,6 +26,7 @@ from unittest.mock import patch
 from realizer.server.effects import Speak
 from realizer.server.journal import Entry, Journal, Kept, Log, journal_at
 from realizer.server.journal import notes as thresholds
+from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.folder import FolderJournal
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.replay import restored
@@ -52,16 +53,12 @@ class Watched:
     def __init__(self, journal: Journal) -> None:
         self._journal = journal
         self.adds: list[float] = []
-        self.compacts: list[float] = []
         self.begin, self.take, self.end, self.close = journal.begin, journal.take, journal.end, journal.close
+        self.compact = journal.compact
 
     def add(self, session: str, entry: Entry) -> None:
         with _timed(self.adds):
             self._journal.add(session, entry)
-
-    def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
-        with _timed(self.compacts):
-            self._journal.compact(session, parts)
 
 
 @contextmanager
@@ -69,6 +66,19 @@ def _timed(spent: list[float]) -> Iterator[None]:
     began = time.perf_counter()
     yield
     spent.append(time.perf_counter() - began)
+
+
+class Checkpoints:
+    """How long each took, from looking at the session to its end on the disk."""
+
+    def __init__(self) -> None:
+        self.seconds: list[float] = []
+
+    def __call__(self, session: Session, t: float) -> bool:
+        began = time.perf_counter()
+        if done := checkpoint(session, t):
+            self.seconds.append(time.perf_counter() - began)
+        return done
 
 
 def spoken(order: Speak) -> Utterance:
@@ -111,19 +121,20 @@ def size(kept: Kept) -> int:
 
 def report(name: str, where: str, documents: int, apart: float, bare: float) -> None:
     journal = Watched(journal_at(where))
-    cost = played(documents, apart, journal)
+    checkpoints = Checkpoints()
+    with patch("realizer.server.session.checkpoint", checkpoints):
+        cost = played(documents, apart, journal)
     began = time.process_time()
-    kept = journal_at(where).take("long")
+    kept = journal.take("long")
     assert kept is not None
     session = opened()
     restored(session, kept, spoken)
     took = time.process_time() - began
     entries = len(journal.adds) / documents
     compacts = ""
-    if journal.compacts:
-        median = 1000 * statistics.median(journal.compacts)
-        compacts = f"; {len(journal.compacts)} checkpoints, {median:.1f} ms each to write (median),"
-        compacts += f" {1000 * max(journal.compacts):.1f} at most"
+    if taken := checkpoints.seconds:
+        compacts = f"; {len(taken)} checkpoints, {1000 * statistics.median(taken):.1f} ms each (median),"
+        compacts += f" {1000 * max(taken):.1f} at most"
     print(
         f"{name}: {cost - bare:+.2f} ms a document ({entries:.1f} entries,"
         f" {1e6 * statistics.median(journal.adds):.0f} us each); at the end {len(kept.entries)} entries,"
