@@ -4,7 +4,7 @@
     text to FAP, silent voice       the same with sentences whose times come from rules
     text to FAP, espeak             with espeak-ng, which never says a sentence twice here
     openfacefx, text to curves      the sentences of the row above it but one, as long as there, by the peer
-    film                            512x512 .mp4 by two workers (`--film`; takes minutes)
+    film                            512x512 .mp4 by two workers (`batch.py film`, which takes a minute)
 
 Each of documents of 4 s, as a dialogue has them, and of 30 s. By core: by the processor time of this process
 and of the engine that speaks for it, which is what a batch on idle cores takes; at best: the same of the
@@ -16,11 +16,11 @@ and blends nothing. Measures only; nothing asserts a time.
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import os
 import statistics
-import sys
 import time
 from collections.abc import Callable, Iterator
 from importlib import import_module
@@ -35,7 +35,7 @@ from realizer.batch.work import Worker
 
 LENGTHS = (4, 30)  # s, about
 DOCUMENTS = 40
-FILMS, FILM = 16, 8  # and s
+FILM = 8  # s
 FPS = 25
 SENTENCES = (
     "Good morning, this is number {k} speaking.",
@@ -93,6 +93,12 @@ def spent_by(pid: int | None) -> float:
     except OSError:
         return 0.0
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def spent() -> float:
+    """Seconds of processor time of this process, and of its children that ended and theirs."""
+    own = os.times()
+    return own.user + own.system + own.children_user + own.children_system
 
 
 def disturbed() -> float:
@@ -176,37 +182,42 @@ def peer(seconds: int, ours: float) -> None:
     worker.close()
 
 
-def film() -> None:
+def film(count: int) -> None:
     """From the start of the two workers and of what draws for them, and from when both have one film done."""
     crew = Processes(Options(formats=(".mp4",), voice="silent", size=(512, 512)), 2)
-    began = time.perf_counter()
+    used, began = spent(), time.perf_counter()
     came: list[tuple[float, float]] = []
     noise: list[float] = []
-    for outcome in crew.perform(tasks(FILMS, FILM, speech=True)):
+    for outcome in crew.perform(tasks(count, FILM, speech=True)):
         assert outcome.row["status"] == "done", outcome.row
         came.append((time.perf_counter(), outcome.row["duration"]))
         noise.append(disturbed())
-    whole = sum(length for _, length in came) / (came[-1][0] - began)
+    played, used = sum(length for _, length in came), spent() - used
     going = sum(length for _, length in came[2:]) / (came[-1][0] - came[1][0])
-    over = 100 * (statistics.median(noise) / min(noise) - 1)
-    print(
-        f"film, 512x512, {FPS} fps, two workers: {going:.2f} x by clock once both are at work, {whole:.2f} x "
-        f"with their start, {FILMS} films of {came[0][1]:.1f} s; noise {over:.0f} %"
-    )
+    print(f"film, 512x512, {FPS} fps, {count} of {came[0][1]:.1f} s by two workers")
+    print(f"{'  by clock, once both are at work':46}{going:6.2f} x")
+    print(f"{'  by clock, with their start':46}{played / (came[-1][0] - began):6.2f} x")
+    print(f"{'  by core, with their start':46}{played / used:6.2f} x")
+    print(f"{'  noise':46}{100 * (statistics.median(noise) / min(noise) - 1):6.0f} %")
 
 
 def main() -> None:
+    reader = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    reader.add_argument("what", nargs="*", choices=("fap", "film"), default=["fap"])
+    reader.add_argument("--films", type=int, default=16, help="how many")
+    asked = reader.parse_args()
     load = os.getloadavg()[0] / (os.cpu_count() or 1)
     print(f"load of the machine {load:.1f} a core before it began")
-    heads = f"{'by core':>11}{'at best':>11}{'by clock':>11}{'a document':>12}{'noise':>10}{'90 %':>7}"
-    print(f"{'':30}{'each':>9}{heads}")
-    for seconds in LENGTHS:
-        fap("text to FAP, without speech", "silent", seconds, speech=False)
-        silent = fap("text to FAP, silent voice", "silent", seconds, speech=True)
-        fap("text to FAP, espeak", "espeak", seconds, speech=True)
-        peer(seconds, silent)
-    if "--film" in sys.argv:
-        film()
+    if "fap" in asked.what:
+        heads = f"{'by core':>11}{'at best':>11}{'by clock':>11}{'a document':>12}{'noise':>10}{'90 %':>7}"
+        print(f"{'':30}{'each':>9}{heads}")
+        for seconds in LENGTHS:
+            fap("text to FAP, without speech", "silent", seconds, speech=False)
+            silent = fap("text to FAP, silent voice", "silent", seconds, speech=True)
+            fap("text to FAP, espeak", "espeak", seconds, speech=True)
+            peer(seconds, silent)
+    if "film" in asked.what:
+        film(asked.films)
 
 
 if __name__ == "__main__":
