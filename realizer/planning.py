@@ -120,23 +120,23 @@ class _Work:
     def check(self) -> None:
         """What the behaviours' kinds have against them, and what the others want of time."""
         gone: list[tuple[str, Warning]] = []
+        world, utterances = self.world, self.world.utterances
         for node in self.block.behaviours:
-            name = f"{self.block.id}:{node.id}"
             kind = self.kinds.get(node.tag)
             if kind is None:
                 said = f"<{node.tag.rpartition('}')[2]}> is not known here"
-                gone.append((node.id, Warning(name, "BEHAVIOR_TYPE_NOT_SUPPORTED", self.at(node.id, said))))
+                gone.append((node.id, self.warning("BEHAVIOR_TYPE_NOT_SUPPORTED", node.id, said)))
                 continue
-            found = kind.check(node, self.world)
-            faults = [Warning(name, fault.type, self.at(node.id, fault.text)) for fault in found]
-            if any(fault.fatal for fault in found):
-                gone.append((node.id, next(w for w, f in zip(faults, found, strict=True) if f.fatal)))
-            elif kind.say is not None and node.id not in self.world.utterances:
-                said = self.at(node.id, "speech: no voice could say it")
-                gone.append((node.id, Warning(name, "CANNOT_CREATE_BEHAVIOR", said)))
+            found = kind.check(node, world)
+            fatal = next((fault for fault in found if fault.fatal), None)
+            if fatal is not None:
+                gone.append((node.id, self.warning(fatal.type, node.id, fatal.text)))
+            elif kind.say is not None and node.id not in utterances:
+                said = "speech: no voice could say it"
+                gone.append((node.id, self.warning("CANNOT_CREATE_BEHAVIOR", node.id, said)))
             else:
-                self.warnings += faults
-                self.timings[node.id] = kind.timing(node, self.world)
+                self.warnings += [self.warning(fault.type, node.id, fault.text) for fault in found]
+                self.timings[node.id] = kind.timing(node, world)
         self.drop(gone)
 
     def schedule(
@@ -165,17 +165,8 @@ class _Work:
             lost = losses(self.claims, held, start)
             if not lost:
                 return [found, *moved]
-            self.drop(
-                (
-                    loss.claim.behaviour,
-                    Warning(
-                        f"{self.block.id}:{loss.claim.behaviour}",
-                        "CANNOT_CREATE_BEHAVIOR",
-                        self.at(loss.claim.behaviour, str(loss)),
-                    ),
-                )
-                for loss in lost
-            )
+            losers = ((loss.claim.behaviour, str(loss)) for loss in lost)
+            self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, said)) for id, said in losers)
 
     def try_bending(
         self,
@@ -246,6 +237,10 @@ class _Work:
         """The behaviour a warning is about; "" where it is about something else."""
         block, _, behaviour = warning.id.partition(":")
         return behaviour if block == self.whole.id else ""
+
+    def warning(self, type: str, behaviour: str, text: str) -> Warning:
+        """What is to be said of a behaviour."""
+        return Warning(f"{self.block.id}:{behaviour}", type, self.at(behaviour, text))
 
     def at(self, behaviour: str, text: str) -> str:
         """A sentence with the place of its behaviour."""
