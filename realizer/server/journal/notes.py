@@ -16,6 +16,8 @@ ENTRIES = 250
 BYTES = 2**20
 # So many times as much is long.
 LONG = 4
+# After so many, which take a good part of a minute to be done again, it is time to say so.
+ENDLESS = 10_000
 # And where it could not be written, again after so many.
 AGAIN = 25
 
@@ -131,6 +133,12 @@ class Notes:
         self._failing = False
         self._entries += 1
         self._bytes += len(entry.body)
+        if self._entries % ENDLESS == 0:
+            log.warning(
+                "session %s: %d entries in its journal and no checkpoint: some block always plays or waits",
+                self._session,
+                self._entries,
+            )
 
     def _recorded(self, write: Callable[[Log], None]) -> None:
         """A record has all or ends: one with a hole would be played otherwise than the session was."""

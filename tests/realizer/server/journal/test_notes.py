@@ -97,6 +97,18 @@ def test_what_a_journal_lacks_a_checkpoint_brings_as_soon_as_there_is_room() -> 
     assert journal.take("s") == Kept(1.7e9, [], {"state": "x"})
 
 
+def test_a_journal_that_only_grows_is_told_of_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("realizer.server.journal.notes.ENDLESS", 10)
+    notes = Notes("s", Memory())
+    notes.begin(0.0)
+    with caplog.at_level(logging.WARNING):
+        for _ in range(25):
+            notes.tell(1.0, "tick")
+    assert [record.args for record in caplog.records] == [("s", 10), ("s", 20)]
+
+
 def test_a_session_that_is_only_recorded_is_never_compacted(tmp_path: Path) -> None:
     notes = Notes("s", record=FolderJournal(tmp_path, {}))
     notes.begin(0.0)
