@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import json
 import sqlite3
 import subprocess
@@ -330,6 +331,30 @@ def test_what_cannot_be_done_again_is_told_and_is_still_there_for_who_can(
                     )
                 async with connect(f"{server.url}?session=s&seen=0") as client:
                     assert await feedback(client, "b:end") == told
+
+    asyncio.run(run())
+
+
+def test_documents_are_played_and_kept_though_there_is_no_room_for_their_record(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def full(file: object, line: str) -> None:
+        if NEXT in json.loads(line).get("body", ""):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("realizer.server.journal.folder._write", full)
+
+    async def run() -> None:
+        settings = Settings(
+            port=0, voice="silent", journal=str(tmp_path / "journal.db"), record=tmp_path / "records"
+        )
+        async with asyncio.timeout(LIMIT):
+            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+                await client.send(NEXT)
+                told = await feedback(client, "b:end")
+                assert "realizer_records_stopped_total 1" in server._shell.measured()
+            async with Server(settings) as server, connect(f"{server.url}?session=s&seen=0") as client:
+                assert await feedback(client, "b:end") == told
 
     asyncio.run(run())
 
