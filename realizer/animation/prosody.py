@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from realizer import tables
+from realizer.animation.blinks import PhraseEnd
 from realizer.animation.chance import uniform
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.idle import PhraseEnd
 from realizer.animation.targets import AU_NAMES, au, axis, region
 from realizer.arrays import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bml_schema import Idle
+from realizer.animation.blinks import Fewer
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.idle import Fewer
 from realizer.animation.targets import presence
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Kind, World

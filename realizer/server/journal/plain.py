@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from realizer.animation.blinks import Fewer
 from realizer.animation.channel import Channel, Gain, Joint, Layer
-from realizer.animation.idle import Fewer
 from realizer.animation.targets import axis
 from realizer.composition.character import Character, Shift
 from realizer.scheduling.timing import Schedule

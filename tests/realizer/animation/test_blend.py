@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.blend import OVER, blend
+from realizer.animation.blinks import Blinks, Fewer
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap import to_fap
-from realizer.animation.idle import Blinks, Fewer, Idle, Motion, idle_face
+from realizer.animation.idle import Idle, Motion, idle_face
 from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
 from realizer.arrays import Float64
 

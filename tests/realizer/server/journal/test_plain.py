@@ -10,8 +10,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from realizer.animation.blinks import Fewer
 from realizer.animation.channel import Channel, Gain, Joint, Layer
-from realizer.animation.idle import Fewer
 from realizer.animation.targets import axis
 from realizer.composition.character import Character, Shift
 from realizer.scheduling.timing import Schedule
