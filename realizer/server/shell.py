@@ -69,6 +69,7 @@ class Shell:
         self._journal: Journal | None = None
         self._record: Log | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
+        self._taken_over: dict[str, float] = {}  # session -> until when clients come back to it; loop time
 
     async def start(self) -> None:
         """Load what every session shares.
@@ -171,7 +172,7 @@ class Shell:
                 self._restoring[name] = self._loop.create_task(self._restore(self._journal, name, seen or 0))
             await asyncio.shield(self._restoring[name])
         session = self._hub.sessions.get(name)
-        if session is not None and session.notes.taken_over and session.log.newest < (seen or 0):
+        if session is not None and name in self._taken_over and session.log.newest < (seen or 0):
             now = self._loop.time()
             session.opened -= caught_up(session, now, seen or 0) - now
             self._pump(session)
@@ -196,6 +197,7 @@ class Shell:
             for connection in session.connections:  # which went with the other process
                 session.disconnect(connection, now)
             self._hub.sessions[name] = session
+            self._taken_over[name] = now + self.settings.keep
             log.info("session %s is gone on with, %d entries long", name, len(kept.entries))
             for effect in owed:
                 self._do(session, effect)
@@ -292,6 +294,14 @@ class Shell:
         """Frames, feedback and whatever else is due."""
         now = self._loop.time()
         self.metrics.late.observe(now - when)
+        run = session.run
+        if run is not None and (data := run.take(now)) is not None:
+            client = self._clients[run.connection]
+            client.send(data)
+            if (waiting := client.waiting) > SLOW:
+                session.backlog(run.connection, waiting)
+            self._alarms.set(session, run.wakes)
+            return
         try:
             found = session.frames(now)
         except Exception:
@@ -370,7 +380,9 @@ class Shell:
         self._pump(session)
 
     def _sweep(self) -> None:
-        self._hub.sweep(self._loop.time())
+        now = self._loop.time()
+        self._hub.sweep(now)
+        self._taken_over = {name: end for name, end in self._taken_over.items() if end > now}
         # What is written for all of them is written one after the other, until the next sweep.
         grown = [session for session in self._hub.sessions.values() if session.notes.grown]
         for place, session in enumerate(grown):

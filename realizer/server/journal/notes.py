@@ -31,9 +31,6 @@ class Notes:
         record: what is played again to look at it. It may fail: nobody waits for it.
         stopped: is called when a record has failed; nothing more is written of it.
         kept: what is in the journal already.
-
-    Attributes:
-        taken_over: another process has begun it.
     """
 
     def __init__(
@@ -50,7 +47,6 @@ class Notes:
         self._record = record
         self._stopped = stopped
         self._failing = False
-        self.taken_over = kept is not None
         entries = [] if kept is None else kept.entries
         self._entries = len(entries)
         self._bytes = sum(len(entry.body) for entry in entries)
