@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
+import math
+from collections import deque
 from collections.abc import Callable, Hashable
-from heapq import heapify, heappop, heappush
+from heapq import heappop, heappush
 from typing import Generic, Protocol, TypeVar
 
 __all__: list[str] = []
 
 T = TypeVar("T", bound=Hashable)
 
-# Nobody is woken for less: what is due within it is woken together.
+# What is due between two whole steps of the clock is woken at the second; so little before one is at it.
 STEP = 0.001  # s
+SLACK = 5e-4  # of a step
 # How long things are woken one after the other before the loop looks for messages again.
 TURN = 0.004  # s
 NEVER = float("inf")
-_Entry = tuple[float, int, T]
 
 
 class Timers(Protocol):
@@ -43,11 +44,13 @@ class Alarms(Generic[T]):
     def __init__(self, loop: Timers, wake: Callable[[T, float], None]) -> None:
         self._loop = loop
         self._wake = wake
-        self._numbers = itertools.count()
-        self._set: dict[T, _Entry[T]] = {}
-        self._heap: list[_Entry[T]] = []  # and such as have been set anew since
+        self._set: dict[T, tuple[float, int]] = {}  # when, and the step it is woken at
+        self._steps: dict[int, deque[T]] = {}  # who is woken at each, and who was set anew since
+        self._order: list[int] = []  # the steps, as a heap
+        self._entries = 0
+        self._reached = 0  # no step before it is looked at any more
         self._timer: asyncio.Handle | None = None
-        self._rings = NEVER  # when the timer is due
+        self._rings = math.inf  # the step at which the timer is due
         self._ringing = False
         self._closed = False
 
@@ -63,47 +66,65 @@ class Alarms(Generic[T]):
             del self._set[thing]
         if when == NEVER or self._closed:
             return
-        entry = self._set[thing] = (when, next(self._numbers), thing)
-        heappush(self._heap, entry)
-        if len(self._heap) > 2 * len(self._set) + 64:
-            self._heap = list(self._set.values())
-            heapify(self._heap)
-        if not self._ringing and when < self._rings:
-            self._arm(when)
+        reached = self._reached
+        step = reached if when <= reached * STEP else math.ceil(when / STEP - SLACK)
+        self._set[thing] = (when, step)
+        self._put(thing, step)
+        if not self._ringing:
+            if self._entries > 2 * len(self._set) + 64:
+                self._tidy()
+            if step < self._rings:
+                self._arm(step)
 
     def close(self) -> None:
         """Wake nobody any more."""
         self._closed = True
         self._set.clear()
-        self._heap.clear()
+        self._tidy()
         if self._timer is not None:
             self._timer.cancel()
 
-    def _arm(self, when: float) -> None:
+    def _put(self, thing: T, step: int) -> None:
+        there = self._steps.get(step)
+        if there is None:
+            there = self._steps[step] = deque()
+            heappush(self._order, step)
+        there.append(thing)
+        self._entries += 1
+
+    def _tidy(self) -> None:
+        """Forget what was set anew since."""
+        self._steps, self._order, self._entries = {}, [], 0
+        for thing, (_, step) in self._set.items():
+            self._put(thing, step)
+
+    def _arm(self, step: int) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._rings = when
-        self._timer = self._loop.call_at(when, self._ring)
+        self._rings = step
+        self._timer = self._loop.call_at(step * STEP, self._ring)
 
     def _ring(self) -> None:
         """Wake all that are due, as long as it is our turn."""
-        self._timer, self._rings, self._ringing = None, NEVER, True
+        self._timer, self._rings, self._ringing = None, math.inf, True
         now = self._loop.time()
         over = now + TURN
         try:
-            while self._heap:
-                entry = self._heap[0]
-                when, _, thing = entry
-                if self._set.get(thing) is not entry:
-                    heappop(self._heap)
-                    continue
-                if when > now or now > over:
-                    break
-                heappop(self._heap)
-                del self._set[thing]
-                self._wake(thing, when)
-                now = self._loop.time()
+            while self._order and self._order[0] <= now / STEP + SLACK and now <= over:
+                step = self._reached = self._order[0]
+                there = self._steps[step]
+                while there and now <= over:
+                    thing = there.popleft()
+                    self._entries -= 1
+                    known = self._set.get(thing)
+                    if known is not None and known[1] == step:
+                        del self._set[thing]
+                        self._wake(thing, known[0])
+                        now = self._loop.time()
+                if not there:
+                    heappop(self._order)
+                    del self._steps[step]
         finally:
             self._ringing = False
-            if self._heap:
-                self._arm(max(self._heap[0][0], now + STEP))
+            if self._order:
+                self._arm(max(self._order[0], math.floor(now / STEP + SLACK) + 1))

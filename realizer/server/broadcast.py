@@ -19,6 +19,7 @@ from realizer.server.connection import (
 )
 from realizer.server.effects import Draw, Effect, Look, Send
 from realizer.server.plans import Plans, message
+from realizer.server.run import Run
 from realizer.server.sound import AHEAD, PACKET, Sound
 from realizer.server.streams import EPSILON, Strip, Timeline, first_at, last_at
 from realizer.server.wire import FrameKind, pack
@@ -41,25 +42,27 @@ class Lane:
 
     Attributes:
         members: who, with what of them.
-        next: the first frame that somebody has not got.
     """
 
     def __init__(self, timeline: Timeline, members: list[tuple[Connection, FrameSubscription]]) -> None:
         self.timeline = timeline
         self.members = members
-        self.next = min(s.next for _, s in members)
         self._strip: Strip | None = None  # of numbers that only one gets: the next ones are slices of it
+
+    @property
+    def next(self) -> int:
+        """The first frame that somebody has not got."""
+        members = self.members
+        return members[0][1].next if len(members) == 1 else min(s.next for _, s in members)
+
+    @property
+    def strip(self) -> Strip | None:
+        """What follows, where only one gets it and it is still what is planned."""
+        return self._strip if self.timeline.current else None
 
     def send(self, newest: int, now: float, sends: list[Send]) -> None:
         """All up to `newest`, to everybody who has not got it."""
-        timeline, first, self.next = self.timeline, self.next, newest + 1
-        strip = self._strip
-        if strip is not None and first == newest < strip.end and timeline.current:
-            ((connection, s),) = self.members
-            if not connection.slow:
-                sends.append(Send(connection.id, strip[newest]))
-                s.next = newest + 1
-                return
+        timeline, first = self.timeline, self.next
         oldest = first if first == newest else first_at(now - LATE, timeline.fps)
         window = timeline.window(max(first, oldest), newest)
         for connection, s in self.members:
@@ -181,6 +184,18 @@ class Broadcast:
                 lane.send(newest, now, sends)
             soonest = min(soonest, lane.next / fps)
         return sends, soonest
+
+    def run(self, zero: float, until: float) -> Run | None:
+        """The frames that one client alone gets, as long as nothing changes; None where there is more to it.
+
+        Args:
+            zero: when the session's clock was 0, on the caller's clock.
+            until: when something else is due, on the caller's clock.
+        """
+        if len(self._lanes) != 1 or (strip := self._lanes[0].strip) is None:
+            return None
+        ((connection, s),) = self._lanes[0].members
+        return Run(connection.id, s, strip, zero, until)
 
     @property
     def shows_plans(self) -> bool:

@@ -38,6 +38,7 @@ from realizer.server.messages import (
     Unsubscribe,
     parse_control,
 )
+from realizer.server.run import Run
 from realizer.server.streams import EPSILON
 from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
@@ -67,6 +68,9 @@ class Session:
         capabilities: what `welcome` tells.
         epoch: POSIX seconds at `now`, told with every time; None leaves them out.
         history: seconds that have passed of which frames can still be asked for.
+
+    Attributes:
+        run: the frames of its only client for which nobody need ask it; None where there is more to it.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
     of them, and `next_deadline` says when `tick` is wanted.
@@ -121,6 +125,7 @@ class Session:
         # that is not known. And when they tell something.
         self._calm: float | None = None
         self._tells = 0.0
+        self.run: Run | None = None
 
     # connections --------------------------------------------------------------------------------
 
@@ -131,7 +136,7 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
-        self._calm = None
+        self._stir()
         self._connections[connection] = Connection(connection, self.log.newest + 1)
         if not self._tell(now - self.opened, "join", connection):
             return
@@ -144,7 +149,8 @@ class Session:
         if self._connections.pop(connection, None) is not None:
             self._tell(now - self.opened, "leave", connection)
         self.intake.speeches.leave(connection)
-        self._unsettled, self._calm = True, None
+        self._unsettled = True
+        self._stir()
         if not self._connections:
             self.empty_since = now
             if not self.named:
@@ -167,7 +173,8 @@ class Session:
 
     def close(self) -> None:
         """End: nothing is done and nothing is sent after it."""
-        self.closed, self._calm = True, None
+        self.closed = True
+        self._stir()
         self._connections.clear()
         self.intake.inbox.clear()
         self._effects.clear()
@@ -177,7 +184,7 @@ class Session:
         if (known := self._connections.get(connection)) is not None:
             known.backlog = waiting
             if known.slow:
-                self._calm = None
+                self._stir()
             if waiting > STUCK:
                 reason = f"{waiting} bytes wait to be read; come back with the session's name and seen"
                 self._effects.append(Close(connection, 1013, reason))
@@ -279,7 +286,7 @@ class Session:
         """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
         if self.closed:
             return
-        self._calm = None
+        self._stir()
         picture = result if isinstance(result, bytes) else None
         effects, lookers = self.broadcast.drawn(draw, picture, self._connections.values())
         self._effects += effects
@@ -316,17 +323,23 @@ class Session:
             self._publish(t)
             self._tells = self.player.next_change()
             if self.player.revision != plans:
-                self._calm = None
+                self._stir()
         sends, following = self.broadcast.frames_due(t)
         effects, self._effects = [*self._effects, *sends], []
         if self._calm is None:
             return effects, self.next_due()
-        return effects, min(self._calm, self._tells, following) + self.opened
+        other = min(self._calm, self._tells)
+        self.run = self.broadcast.run(self.opened, other + self.opened)
+        return effects, min(other, following) + self.opened
+
+    def _stir(self) -> None:
+        """Something may change: nobody knows what is due before all of it has been looked at."""
+        self._calm = self.run = None
 
     def rest(self, now: float) -> None:
         """Keep the journal short, where it has grown; what is due is told first."""
         if self.notes.grown and not self.closed:
-            self._calm = None
+            self._stir()
             self._publish(now - self.opened)
             self._compact(now - self.opened)
 
@@ -337,7 +350,8 @@ class Session:
 
     def _work(self, t: float, reads: bool = True) -> bool:
         """What `tick` does; False where nothing came of it but what plays."""
-        self._unsettled, self._calm = False, None
+        self._unsettled = False
+        self._stir()
         self._publish(t)
         self.broadcast.gets(self._connections.values())
         self.broadcast.due(t, self._effects)

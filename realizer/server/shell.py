@@ -294,6 +294,14 @@ class Shell:
         """Frames, feedback and whatever else is due."""
         now = self._loop.time()
         self.metrics.late.observe(now - when)
+        run = session.run
+        if run is not None and (data := run.take(now)) is not None:
+            client = self._clients[run.connection]
+            client.send(data)
+            if (waiting := client.waiting) > SLOW:
+                session.backlog(run.connection, waiting)
+            self._alarms.set(session, run.wakes)
+            return
         try:
             found = session.frames(now)
         except Exception:

@@ -100,7 +100,12 @@ class Driver:
 
     def wake(self) -> None:
         """As the shell does it."""
-        found = None if self.session.reads else self.session.frames(self.opened + self.now)
+        now, run = self.opened + self.now, self.session.run
+        if run is not None and (data := run.take(now)) is not None:
+            assert run.wakes == self.session.next_due()
+            self.do(Send(run.connection, data))
+            return
+        found = None if self.session.reads else self.session.frames(now)
         if found is None:
             self.session.tick(self.opened + self.now)
             self.collect()

@@ -161,4 +161,4 @@ def test_the_last_time_counts_whatever_was_set_before(steps: list[tuple[int, flo
     clock.run(20.0)
     assert {thing: when for thing, when, _ in woken} == {t: w for t, w in last.items() if w < NEVER}
     assert len(woken) == len({thing for thing, *_ in woken})
-    assert [when for _, when, _ in woken] == sorted(when for _, when, _ in woken)
+    assert all(wanted - STEP / 1000 <= was <= wanted + 2 * STEP for _, wanted, was in woken)
