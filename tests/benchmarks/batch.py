@@ -4,7 +4,7 @@
     text to FAP, silent voice       the same with sentences whose times come from rules
     text to FAP, espeak             with espeak-ng, which never says a sentence twice here
     openfacefx, text to curves      the sentences of the row above it but one, as long as there, by the peer
-    film                            512x512 .mp4 by two workers (`batch.py film`, which takes a minute)
+    film                            512x512 .mp4 by two workers (`--films 16`, which take a minute)
 
 Each of documents of 4 s, as a dialogue has them, and of 30 s. By core: by the processor time of this process
 and of the engine that speaks for it, which is what a batch on idle cores takes; at best: the same of the
@@ -203,21 +203,20 @@ def film(count: int) -> None:
 
 def main() -> None:
     reader = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    reader.add_argument("what", nargs="*", choices=("fap", "film"), default=["fap"])
-    reader.add_argument("--films", type=int, default=16, help="how many")
-    asked = reader.parse_args()
+    reader.add_argument("--films", type=int, metavar="N", help="so many films, and no documents")
+    films = reader.parse_args().films
     load = os.getloadavg()[0] / (os.cpu_count() or 1)
     print(f"load of the machine {load:.1f} a core before it began")
-    if "fap" in asked.what:
-        heads = f"{'by core':>11}{'at best':>11}{'by clock':>11}{'a document':>12}{'noise':>10}{'90 %':>7}"
-        print(f"{'':30}{'each':>9}{heads}")
-        for seconds in LENGTHS:
-            fap("text to FAP, without speech", "silent", seconds, speech=False)
-            silent = fap("text to FAP, silent voice", "silent", seconds, speech=True)
-            fap("text to FAP, espeak", "espeak", seconds, speech=True)
-            peer(seconds, silent)
-    if "film" in asked.what:
-        film(asked.films)
+    if films:
+        film(films)
+        return
+    heads = f"{'by core':>11}{'at best':>11}{'by clock':>11}{'a document':>12}{'noise':>10}{'90 %':>7}"
+    print(f"{'':30}{'each':>9}{heads}")
+    for seconds in LENGTHS:
+        fap("text to FAP, without speech", "silent", seconds, speech=False)
+        silent = fap("text to FAP, silent voice", "silent", seconds, speech=True)
+        fap("text to FAP, espeak", "espeak", seconds, speech=True)
+        peer(seconds, silent)
 
 
 if __name__ == "__main__":
