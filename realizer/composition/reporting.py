@@ -118,13 +118,14 @@ def sync_progress(block: Block, behaviour: str, sync: str, time: float, start: f
 def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Event]:
     """Every sync point of a block, when it is due; `order` and `number` as of the Event."""
     found: list[Event] = []
+    phase = Phase.SYNC
     for place, node in enumerate(block.behaviours):
         id = node.id
         if id not in schedule.times:
             continue
         times = (schedule.start + schedule.times[id]).tolist()
         found += [
-            made(Event, (time, order, Phase.SYNC, place, index, number, id, sync))
+            made(Event, (time, order, phase, place, index, number, id, sync))
             for index, (sync, time) in enumerate(zip(schedule.points[id], times, strict=True))
         ]
     return found
