@@ -70,10 +70,10 @@ async def plays(client: ClientConnection, block: str) -> None:
 
 def unread(engine: EspeakVoice) -> int:
     """Bytes of a request that an engine has been sent and has not read."""
-    process = engine._process._process
-    assert process is not None
-    assert process.stdin is not None
-    return struct.unpack("i", fcntl.ioctl(process.stdin.fileno(), termios.FIONREAD, bytes(4)))[0]
+    running = engine._process._running
+    assert running is not None
+    assert running.process.stdin is not None
+    return struct.unpack("i", fcntl.ioctl(running.process.stdin.fileno(), termios.FIONREAD, bytes(4)))[0]
 
 
 @pytest.mark.espeak
