@@ -11,6 +11,7 @@ loaded in a process of its own.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ctypes
 import os
 from pathlib import Path
@@ -108,9 +109,10 @@ class Engine:
 
         self.voice = ""
         self.voices = self._voices()
-        for voice in self.voices:
-            if any(tag == "en-us" for _, tag in voice["languages"]):  # the voice that is asked for most
-                self.say({**self.first, "voice": voice["id"]})
+        # The voice that is asked for most; an installation may lack English.
+        english = (v["id"] for v in self.voices if any(tag == "en-us" for _, tag in v["languages"]))
+        with contextlib.suppress(StopIteration, RuntimeError):
+            self.say({**self.first, "voice": next(english)})
         self.operations = {"say": self.say, "phonemes": self.phonemes}
 
     def hello(self) -> dict[str, Any]:
