@@ -39,10 +39,16 @@ class FeedbackLog:
         """Seq of the oldest message that is kept; of the next one where none is."""
         return self.newest - len(self._kept) + 1
 
-    def add(self, feedback: Feedback, now: float) -> None:
-        """Number a message and keep it; seconds on the session clock."""
+    def add(self, feedback: Feedback, now: float) -> str:
+        """Number a message and keep it; its text.
+
+        Args:
+            now: seconds on the session clock.
+        """
         self.newest += 1
-        self._keep(feedback.to_xml(self.newest, self._epoch), now)
+        text = feedback.to_xml(self.newest, self._epoch)
+        self._keep(text, now)
+        return text
 
     def restore(self, newest: int, texts: Iterable[str], now: float) -> None:
         """Have told these messages, the last of which has the number `newest`."""

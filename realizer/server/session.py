@@ -40,6 +40,7 @@ from realizer.server.messages import (
 )
 from realizer.server.run import Run
 from realizer.server.streams import EPSILON
+from realizer.server.telling import Telling
 from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
 from realizer.speech.utterance import Utterance
@@ -118,7 +119,7 @@ class Session:
         self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
         self.intake = Intake(id, settings, self.player, self._owe)
         self._connections: dict[int, Connection] = {}
-        self.log = FeedbackLog(epoch)
+        self.telling = Telling(self.player, self.intake, epoch)
         self._effects: list[Effect] = []
         self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
         # Until then nothing is due but frames and what blocks tell as they play, on its own clock; None where
@@ -128,6 +129,11 @@ class Session:
         self.run: Run | None = None
 
     # connections --------------------------------------------------------------------------------
+
+    @property
+    def log(self) -> FeedbackLog:
+        """What it has told."""
+        return self.telling.log
 
     @property
     def connections(self) -> tuple[int, ...]:
@@ -410,25 +416,8 @@ class Session:
     # feedback -----------------------------------------------------------------------------------
 
     def _publish(self, t: float) -> None:
-        """Number what is due, keep it, and send it to every connection that has not switched it off."""
-        while due := self.player.due(t + EPSILON):
-            for feedback in due:
-                told, ends = self.intake.speeches.told(feedback)
-                self.log.add(told, t)
-                if ends:
-                    waiting = self.intake.preparation.waiting
-                    self.intake.withdraw([w for w in waiting if w.block.id in ends], t)
-                    self.player.stop(t, ends)
-        for connection in self._connections.values():
-            if connection.place <= self.log.newest:
-                self._catch_up(connection)
-
-    def _catch_up(self, connection: Connection) -> None:
-        if connection.feedback is not None:
-            wanted = connection.feedback
-            told = self.log.since(connection.place)
-            self._effects += [Send(connection.id, text) for text in told if wanted.takes(text)]
-        connection.place = self.log.newest + 1
+        """Tell all that is due to everybody who has not switched it off."""
+        self._effects += self.telling.publish(t, self._connections.values())
 
     def resume(self, connection: int, seen: int) -> None:
         """Send what followed `seen`, after a `gap` where some of it is gone or was never there."""
@@ -436,8 +425,9 @@ class Session:
         if seen + 1 < first or seen > self.log.newest:
             self.reply(connection, Gap(seen=seen, first=first))
             seen = first - 1
-        self._connections[connection].place = seen + 1
-        self._catch_up(self._connections[connection])
+        known = self._connections[connection]
+        known.place = seen + 1
+        self._effects += self.telling.catch_up(known)
 
     def welcome(self, connection: int, now: float) -> None:
         """Tell a client where it is and what there is."""

@@ -45,7 +45,7 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         epoch=record.head["epoch"],
         history=float("inf"),
     )
-    log = session.log = _Whole(record.head["epoch"])
+    log = session.telling.log = _Whole(record.head["epoch"])
     studio = Studio(settings.deformer)
     try:
         replay(session, record.entries, studio.speak)
@@ -73,9 +73,10 @@ class _Whole(FeedbackLog):
         super().__init__(epoch)
         self.told: list[tuple[Feedback, str]] = []
 
-    def add(self, feedback: Feedback, now: float) -> None:
-        super().add(feedback, now)
-        self.told.append((feedback, self.since(self.newest)[0]))
+    def add(self, feedback: Feedback, now: float) -> str:
+        text = super().add(feedback, now)
+        self.told.append((feedback, text))
+        return text
 
 
 def _settings(head: Mapping[str, Any]) -> dict[str, Any]:
