@@ -34,24 +34,21 @@ def encode(clip: FAPClip) -> str:
     if not (math.isfinite(clip.fps) and clip.fps > 0):
         raise ValueError(f"fps: wanted a positive number, got {clip.fps}")
     fps = int(clip.fps) if clip.fps == int(clip.fps) else clip.fps
-    lines = [f"2.1 {_word(clip.name)} {fps} {len(clip.values)}"]
-    mask = " ".join("1" if bit else "0" for bit in clip.mask)
     columns = [clip.values[:, 2:][:, clip.mask[2:]]]
     if clip.mask[1]:
         columns.insert(0, clip.expressions)
     if clip.mask[0]:
         columns.insert(0, clip.visemes)
-    for k, words in enumerate(_words(np.hstack(columns))):
-        lines.append(mask)
-        lines.append(" ".join([str(k), *words]))
-    return "\n".join(lines) + "\n"
+    mask = "\n" + " ".join("1" if bit else "0" for bit in clip.mask) + "\n"
+    frames = [" ".join([str(k), *words]) for k, words in enumerate(_words(np.hstack(columns)))]
+    return mask.join([f"2.1 {_word(clip.name)} {fps} {len(frames)}", *frames]) + "\n"
 
 
 def _words(numbers: Int32) -> list[list[str]]:
     """(n, k) numbers as text, row by row."""
-    small = np.abs(numbers) <= SMALL
-    words = _small()[np.where(small, numbers, 0) + SMALL]
-    words[~small] = [str(number) for number in numbers[~small].tolist()]
+    words = _small().take(numbers + SMALL, mode="clip")
+    others = (numbers < -SMALL) | (numbers > SMALL)
+    words[others] = [str(number) for number in numbers[others].tolist()]
     rows: list[list[str]] = words.tolist()
     return rows
 
