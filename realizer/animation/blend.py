@@ -210,7 +210,7 @@ def _lids() -> tuple[int, ...]:
 @cache
 def _sums() -> tuple[bool, ...]:
     """Of each column whether channels add up there."""
-    known = tables.by_number(tables.action_units())
+    known = tables.by_number()
     aus = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
     return (*aus, *(True for _ in range(len(aus), len(axis()))))
 

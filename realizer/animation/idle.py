@@ -155,7 +155,7 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
 def _turn(sides: Sequence[int], degrees: Float64) -> Iterator[tuple[int, Float64]]:
     """Signed degrees as two AUs, column and values; between keys they add up to the same smooth course."""
     for number, sign in zip(sides, (-1.0, 1.0), strict=False):
-        most = tables.by_number(tables.action_units())[number].degrees
+        most = tables.by_number()[number].degrees
         yield au(number)[0].column, np.maximum(sign * degrees, 0.0) / most
 
 

@@ -221,6 +221,6 @@ def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> li
 def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> Iterator[Channel]:
     """Signed degrees as AUs."""
     for number, sign in zip(sides, (-1.0, 1.0), strict=True):
-        values = np.maximum(sign * degrees, 0.0) / tables.by_number(tables.action_units())[number].degrees
+        values = np.maximum(sign * degrees, 0.0) / tables.by_number()[number].degrees
         if values.any():
             yield Channel(au(number)[0], times, values, layer=Layer.IDLE, source=SOURCE)

@@ -109,7 +109,7 @@ def _targets(node: Part, world: World) -> dict[Target, float]:
 
 def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
     faults = []
-    known = poses.units()
+    known = tables.by_number()
     for part in parts:
         if isinstance(part, FaceLexeme):
             if part.lexeme not in world.library:

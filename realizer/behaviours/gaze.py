@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from bml_schema import Gaze, GazeShift
+from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au, presence
 from realizer.arrays import Float64
-from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
 from realizer.behaviours.scene import Turn, angles, facts, limits, target_faults, turn, within
@@ -146,7 +146,7 @@ def _converge(
     """AU66 for eyes that turn in by so many degrees each, at the first keys of a gaze or all."""
     if not inward:
         return ()
-    values = min(inward / poses.units()[66].degrees, 1.0) * EYES_TAKEN[: len(times)]
+    values = min(inward / tables.by_number()[66].degrees, 1.0) * EYES_TAKEN[: len(times)]
     return (Channel(au(66)[0], times, values, layer=layer, holds=holds, source=source),)
 
 

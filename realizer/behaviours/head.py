@@ -8,11 +8,12 @@ from functools import lru_cache
 import numpy as np
 
 from bml_schema import Head, HeadDirectionShift
+from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.poses import units, unknown
+from realizer.behaviours.poses import unknown
 from realizer.behaviours.preferred import from_gaps, preferred
 from realizer.behaviours.scene import angles, limits, target_faults, turn, within
 from realizer.scheduling.timing import Timing
@@ -80,7 +81,7 @@ def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
 
 
 def _turned(number: int, keys: Float64, turned: Float64, source: str) -> Channel:
-    values = turned / units()[number].degrees
+    values = turned / tables.by_number()[number].degrees
     return Channel(au(number)[0], keys, values, layer=Layer.HEAD, source=source)
 
 

@@ -142,7 +142,7 @@ def _by_lines(type: str, lines: list[list[str]], count: int) -> Float64:
 
 
 def _parts(type: str, text: str) -> tuple[int | tuple[int, str], ...]:
-    known = tables.by_number(tables.action_units())
+    known = tables.by_number()
     parts: list[int | tuple[int, str]] = []
     for word in text.replace(",", " ").split():
         match = PART[type].fullmatch(word)

@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from functools import cache
 
 import numpy as np
 
-from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import Target, au
 from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault
 
 __all__: list[str] = []
-
-
-@cache
-def units() -> Mapping[int, tables.ActionUnit]:
-    """AU -> its row."""
-    return tables.by_number(tables.action_units())
 
 
 def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target, float]:

@@ -15,7 +15,6 @@ from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
 from realizer.arrays import Float64
-from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Position, World
 
 __all__: list[str] = []
@@ -103,7 +102,7 @@ def turn(
     for degrees, sides in zip(zip(*turns, strict=True), TURNS[part], strict=True):
         for number, sign, most in zip(sides, (1.0, -1.0), (max(degrees), -min(degrees)), strict=True):
             if most > 0.0:
-                whole = poses.units()[number].degrees
+                whole = tables.by_number()[number].degrees
                 values = np.array([max(0.0, sign * angle) / whole for angle in degrees])
                 target = au(number)[0]
                 channels.append(Channel(target, times, values, layer=layer, holds=holds, source=source))

@@ -13,7 +13,7 @@ from realizer.animation.targets import au, axis, fap
 from realizer.arrays import Float32
 from realizer.emotion import wheel
 from realizer.expressions import Expression
-from realizer.tables import action_units, by_number, faps
+from realizer.tables import by_number, faps
 from realizer.tables.emotions import archetypes
 from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes
@@ -89,7 +89,7 @@ def _both_ways(row: Fap, value: float) -> list[Pose]:
 
 def of_aus(intensity: float) -> list[Series]:
     """Each action unit on both sides, by place and direction."""
-    names = by_number(action_units())
+    names = by_number()
     return [
         Series(
             f"Action units: {region.name}",

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from realizer.expressions.expression import Expression
-from realizer.tables import action_units, by_number
+from realizer.tables import by_number
 
 __all__ = ["by_action_units", "by_meaning"]
 
@@ -148,7 +148,7 @@ def _words(text: str) -> list[str]:
 
 def _vector(aus: Mapping[tuple[int, str], float]) -> dict[tuple[int, str], float]:
     """(AU, L | R | "") -> intensity; a unit without sides has one place."""
-    sided = by_number(action_units())
+    sided = by_number()
     vector: dict[tuple[int, str], float] = {}
     for (au, side), value in aus.items():
         letters = ("L", "R") if side == "BOTH" else (side[0],)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__: list[str] = []
 
-# Frames computed in one call. 250 cost half as much again as 25; a longer window is thrown away more often, when
-# a plan changes.
+# Frames computed in one call. 250 cost half as much again as 25; a longer window is thrown away more often,
+# when a plan changes.
 WINDOW = 10.0  # s
 # Meshes computed in one call: each costs as much as the frames of a whole window, so a few at a time.
 MESHES = 8

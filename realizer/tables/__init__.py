@@ -206,13 +206,14 @@ def au_to_fap() -> tuple[AuToFap, ...]:
     return read_csv(text_of("au_to_fap.csv"), AuToFap, "au_to_fap.csv")
 
 
-def by_number(rows: tuple[ActionUnit, ...]) -> Mapping[int, ActionUnit]:
-    """AU number -> row."""
-    return {row.au: row for row in rows}
+@cache
+def by_number() -> Mapping[int, ActionUnit]:
+    """AU number -> its row of `action_units`."""
+    return {row.au: row for row in action_units()}
 
 
 def nearest(number: int) -> str:
     """The three action units nearest to a number, for messages: "2 (Outer brow raiser), 4 (...), ..."."""
-    known = by_number(action_units())
+    known = by_number()
     near = sorted(sorted(known, key=lambda au: (abs(au - number), au))[:3])
     return ", ".join(f"{au} ({known[au].name})" for au in near)

@@ -148,7 +148,7 @@ def _unit(text: str, sets: Mapping[str, Any]) -> Unit:
     if match is None:
         raise TableError(f"wanted the number of an action unit, got {text!r}")
     number, name = int(match[1]), match[2].upper()
-    if number not in tables.by_number(tables.action_units()):
+    if number not in tables.by_number():
         raise TableError(f"wanted an action unit that a face shows, got AU{number}")
     if name and name not in sets:
         known = " or ".join(sets) if sets else "no letter here"

@@ -96,7 +96,7 @@ def _rows(part: str) -> dict[str, Mapping[str, Any]]:
 
 def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], float]:
     """(AU, side) -> intensity of a row such as { 1 = 0.5, 12L = 1.0 }; `place` is for messages."""
-    known = tables.by_number(tables.action_units())
+    known = tables.by_number()
     aus = {}
     for cell, amount in cells.items():
         match = re.fullmatch(r"(\d+)([LR]?)", cell)
@@ -110,7 +110,7 @@ def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], fl
 
 
 def _pose(name: str, row: Mapping[str, Any], pose: str) -> dict[int, float]:
-    known = tables.by_number(tables.action_units())
+    known = tables.by_number()
     degrees = {}
     for cell, angle in row[pose].items():
         au = known.get(int(cell)) if cell.isdigit() else None

@@ -174,7 +174,7 @@ def _number(field: str, name: str, where: str) -> float:
 
 
 def _known(au: int, where: str) -> None:
-    if au not in by_number(action_units()):
+    if au not in by_number():
         raise TableError(f"{where}: wanted a FACS action unit, got {au}; near: {nearest(au)}")
 
 
@@ -195,7 +195,7 @@ def _check(row: AuToFap, where: str) -> None:
 
 def _sides(au: int, side: str) -> list[tuple[int, Side]]:
     """What a file's action unit is on our axis."""
-    if not by_number(action_units())[au].sides:
+    if not by_number()[au].sides:
         return [(au, "")]
     return [(au, cast(Side, side))] if side else [(au, "L"), (au, "R")]
 

@@ -25,7 +25,7 @@ from scipy.optimize import Bounds, LinearConstraint, minimize
 from realizer import tables
 from realizer.arrays import Float32, Float64
 from realizer.face import load_face
-from realizer.tables import action_units, by_number, faps, read_csv
+from realizer.tables import by_number, faps, read_csv
 
 # Upper and lower lip, one above the other: they part by -(upper + lower).
 INNER = ((4, 5), (8, 10))
@@ -111,7 +111,7 @@ def gaps_of(number: int, found: dict[int, dict[int, float]]) -> dict[tuple[int, 
 
 def rows_of(number: int, values: dict[int, float]) -> list[str]:
     """Rows of the table, both sides."""
-    sides = ("L", "R") if by_number(action_units())[number].sides else ("",)
+    sides = ("L", "R") if by_number()[number].sides else ("",)
     lines = []
     for side in sides:
         asks = dict(values) if side == "L" else {}

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
 import resource
 import struct
 import subprocess
@@ -48,7 +47,7 @@ def processes(parent: int) -> list[int]:
 
 
 def spent(parent: int) -> float:
-    """Processor seconds, to the nanosecond: what is sampled when clocks tick is wrong of who wakes with them."""
+    """Processor seconds, to the nanosecond: what clock ticks sample is wrong of who wakes with them."""
     threads = (t for process in processes(parent) for t in Path(f"/proc/{process}/task").iterdir())
     return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads) / 1e9
 

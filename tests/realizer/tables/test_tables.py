@@ -13,7 +13,7 @@ from realizer.errors import TableError
 from realizer.tables import Fap, lexemes, timing
 
 FAPS = {row.fap: row for row in tables.faps()}
-AUS = tables.by_number(tables.action_units())
+AUS = tables.by_number()
 ROWS = tables.au_to_fap()
 
 # Wojdel 2005, appendix A: the action units of Ekman and Friesen.
