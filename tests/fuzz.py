@@ -219,11 +219,11 @@ def tasks(seed: int, mutant: bytes) -> None:
     # A text that is too long is let go of when it is too long: how much of it is shown depends on the cuts.
     if not any(isinstance(one, Fault) for one in (*found, *once)):
         assert found == once, mutant
-    desk, now = Desk(1), 0.0
+    desk, now, settings = Desk(1), 0.0, Settings(media=CORPUS / "media")
     for one in found[:60]:
         if isinstance(one, Task):
             _answered(desk, list(desk.accept(one)), now)
-            brought = _or_words(lambda one=one: prepare(one, CORPUS / "media", 2**20))
+            brought = _or_words(lambda one=one: prepare(one, settings))
             _answered(desk, list(desk.run(one, brought, now)), now)
             now += random.choice((0.0, 0.1, 3.0))
 
