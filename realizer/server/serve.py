@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import gc
 import signal
 import socket
 from collections.abc import Awaitable, Coroutine
@@ -13,6 +12,7 @@ from types import TracebackType
 from realizer.errors import RealizerError
 from realizer.logs import write_json
 from realizer.scheduling import warm_up
+from realizer.server.cycles import leave_to_shell
 from realizer.server.doors.asap import AsapDoor
 from realizer.server.doors.door import Door
 from realizer.server.doors.stomp import StompDoor
@@ -25,9 +25,6 @@ from realizer.settings import Settings
 
 __all__ = ["Server", "run", "serve", "work"]
 
-# What plays leaves no cycles behind, only what fails does: they are looked for seldom, since a search through
-# the whole memory of a thousand sessions stops all of them for most of a second.
-SEARCH_CYCLES = (20_000, 20, 100)
 # How often the drain looks whether everything has ended.
 DRAIN_STEP = 0.05  # s
 
@@ -91,9 +88,7 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
 
 
 async def _serve(server: Server, asked: Awaitable[None]) -> None:
-    gc.collect()
-    gc.freeze()  # tables and faces stay as long as the service
-    gc.set_threshold(*SEARCH_CYCLES)
+    leave_to_shell()
     telling = [asyncio.create_task(_tell(door)) for door in server.doors]
     try:
         await asked

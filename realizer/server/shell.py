@@ -15,6 +15,7 @@ from realizer.expressions import library_of
 from realizer.mapping import mapping_of
 from realizer.server.alarms import Alarms
 from realizer.server.connection import SLOW
+from realizer.server.cycles import Cycles
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import ANYBODY, Hub, HubError, Visitor
@@ -65,6 +66,7 @@ class Shell:
         self._scene: Mapping[str, Position] | None = None
         self._capabilities: dict[str, Any] = {}
         self._ending = False
+        self._cycles = Cycles()
         self._closed = False
         self._journal: Journal | None = None
         self._record: Log | None = None
@@ -245,6 +247,7 @@ class Shell:
             self.metrics.counts["frames_dropped"] += left.dropped(number)
         self._hub.leave(number, self._loop.time())
         self._clients.pop(number, None)
+        self._cycles.ended += 1
         if left is not None:
             self._arm(left)
 
@@ -380,6 +383,7 @@ class Shell:
         self._pump(session)
 
     def _sweep(self) -> None:
+        self._cycles.look(len(self._clients))
         now = self._loop.time()
         self._hub.sweep(now)
         self._taken_over = {name: end for name, end in self._taken_over.items() if end > now}

@@ -21,6 +21,7 @@ import numpy as np
 __all__ = ["FPS", "Crowd"]
 
 FPS = 25
+CALM = 0.5  # s
 EVERY = 10.0  # s between two documents of a session
 SCENE = {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}
 BODY = (
@@ -127,15 +128,12 @@ class Crowd:
 
     def listen(self, seconds: float) -> dict[str, float]:
         """Play and listen for some time: what came in it, lateness and answers in ms."""
+        self._go_on(CALM)  # what came while nobody listened is not late
         self._frames = self._missing = 0
         self._late.clear()
         self._answers.clear()
         begun, used = time.time(), time.process_time()
-        while (now := time.time()) < begun + seconds:
-            for number, _ in self._poll.poll(0.002):
-                self._read(self._peers[number])
-            while self._due and self._due[0][0] <= now:
-                self._send()
+        self._go_on(seconds)
         late, answers = self._late or [0.0], self._answers or [0.0]
         return {
             "frames": self._frames,
@@ -146,6 +144,14 @@ class Crowd:
             **{f"answer_{n}": 1e3 * float(np.percentile(answers, part)) for n, part in PARTS.items()},
             "load": (time.process_time() - used) / (time.time() - begun),
         }
+
+    def _go_on(self, seconds: float) -> None:
+        end = time.time() + seconds
+        while (now := time.time()) < end:
+            for number, _ in self._poll.poll(0.002):
+                self._read(self._peers[number])
+            while self._due and self._due[0][0] <= now:
+                self._send()
 
     def _read(self, peer: Peer) -> None:
         try:
