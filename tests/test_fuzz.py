@@ -71,9 +71,9 @@ def test_a_law_that_is_broken_is_noticed_with_its_seed(monkeypatch: pytest.Monke
     # One message in three is not numbered: clients of the session see the gap.
     real = FeedbackLog.add
 
-    def forgetful(log: FeedbackLog, feedback: Feedback) -> None:
+    def forgetful(log: FeedbackLog, feedback: Feedback, now: float) -> str:
         log.newest += log.newest % 3 == 1
-        real(log, feedback)
+        return real(log, feedback, now)
 
     monkeypatch.setattr(FeedbackLog, "add", forgetful)
     with pytest.raises(AssertionError, match=r"--only sessions --seed \d+$") as caught:

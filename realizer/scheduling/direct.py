@@ -91,11 +91,14 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
     for label, times in zip(labels, at, strict=True):
         slide = 0.0 if label in begins or late[label] == NEVER else late[label]
         time += [seconds + slide for seconds in times]
-    # Exactly equal where the document says so, and exactly not too soon, whatever rounding did.
+    # Exactly equal where the document says so, exactly in order, exactly not too soon, whatever rounding did.
     for p in named:
         time[p] = time[ties.find(p)] + ties.shift[p]
-    for first, earliest in zip(problem.first, problem.earliest, strict=True):
+    for first, own, earliest in zip(problem.first, lists, problem.earliest, strict=True):
         time[first] = max(time[first], earliest)
+        for p in range(first + 1, first + len(own.chain)):
+            if time[p] < time[p - 1]:
+                time[p] = time[p - 1]
     return time, cost
 
 

@@ -31,6 +31,10 @@ def test_the_times_and_the_cost_are_those_found_in_arrays(recipe: Recipe, earlie
     time, cost = found
     other = in_arrays(recipe, earliest)
     np.testing.assert_allclose(time, other.time, rtol=0.0, atol=1e-9)
+    problem = built(recipe, earliest=earliest)
+    for first, timing in zip(problem.first, problem.timings, strict=True):
+        own = time[first : first + len(timing.points)]
+        assert own == sorted(own), "in order, whatever rounding did"
     assert cost == pytest.approx(other.cost, abs=1e-9)
     assert time[ORIGIN] == 0.0
 
