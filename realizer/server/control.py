@@ -72,7 +72,7 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
             case Unsubscribe():
                 if message.stream == "feedback":
                     connection.feedback = None
-                connection.subscriptions.pop((message.stream, message.character), None)
+                connection.subscriptions.pop(_key(session, message.stream, message.character), None)
             case SceneMessage():
                 session.player.set_scene(
                     None
@@ -165,8 +165,9 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
         session.reply(connection.id, Subscribed(stream=stream, encoding=encoding, **told))
         return
     index = index_of(session, message.character)
+    key = _key(session, stream, message.character)
     if stream == "schedule":
-        connection.subscriptions[stream, message.character] = PlanSubscription(
+        connection.subscriptions[key] = PlanSubscription(
             None if message.character is None else index, message.character
         )
         session.reply(
@@ -175,7 +176,7 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
         return
     fps = message.fps or session.settings.fps
     told = {"stream": stream, "encoding": encoding, "index": index}
-    old = connection.subscriptions.get((stream, message.character))
+    old = connection.subscriptions.get(key)
     subscription: Subscription
     if stream == "audio":
         one = None if message.character is None else index
@@ -206,7 +207,7 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
             told["names"] = list(AU_NAMES())
         elif stream == "arkit":
             told["names"] = arkit_names()
-    connection.subscriptions[stream, message.character] = subscription
+    connection.subscriptions[key] = subscription
     session.reply(connection.id, Subscribed(character=message.character, **told))
 
 
@@ -335,6 +336,16 @@ def _state(session: Session, connection: Connection, t: float) -> StateMessage:
         connections=len(session.connections),
         dropped=connection.dropped,
     )
+
+
+def _key(session: Session, stream: str, character: str | None) -> tuple[str, str | None]:
+    """What a subscription is replaced by; the first character is who is meant where nobody is named.
+
+    But of sound and plans: those that name nobody are of all.
+    """
+    if stream not in ("audio", "schedule") and character == session.player.characters[0]:
+        return stream, None
+    return stream, character
 
 
 def index_of(session: Session, character: str | None) -> int:

@@ -192,6 +192,8 @@ class Shell:
                 log.exception("session %s cannot be gone on with", name)
                 raise JournalError(f"session {name} cannot be gone on with: internal error") from None
             session.notes = Notes(name, journal, kept=kept)
+            if self._record is not None:
+                log.warning("session %s is gone on with from the journal: it is recorded no further", name)
             at = caught_up(session, at, seen)
             owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
             now = self._loop.time()

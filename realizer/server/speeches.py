@@ -244,9 +244,14 @@ class Speeches:
         return replace(feedback, said=" ".join([*speech.said, *words])), left
 
     @property
+    def open(self) -> list[str]:
+        """Ids of those whose end nobody knows yet."""
+        return [speech.id for speech in self._speeches.values() if not speech.over]
+
+    @property
     def lasting(self) -> bool:
         """Whether `settle` may have something to do as time passes."""
-        return any(not speech.over for speech in self._speeches.values())
+        return bool(self.open)
 
     def settle(self, t: float) -> bool:
         """Let the block of each speech end with its last piece; True where one ends at another time."""

@@ -151,7 +151,8 @@ class Workers:
                 return
             child, _ = self._children[number]
             await loop.run_in_executor(None, child.join)
-            log.error("worker %d ended with status %s: its sessions are lost", number, child.exitcode)
+            fate = "are lost" if self._settings.journal is None else "go on when their clients come back"
+            log.error("worker %d ended with status %s: its sessions %s", number, child.exitcode, fate)
             control.close()
             self._children[number] = child, control = self._begin(number)
             if (words := await _lacks(control)) is not None:

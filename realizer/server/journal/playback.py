@@ -51,6 +51,9 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         replay(session, record.entries, studio.speak)
     finally:
         studio.close()
+    # What was being said when the record broke off has no end of its own.
+    last = record.entries[-1].at if record.entries else 0.0
+    session.player.stop(last, session.intake.speeches.open)
     for feedback in session.player.due(float("inf")):
         session.log.add(feedback, float("inf"))
     player = session.player

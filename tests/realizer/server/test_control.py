@@ -208,6 +208,7 @@ def test_a_speech_that_is_open_is_known_from_its_first_message_on(drive) -> None
 def test_the_pictures_of_a_session_are_bounded_together_and_a_shared_one_counts_once(drive) -> None:
     driver = drive(max_pixels=64 * 64 * 50)
     driver.join(2)
+    driver.join(3)
 
     def look(connection: int, **asked) -> str:
         """The answer to a subscription of pictures, 64 x 64 at 25 a second."""
@@ -216,13 +217,13 @@ def test_the_pictures_of_a_session_are_bounded_together_and_a_shared_one_counts_
 
     assert look(1) == look(2) == "subscribed"  # the same picture
     assert look(2, light="evening") == "subscribed"  # its own, in place of that
-    assert look(1, character="Ada", light="evening") == "subscribed"  # the first and only one there is
+    assert look(3, character="Ada", light="evening") == "subscribed"  # the first and only one there is
     assert look(2, camera="three-quarter") == "error"  # a third one
     (error,) = driver.clients[2].of("error")
     assert error["where"] == "subscribe.fps"
     assert "REALIZER_MAX_PIXELS" in error["message"]
     driver.send({"type": "unsubscribe", "stream": "video"})
-    driver.send({"type": "unsubscribe", "stream": "video", "character": "Ada"})
+    driver.send({"type": "unsubscribe", "stream": "video", "character": "Ada"}, 3)
     assert look(2, camera="three-quarter") == "subscribed"
 
 
@@ -237,3 +238,15 @@ def test_times_are_told_to_the_microsecond(drive) -> None:
     assert pong["time"] == state["time"] == welcome["time"] == 0.333333
     (block,) = state["blocks"]
     assert (block["start"], block["end"]) == (0.333333, 0.45679)
+
+
+def test_a_stream_of_the_first_character_is_replaced_whether_it_is_named_or_not(driver) -> None:
+    driver.send({"type": "character", "id": "Ada"})
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 10})
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 20, "character": "Ada"})
+    client = driver.run(1.0)
+    assert [frame.time for frame in client.frames[-3:]] == pytest.approx([0.9, 0.95, 1.0])
+    driver.send({"type": "unsubscribe", "stream": "fap"})
+    count = len(client.frames)
+    driver.run(2.0)
+    assert len(client.frames) == count

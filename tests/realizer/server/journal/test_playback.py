@@ -83,6 +83,26 @@ def test_a_record_that_broke_off_is_played_to_the_end_of_what_was_planned(tmp_pa
     assert again[:4] == told[:4]
 
 
+def test_a_record_that_broke_off_in_a_speech_ends_with_what_had_been_said(tmp_path: Path) -> None:
+    session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
+    record = FolderJournal(tmp_path, head(SETTINGS, None))
+    session.notes = Notes("s", record=record)
+    session.notes.begin(1e9)
+    session.connect(1, 100.0)
+    session.receive(1, '{"type": "speech", "id": "turn", "append": "One two three. Four"}', 100.1)
+    for step in range(100):
+        now = 100.1 + step * 0.02
+        session.tick(now)
+        for effect in session.outgoing():
+            if isinstance(effect, Speak):
+                session.spoken(effect.id, fitted(SilentVoice(), effect.say), now)
+    record.close()
+    (path,) = tmp_path.glob("*.jsonl")
+    realization, again = played(read_record(path))
+    assert any('"turn:end"' in text for text in again)
+    assert 1.0 < realization.duration < 10.0
+
+
 @pytest.mark.parametrize(
     ("first", "fault"),
     [
