@@ -22,6 +22,7 @@ __all__ = ["FPS", "Crowd"]
 
 FPS = 25
 CALM = 0.5  # s
+PING, PONG = 9, 10
 EVERY = 10.0  # s between two documents of a session
 SCENE = {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}
 BODY = (
@@ -164,7 +165,9 @@ class Crowd:
             return
         peer.data += data
         for code, payload in messages(peer.data):
-            if code == 2 and payload[0] == 1:
+            if code == PING:  # who does not answer is taken for gone
+                peer.socket.sendall(bytes([0x80 | PONG, 0x80 | len(payload)]) + bytes(4) + payload)
+            elif code == 2 and payload[0] == 1:
                 self._frame(peer, payload, 4, came)
             elif code == 1 and payload[:1] == b"<":
                 if (found := POSIX.search(payload)) is not None:
