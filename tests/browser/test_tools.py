@@ -174,6 +174,8 @@ def test_behaviours_are_drawn_as_scheduled_and_as_they_happened(page) -> None:  
     page.press("#document", "Control+Enter")
     page.wait_for_selector("#log li:has-text('drawn ends')")
     page.wait_for_function("document.querySelectorAll('#score .happened').length === 2")
+    # What is told is drawn with the next picture.
+    page.wait_for_function("document.querySelectorAll('#score .track:not(.curve) i.dot').length === 11")
     assert page.text_content("#playing") == "drawn"
     rows = page.locator("#score .track:not(.curve)")
     assert rows.locator("> span").all_text_contents() == ["n", "f"]
