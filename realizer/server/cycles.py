@@ -43,8 +43,9 @@ class Cycles:
         Args:
             alive: how many connections there are.
         """
-        self._least = min(self._least, memory())
-        if self.ended < max(ENDED, alive) and memory() < GROWN * self._least + MORE:
+        used = memory()
+        self._least = min(self._least, used)
+        if self.ended < max(ENDED, alive) and used < GROWN * self._least + MORE:
             return False
         gc.collect()
         self.ended, self._least = 0, memory()

@@ -29,6 +29,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from plot import exponent
 
 from bml_schema import MOST_BEHAVIOURS, Block, parse
 from realizer.player import Player
@@ -256,7 +257,7 @@ def main() -> None:
         ("chain of <after>s", ordered),
     ):
         medians = [median(make_n(n), 0.2) for n in sizes]
-        slope = np.polyfit(np.log(sizes), np.log([processor for _, processor in medians]), 1)[0]
+        slope = exponent(sizes, [processor for _, processor in medians])
         times = ", ".join(f"{n}: {t * 1e3:.2f} ms" for n, (t, _) in zip(sizes, medians, strict=True))
         print(f"{name:40} {slope:10.2f}   {times}")
 

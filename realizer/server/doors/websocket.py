@@ -238,7 +238,7 @@ class WebSocketDoor:
         except ConnectionClosed:
             pass
         except TimeoutError:
-            await client._close(1008, "token: it has expired")
+            await client.close(1008, "token: it has expired")
         finally:
             self._shell.leave(number)
             log.info("left", extra={**told, "code": socket.close_code})

@@ -36,10 +36,10 @@ class WebSocketClient:
 
     def end(self, code: int, reason: str) -> None:
         if self._end is None:
-            self._end = asyncio.get_running_loop().create_task(self._close(code, reason))
+            self._end = asyncio.get_running_loop().create_task(self.close(code, reason))
 
-    async def _close(self, code: int, reason: str) -> None:
-        """One that does not read will not hear that it is let go: `close` would wait for it for ever."""
+    async def close(self, code: int, reason: str) -> None:
+        """Let it go, and wait until it is gone; one that does not read will never hear of it."""
         try:
             async with asyncio.timeout(GOODBYE):
                 await self._socket.close(code, reason)
