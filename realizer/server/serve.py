@@ -152,7 +152,7 @@ class Server:
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
         self.settings = settings or Settings()
         self._shell = Shell(self.settings, worker)
-        self._web = WebSocketDoor(self._shell, self.settings, listens=worker is None)
+        self._web = WebSocketDoor(self._shell, self.settings, worker=worker)
         self.doors: list[Door] = []
         self._closed = asyncio.Event()
 

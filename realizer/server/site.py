@@ -13,7 +13,7 @@ from urllib.parse import parse_qs, unquote
 from realizer.errors import FaceError, RealizerError
 from realizer.settings import Settings
 
-__all__ = ["Answer", "Site"]
+__all__ = ["TEXT", "Answer", "Site"]
 
 JSON = "application/json; charset=utf-8"
 TEXT = "text/plain; charset=utf-8"

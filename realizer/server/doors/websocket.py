@@ -33,7 +33,7 @@ from realizer.server.messages import ErrorMessage
 from realizer.server.metrics import MEDIA_TYPE
 from realizer.server.passes import Pass
 from realizer.server.shell import Shell
-from realizer.server.site import Answer, Site
+from realizer.server.site import TEXT, Answer, Site
 from realizer.settings import Settings, raises
 
 __all__ = ["WebSocketDoor", "lines"]
@@ -50,12 +50,13 @@ class WebSocketDoor:
     """Serves `settings.host`; `port` is the one that is open after `start`.
 
     Args:
-        listens: or not: then it serves what it is told to `take`.
+        worker: the number of this one among several; then it serves what it is told to `take`.
     """
 
-    def __init__(self, shell: Shell, settings: Settings, *, listens: bool = True) -> None:
+    def __init__(self, shell: Shell, settings: Settings, *, worker: int | None = None) -> None:
         self.port = settings.port
-        self._listens = listens
+        self._listens = worker is None
+        self._worker = worker or 0
         self._taking: set[asyncio.Task[Any]] = set()
         self._shell = shell
         self._settings = settings
@@ -158,7 +159,9 @@ class WebSocketDoor:
         if path in ("/ws", "/check") or upgrade:
             got = "a WebSocket" if upgrade else "plain HTTP"
             words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
-            return _response(Answer(426 if not upgrade else 404, "text/plain; charset=utf-8", words.encode()))
+            return _response(Answer(426 if not upgrade else 404, TEXT, words.encode()))
+        if path in ("/metrics", "/healthz") and (wrong := self._other(request)) is not None:
+            return _response(Answer(404, TEXT, f"{wrong}\n".encode()))
         if path == "/metrics":
             try:
                 allowed = self._guard.request(request.path, _headers(request))
@@ -170,11 +173,18 @@ class WebSocketDoor:
         loop = asyncio.get_running_loop()
         return _response(await loop.run_in_executor(None, self._site.answer, request.path))
 
+    def _other(self, request: Request) -> str | None:
+        """Why the worker that a request names is not this one; None where it is, or none is named."""
+        named = parse_qs(urlsplit(request.path).query, keep_blank_values=True).get("worker", [])
+        if named[-1:] in ([], [str(self._worker)]):
+            return None
+        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {named[-1][:80]!r}"
+
     def _refused(self, connection: ServerConnection, error: HubError) -> Response:
         self._shell.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": _address(connection), "status": error.status})
         headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
-        return _response(Answer(error.status, "text/plain; charset=utf-8", f"{error}\n".encode(), headers))
+        return _response(Answer(error.status, TEXT, f"{error}\n".encode(), headers))
 
     def _room(self, socket: ServerConnection) -> None:
         """Whether one more may come from its address: nobody can take the room of all others.
@@ -344,8 +354,8 @@ def _query(request: Request) -> tuple[str | None, int | None]:
     Raises:
         HubError: 400, `seen` is no number.
     """
-    query = parse_qs(urlsplit(request.path).query)
-    session = query.get("session", [None])[-1]
+    query = parse_qs(urlsplit(request.path).query, keep_blank_values=True)
+    session = query.get("session", [None])[-1] or None
     seen = query.get("seen", [None])[-1]
     if seen is None:
         return session, None

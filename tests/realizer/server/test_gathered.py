@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 
 import pytest
@@ -21,6 +22,10 @@ def answer(status: str, body: str) -> bytes:
 
 def of(number: int) -> bytes:
     return answer("200 OK", Metrics(worker=number).text(dict.fromkeys(GAUGES, number + 1), {}))
+
+
+def health(sessions: int) -> bytes:
+    return answer("200 OK", json.dumps({"status": "ok", "sessions": sessions, "connections": 2}))
 
 
 def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list[bytes]]:
@@ -85,6 +90,25 @@ def test_workers_that_say_nothing_are_left_out(monkeypatch: pytest.MonkeyPatch) 
     assert asked(b"")[0].startswith(b"HTTP/1.1 503 ")
 
 
+def test_health_is_the_sum_and_says_who_does_not_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "HASTE", 0.2)
+    request = REQUEST.replace(b"/metrics", b"/healthz")
+
+    def told(*answers: bytes | None) -> tuple[bytes, object]:
+        head, _, body = asked(*answers, request=request)[0].partition(b"\r\n\r\n")
+        assert b"Content-Length: %d" % len(body) in head
+        return head[9:12], json.loads(body)
+
+    whole = {"status": "ok", "sessions": 3, "connections": 4, "workers": 2}
+    assert told(health(1), health(2)) == (b"200", whole)
+    partly = {"status": "partly", "sessions": 1, "connections": 2, "workers": 3, "silent": [1, 2]}
+    assert told(health(1), None, b"") == (b"200", partly)
+    got, _ = asked(None, b"", request=request)
+    assert got.startswith(b"HTTP/1.1 503 ")
+    assert got.endswith(b"no worker answers")
+    assert b"Content-Length: %d\r\n" % len(b"no worker answers") in got
+
+
 def test_half_a_request_is_answered_by_nothing() -> None:
     assert asked(of(0), request=b"GET /metrics HTTP/1.1\r\nHost") == (b"", [])
 
@@ -98,6 +122,8 @@ def test_half_a_request_is_answered_by_nothing() -> None:
         ("GET /metrics?worker=1 HTTP/1.1", False),
         ("GET /metrics?token=x&worker=1 HTTP/1.1", False),
         ("GET /metricsx HTTP/1.1", False),
+        ("GET /healthz HTTP/1.1", True),
+        ("GET /healthz?worker=0 HTTP/1.1", False),
         ("GET /ws?session=metrics HTTP/1.1", False),
         ("POST /metrics HTTP/1.1", False),
         ("", False),

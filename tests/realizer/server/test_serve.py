@@ -158,6 +158,18 @@ def test_a_bad_session_name_is_refused_before_the_handshake() -> None:
     serving(test)
 
 
+@pytest.mark.parametrize("seen", ["abc", "-1", "1.5", "", "9" * 16])
+def test_a_seen_that_is_no_number_is_refused_before_the_handshake(seen: str) -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as caught:
+            await connect(f"{server.url}?session=s&seen={seen}")
+        assert caught.value.response.status_code == 400
+        said = f"seen: wanted the number of the last feedback that came, got {seen!r}\n"
+        assert caught.value.response.body.decode() == said
+
+    serving(test)
+
+
 def fetch(url: str) -> tuple[int, str, bytes]:
     try:
         with urllib.request.urlopen(url, timeout=LIMIT) as answer:
@@ -172,6 +184,9 @@ def test_http_is_answered_on_the_same_port() -> None:
         status, media_type, body = await asyncio.to_thread(fetch, server.page + "healthz")
         assert (status, media_type) == (200, "application/json; charset=utf-8")
         assert json.loads(body)["status"] == "ok"
+        assert (await asyncio.to_thread(fetch, server.page + "healthz?worker=0"))[0] == 200
+        missing = (404, "text/plain; charset=utf-8", b"worker: wanted a number of 0..0, got '1'\n")
+        assert await asyncio.to_thread(fetch, server.page + "metrics?worker=1") == missing
         assert (await asyncio.to_thread(fetch, server.page + "nothing"))[0] == 404
         assert (await asyncio.to_thread(fetch, server.page + "ws"))[0] == 426
 

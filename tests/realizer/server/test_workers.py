@@ -152,6 +152,45 @@ def test_one_scrape_tells_the_sum_of_all_workers(workers: Workers) -> None:
     played(test())
 
 
+@pytest.mark.parametrize("named", ["9", "2", "x", "-1", "", "01"])
+@pytest.mark.parametrize("path", ["metrics", "healthz"])
+def test_a_worker_that_there_is_not_is_not_found(workers: Workers, path: str, named: str) -> None:
+    with pytest.raises(urllib.error.HTTPError, match="404") as missing:
+        urllib.request.urlopen(f"http://127.0.0.1:{workers.port}/{path}?worker={named}", timeout=LIMIT)
+    assert missing.value.read().decode() == f"worker: wanted a number of 0..1, got {named!r}\n"
+    missing.value.close()
+
+
+def health(workers: Workers, query: str = "") -> dict[str, object]:
+    with urllib.request.urlopen(f"http://127.0.0.1:{workers.port}/healthz{query}", timeout=LIMIT) as answer:
+        told: dict[str, object] = json.loads(answer.read())
+    return told
+
+
+def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        names = [one_of(0), one_of(1)]
+        async with contextlib.AsyncExitStack() as stack:
+            for name in names:
+                await stack.enter_async_context(connect(f"{url}?session={name}"))
+            each = [await asyncio.to_thread(health, workers, f"?worker={k}") for k in (0, 1)]
+            assert all(one["connections"] for one in each)
+            whole = await asyncio.to_thread(health, workers)
+            assert (whole["status"], whole["workers"]) == ("ok", 2)
+            assert whole["connections"] == sum(int(str(one["connections"])) for one in each)
+            os.kill(workers.processes[1], signal.SIGSTOP)
+            try:
+                left = await asyncio.to_thread(health, workers)
+            finally:
+                os.kill(workers.processes[1], signal.SIGCONT)
+            assert (left["status"], left["silent"]) == ("partly", [1])
+            assert left["connections"] == each[0]["connections"]
+
+    played(test())
+
+
 def test_one_worker_that_hangs_is_left_out_of_the_sum(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
