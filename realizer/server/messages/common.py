@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 
 __all__ = [
     "MAX_CONTROL",
@@ -12,12 +12,14 @@ __all__ = [
     "PICTURES",
     "PROTOCOL",
     "STREAMS",
+    "WHOLE",
     "Encoding",
     "Message",
     "Picture",
     "Reply",
     "Seconds",
     "Stream",
+    "Whole",
 ]
 
 # Version of the protocol that `hello` and `welcome` name.
@@ -28,6 +30,20 @@ MAX_CONTROL = 256 * 1024  # bytes
 # The highest rate of frames; ten times as fast as a film.
 MAX_FPS = 240
 
+# Beyond these a float skips numbers.
+EXACT = 2**53
+
+
+def _whole(value: object) -> object:
+    """JSON has one kind of number, and what writes it may write 25 as 25.0."""
+    if isinstance(value, float) and value.is_integer() and abs(value) < EXACT:
+        return int(value)
+    return value
+
+
+# A whole number of a message in; and what makes one that has bounds of its own, given behind them.
+WHOLE = BeforeValidator(_whole)
+Whole = Annotated[int, WHOLE]
 # Of a time no more is told than anybody can mean.
 Seconds = Annotated[float, AfterValidator(lambda time: round(time, 6))]
 Stream = Literal["feedback", "fap", "au", "arkit", "mesh", "audio", "video", "schedule"]
@@ -49,9 +65,9 @@ PICTURES: dict[str, str] = {"jpeg": "image/jpeg", "png": "image/png", "webp": "i
 
 
 class Message(BaseModel):
-    """A message in: no unknown fields, no NaN."""
+    """A message in: no unknown fields, no NaN, numbers that are numbers: neither `true` nor "25"."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class Reply(BaseModel):

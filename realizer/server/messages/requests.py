@@ -6,7 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, ConfigDict, Field, field_validator
 
-from realizer.server.messages.common import MAX_FPS, PROTOCOL, Encoding, Message, Picture, Stream
+from realizer.server.messages.common import (
+    MAX_FPS,
+    PROTOCOL,
+    WHOLE,
+    Encoding,
+    Message,
+    Picture,
+    Stream,
+    Whole,
+)
 
 __all__ = [
     "Anticipate",
@@ -23,7 +32,8 @@ __all__ = [
 ]
 
 FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
-Side = Annotated[int, Field(ge=16)]
+Side = Annotated[int, Field(ge=16), WHOLE]
+Numbered = Annotated[int, Field(ge=0), WHOLE]
 
 
 class Hello(Message):
@@ -38,9 +48,9 @@ class Hello(Message):
     )
 
     type: Literal["hello"]
-    version: int = Field(PROTOCOL, description="of the protocol that the client speaks")
+    version: Whole = Field(PROTOCOL, description="of the protocol that the client speaks")
     session: str | None = Field(None, pattern=r"^[A-Za-z0-9._~-]{1,64}$")
-    seen: int | None = Field(None, ge=0, description="seq of the last feedback that arrived")
+    seen: Numbered | None = Field(None, description="seq of the last feedback that arrived")
     token: str | None = Field(
         None, max_length=4096, description="of the service, where it asks for one and none came before"
     )
@@ -78,7 +88,7 @@ class Subscribe(Message):
     encoding: Encoding | None = Field(None, description="None: the stream's first")
     fps: float | None = Field(None, gt=0, le=MAX_FPS, description="None: the service's own rate")
     character: str | None = Field(None, max_length=256, description="None: the first")
-    size: tuple[Side, Side] = Field((512, 512), description="video: width, height in pixels")
+    size: tuple[Side, Side] = Field((512, 512), strict=False, description="video: width, height in pixels")
     camera: str | None = Field(None, max_length=64, description="video: None: the service's own")
     light: str | None = Field(None, max_length=64, description="video: None: the service's own")
     background: str | None = Field(
@@ -87,10 +97,10 @@ class Subscribe(Message):
         description="video: a colour, or of PNG and WebP transparent; None: the service's, or the light's",
     )
     format: Picture = Field("jpeg", description="video: what the pictures are")
-    quality: int = Field(85, ge=1, le=100, description="video: of JPEG and WebP")
+    quality: Whole = Field(85, ge=1, le=100, description="video: of JPEG and WebP")
     asked: bool = Field(False, description="au: as asked for, before the rules of co-occurrence")
     elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
-    rate: int = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
+    rate: Whole = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
 
 
 class Unsubscribe(Message):
@@ -237,4 +247,4 @@ class Ping(Message):
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "ping", "id": 1}]})
 
     type: Literal["ping"]
-    id: int | str | None = None
+    id: Whole | str | None = None

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -17,6 +19,9 @@ from realizer.server.messages import (
     Subscribe,
     parse_control,
 )
+from tests.protocol import REQUESTS, asyncapi
+
+DOCUMENT = asyncapi()
 
 
 def test_every_supported_type_is_understood() -> None:
@@ -148,3 +153,57 @@ def test_a_scene_may_be_written_in_any_of_three_ways(objects: object) -> None:
     assert isinstance(message, SceneMessage)
     assert message.objects is not None
     assert (message.objects["cup"].x, message.objects["cup"].z) == (0.1, 0.5)
+
+
+def places(node: Any) -> Iterator[tuple[str, str, Callable[[Any], Any]]]:
+    """Where JSON of a schema may hold a number or a truth value, which, and what makes the rest around it."""
+    match node:
+        case {"$ref": ref}:
+            yield from places(DOCUMENT["components"]["schemas"][ref.rpartition("/")[2]])
+        case {"anyOf": kinds}:
+            if not any(kind.get("type") == "string" for kind in kinds):  # `ping` takes back any id
+                for kind in kinds:
+                    yield from places(kind)
+        case {"type": "number" | "integer" | "boolean" as kind}:
+            yield "", kind, lambda value: value
+        case {"type": "array"}:
+            items = node.get("prefixItems", [node.get("items")])
+            for place, item in enumerate(items):
+                for where, kind, inner in places(item):
+                    yield f".{place}{where}", kind, lambda v, n=place, f=inner: [100] * n + [f(v)]
+        case {"type": "object"}:
+            rest = dict.fromkeys(node.get("required", ()), 0)
+            for name, field in node.get("properties", {"12": node.get("additionalProperties")}).items():
+                for where, kind, inner in places(field):
+                    yield f".{name}{where}", kind, lambda v, n=name, f=inner, r=rest: {**r, n: f(v)}
+
+
+PLACES = [
+    (name + where, kind, make)
+    for name in SUPPORTED
+    for where, kind, make in places(DOCUMENT["components"]["messages"][name]["payload"])
+]
+
+
+def test_numbers_are_found_in_messages() -> None:
+    found = {where for where, _, _ in PLACES}
+    assert {"subscribe.fps", "subscribe.size.1", "set.aus.12", "scene.objects.12.z"} <= found
+    assert {"speech.words.0.start", "set.emotion.angle", "speech.close", "hello.seen"} <= found
+
+
+@pytest.mark.parametrize(("where", "kind", "make"), PLACES, ids=[where for where, _, _ in PLACES])
+def test_what_only_looks_like_a_number_is_none(where, kind, make) -> None:
+    name, field, *_ = where.split(".")
+    (example, *_) = DOCUMENT["components"]["schemas"][REQUESTS[name].__name__]["examples"]
+    for value in (1, "true", []) if kind == "boolean" else (True, "25", []):
+        error = parse_control(json.dumps({**example, field: make(value)[field]}))
+        assert isinstance(error, ErrorMessage)
+        assert error.where == where
+
+
+def test_a_whole_number_may_be_written_with_a_point() -> None:
+    message = parse_control('{"type":"subscribe","stream":"video","size":[64.0,48.0],"rate":22050.0}')
+    assert isinstance(message, Subscribe)
+    assert (message.size, message.rate) == ((64, 48), 22050)
+    assert isinstance(parse_control('{"type":"subscribe","stream":"video","quality":22.5}'), ErrorMessage)
+    assert isinstance(parse_control('{"type":"ping","id":true}'), ErrorMessage)
