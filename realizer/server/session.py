@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from realizer.animation.mapping import FapMapping
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError
-from realizer.mapping import mapping_of
 from realizer.player import HISTORY, Player
 from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
@@ -19,6 +17,7 @@ from realizer.server.clips import ClipError, Clips
 from realizer.server.connection import STUCK, Connection, PictureSubscription, Subscription, View
 from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send
+from realizer.server.faces import Faces
 from realizer.server.feedback_log import FeedbackLog
 from realizer.server.greeting import greeting
 from realizer.server.inbox import name_of
@@ -45,9 +44,6 @@ from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
 from realizer.speech.utterance import Utterance
 
-if TYPE_CHECKING:
-    from realizer.face.model import Face
-
 __all__ = ["Session"]
 
 log = logging.getLogger(__name__)
@@ -65,7 +61,6 @@ class Session:
         now: seconds on the caller's clock; the session's own clock starts here.
         named: it was asked for by name, and outlives its last connection by `settings.keep`.
         scene: where targets are, to begin with.
-        load_face: name -> Face, raising FaceError.
         capabilities: what `welcome` tells.
         epoch: POSIX seconds at `now`, told with every time; None leaves them out.
         history: seconds that have passed of which frames can still be asked for.
@@ -85,7 +80,6 @@ class Session:
         *,
         named: bool = False,
         scene: Mapping[str, Position] | None = None,
-        load_face: Callable[[str], Face] | None = None,
         capabilities: Mapping[str, Any] | None = None,
         epoch: float | None = None,
         history: float = HISTORY,
@@ -97,6 +91,7 @@ class Session:
         self.closed = False
         self.empty_since: float | None = now
         self.notes = Notes(id)
+        self.faces = Faces(settings)
         self.clips = Clips()
         self.player = Player(
             kinds=KINDS,
@@ -110,13 +105,11 @@ class Session:
             history=history,
             cooccurrence=settings.cooccurrence,
             prosody=settings.prosody,
-            takes=lambda index: self.face(index).takes,
+            takes=lambda index: self.faces.of(index).takes,
             refuses=lambda block, schedule: too_long(block, schedule, settings),
         )
-        self.load_face = load_face or (lambda name: _load_face(name, settings.deformer))
         self.capabilities = dict(capabilities or {})
-        self.faces: dict[int, str] = {}
-        self.broadcast = Broadcast(self.player, self.face, self.mapping, self.face_name)
+        self.broadcast = Broadcast(self.player, self.faces)
         self.intake = Intake(id, settings, self.player, self._owe)
         self._connections: dict[int, Connection] = {}
         self.telling = Telling(self.player, self.intake, epoch)
@@ -294,7 +287,7 @@ class Session:
             return
         self._stir()
         picture = result if isinstance(result, bytes) else None
-        effects, lookers = self.broadcast.drawn(draw, picture, self._connections.values())
+        effects, lookers = self.broadcast.pictures.drawn(draw, picture, self._connections.values())
         self._effects += effects
         if not isinstance(result, bytes):
             for connection in lookers:
@@ -349,9 +342,14 @@ class Session:
             self._publish(now - self.opened)
             self._compact(now - self.opened)
 
-    def pass_time(self, t: float) -> None:
-        """Tell what comes due before `t` on the session clock, each at its own time; for who replays it."""
+    def pass_time(self, t: float, look: Callable[[float], None] = lambda t: None) -> None:
+        """Tell what comes due before `t` on the session clock, each at its own time; for who replays it.
+
+        Args:
+            look: is called with each of those times, before anything happens then.
+        """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
+            look(due)
             self._publish(due)
 
     def _work(self, t: float, reads: bool = True) -> bool:
@@ -437,24 +435,5 @@ class Session:
         """A client asks for another session."""
         self._effects.append(Move(connection, session, seen))
 
-    # characters ---------------------------------------------------------------------------------
-
-    def face_name(self, index: int) -> str:
-        from realizer.face import face_name
-
-        return face_name(self.faces.get(index, self.settings.face))
-
-    def face(self, index: int) -> Face:
-        return self.load_face(self.face_name(index))
-
-    def mapping(self, index: int) -> FapMapping:
-        return mapping_of(self.face_name(index), self.settings.mapping)
-
     def reply(self, connection: int, reply: Any) -> None:
         self._effects.append(Send(connection, reply.text()))
-
-
-def _load_face(name: str, deformer: str | None) -> Face:
-    from realizer.face import load_face
-
-    return load_face(name, deformer=deformer)

@@ -90,9 +90,9 @@ def test_a_session_shows_characters_by_their_faces_and_the_users_mapping(own: Pa
     (own / "au_to_fap.txt").write_text("26\n3 0 1 0 111\n", "utf-8")
     (own / "mine.txt").write_text("27\n3 0 1 0 333\n", "utf-8")
     session = Session("s", Settings(mapping=own / "mine.txt"), 0.0)
-    assert (most(session.mapping(0), 26, 3), most(session.mapping(0), 27, 3)) != ([111], [333])
-    session.faces[0] = "own"
-    assert (most(session.mapping(0), 26, 3), most(session.mapping(0), 27, 3)) == ([111], [333])
+    assert (most(session.faces.mapping(0), 26, 3), most(session.faces.mapping(0), 27, 3)) != ([111], [333])
+    session.faces.given[0] = "own"
+    assert (most(session.faces.mapping(0), 26, 3), most(session.faces.mapping(0), 27, 3)) == ([111], [333])
 
 
 def test_a_setting_names_a_file_that_is_there() -> None:

@@ -80,7 +80,7 @@ def _state(session: Session, t: float) -> dict[str, Any]:
         "told": _told(session),
         "scene": None if scene is None else {name: list(place) for name, place in scene.items()},
         "characters": [plain_character(character) for character in player.held_by],
-        "faces": {str(index): face for index, face in session.faces.items()},
+        "faces": {str(index): face for index, face in session.faces.given.items()},
         "voices": {str(index): voice for index, voice in intake.voices.items()},
         "past": [plain_schedule(schedule) for schedule in past],
         "expected": plain_schedule(expected),
@@ -97,7 +97,7 @@ def _restore(session: Session, told: Mapping[str, Any], parts: Mapping[str, str]
     player.restore(
         map(character_of, told["characters"]), map(schedule_of, told["past"]), schedule_of(told["expected"])
     )
-    session.faces.update({int(index): face for index, face in told["faces"].items()})
+    session.faces.given.update({int(index): face for index, face in told["faces"].items()})
     intake.voices.update({int(index): voice for index, voice in told["voices"].items()})
     intake.orders.placed, intake.orders.fault = int(told["spoken"]), told["fault"]
     session.clips.restore((id, parts[CLIP + id]) for id in told["clips"])

@@ -1,25 +1,39 @@
-"""A record in, what was seen and heard of its session out, as of documents that are realized."""
+"""A record in, what was told, seen and heard of its session out, as those had it who were there."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from bml_schema import Feedback
-from realizer.realization import Realization, seen
+from realizer.composition.playing import Speaking
+from realizer.realization import Realization, counted, warned
 from realizer.server.feedback_log import FeedbackLog
+from realizer.server.journal.checkpoint import restore
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.folder import Record
 from realizer.server.journal.replay import replay
+from realizer.server.journal.viewer import Viewer
 from realizer.server.session import Session
 from realizer.server.studio import Studio
 from realizer.settings import Settings, SettingsError
 
-__all__ = ["played"]
+__all__ = ["played", "told"]
+
+
+def told(record: Record, **changed: Any) -> list[str]:
+    """The feedback of a session that is played again, XML texts with their `seq`; as `played`."""
+    again = _Again(record, changed)
+    again.play()
+    return [text for _, text in again.log.told]
 
 
 def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
-    """Play a record again, to the end of what was planned last.
+    """Play a record again, as it was seen: to its end, or until nothing moves that was planned or held.
+
+    What was only planned before something else was done is not in it; nor is what is past changed by what
+    was done later. A record that begins with a checkpoint is seen from there: all times are from then on.
 
     Args:
         changed: settings that are to be other than they were, where they are not None.
@@ -28,45 +42,70 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         What was seen and heard, and the feedback as it was told, XML texts with their `seq`.
 
     Raises:
-        JournalError: a setting or the scene of its head cannot be used here.
+        JournalError: a setting, the scene or the checkpoint of its head cannot be used here.
         FaceError: its face is not there.
+        RealizerError: it lasts too long.
     """
-    asked = {name: value for name, value in changed.items() if value is not None}
-    try:
-        settings = Settings.read({**_settings(record.head), **asked})
-    except SettingsError as error:
-        raise JournalError(f"the record of {record.head['session']}: {error}") from None
-    session = Session(
-        record.head["session"],
-        settings,
-        0.0,
-        named=True,
-        scene=_scene(record.head),
-        epoch=record.head["epoch"],
-        history=float("inf"),
-    )
-    log = session.telling.log = _Whole(record.head["epoch"])
-    studio = Studio(settings.deformer)
-    try:
-        replay(session, record.entries, studio.speak)
-    finally:
-        studio.close()
-    # What was being said when the record broke off has no end of its own.
-    last = record.entries[-1].at if record.entries else 0.0
-    session.player.stop(last, session.intake.speeches.open)
-    for feedback in session.player.due(float("inf")):
-        session.log.add(feedback, float("inf"))
-    player = session.player
-    realization = seen(
-        player,
-        [feedback for feedback, _ in log.told],
-        [playing.schedule for playing in player.cast.all()],
+    again = _Again(record, changed)
+    session, settings = again.session, again.session.settings
+    viewer = Viewer(session, settings.fps, again.begin)
+    begin = viewer.first / settings.fps
+    counted(again.last - begin, settings.fps)
+    again.play(viewer.look)
+    end = max(again.last, viewer.still) - begin
+    characters = viewer.performances(counted(end, settings.fps))
+    feedback = [feedback for feedback, _ in again.log.told]
+    schedules = [playing.latest for playing in viewer.blocks]
+    speaking = [said for playing in viewer.blocks for said in playing.speech.values()]
+    realization = Realization(
         fps=settings.fps,
-        face=session.face_name(0),
+        duration=end,
+        face_name=session.faces.name(0),
+        characters=characters,
+        schedules=tuple(replace(one, start=one.start - begin) for one in schedules),
+        told=tuple(feedback),
+        warnings=warned(feedback, schedules),
+        speaking=tuple(sorted((_earlier(one, begin) for one in speaking), key=lambda one: one.start)),
         deformer=settings.deformer,
-        mapping=session.mapping(0),
+        mapping=session.faces.mapping(0),
     )
-    return realization, [text for _, text in log.told]
+    return realization, [text for _, text in again.log.told]
+
+
+class _Again:
+    """A session that is to be what was recorded.
+
+    Attributes:
+        begin: seconds on its clock where the record begins.
+        last: and of what was done last.
+    """
+
+    def __init__(self, record: Record, changed: Mapping[str, Any]) -> None:
+        head = record.head
+        asked = {name: value for name, value in changed.items() if value is not None}
+        try:
+            settings = Settings.read({**_settings(head), **asked})
+        except SettingsError as error:
+            raise JournalError(f"the record of {head['session']}: {error}") from None
+        self.session = Session(
+            head["session"], settings, 0.0, named=True, scene=_scene(head), epoch=head["epoch"]
+        )
+        self.log = self.session.telling.log = _Whole(head["epoch"])
+        self.begin = restore(self.session, record.parts) if record.parts else 0.0
+        self._entries = record.entries
+        self.last = record.entries[-1].at if record.entries else self.begin
+
+    def play(self, look: Callable[[float], None] = lambda t: None) -> None:
+        """Do all of it, and let what plays then come to its end; `look` as in `replay`."""
+        session = self.session
+        studio = Studio(session.settings.deformer)
+        try:
+            replay(session, self._entries, studio.speak, look)
+        finally:
+            studio.close()
+        # What was being said when the record broke off has no end of its own.
+        session.player.stop(self.last, session.intake.speeches.open)
+        session.pass_time(float("inf"), look)
 
 
 class _Whole(FeedbackLog):
@@ -80,6 +119,11 @@ class _Whole(FeedbackLog):
         text = super().add(feedback, now)
         self.told.append((feedback, text))
         return text
+
+
+def _earlier(speaking: Speaking, seconds: float) -> Speaking:
+    gains = tuple(gain.shifted(-seconds) for gain in speaking.gains)
+    return replace(speaking, start=speaking.start - seconds, until=speaking.until - seconds, gains=gains)
 
 
 def _settings(head: Mapping[str, Any]) -> dict[str, Any]:

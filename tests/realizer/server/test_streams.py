@@ -110,5 +110,5 @@ def test_the_state_tells_each_layer_s_part_of_the_face(drive) -> None:
     assert layers["gaze"]["aus"]
     assert "idle" not in layers
     assert face["aus"]["4L"] > 0
-    assert face["face"] == driver.session.face_name(0)
+    assert face["face"] == driver.session.faces.name(0)
     assert {(b["id"], *b["behaviours"]) for b in state["blocks"]} >= {("b", "f"), ("g", "g")}

@@ -160,7 +160,7 @@ class Pair:
         assert torn.log.newest == whole.log.newest
         assert torn.player.characters == whole.player.characters
         assert torn.clips.ids == whole.clips.ids
-        assert (torn.faces, torn.intake.voices) == (whole.faces, whole.intake.voices)
+        assert (torn.faces.given, torn.intake.voices) == (whole.faces.given, whole.intake.voices)
         assert torn.intake.orders.fault == whole.intake.orders.fault
         times = self._now + np.arange(4) / 25
         for index in range(len(whole.player.characters)):
