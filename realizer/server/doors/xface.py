@@ -96,9 +96,9 @@ class XfaceDoor:
         while data := await reader.read(READ):
             for found in tasks.feed(data):
                 match found:
-                    case Fault(text, large):
+                    case Fault(text, task):
                         log.info("xface: client %d: %s", seat.desk.owner, text)
-                        seat.do([ERROR] if large is None else seat.desk.refuse(large))
+                        seat.do(seat.desk.refuse(task))
                     case Task():
                         seat.do(seat.desk.accept(found))
                         brought = await self._prepared(found)

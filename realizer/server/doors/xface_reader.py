@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from realizer.server.doors.xface_wire import Task
 
@@ -20,10 +20,14 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A stretch of the stream that is no task, and why; `task` where it is one that is too large."""
+    """A stretch of the stream that is no task, and why.
+
+    Attributes:
+        task: as much as could be read of one that is too large, half, or has no name that can be one: "".
+    """
 
     text: str
-    task: Task | None = None
+    task: Task = Task("")
 
 
 _OPEN = re.compile(rb"<task(?=[\s/>])")
@@ -104,21 +108,25 @@ class TaskReader:
         if end is None or not end[0].startswith(b"</"):
             if end is not None:
                 got = "a NUL" if end[0] == b"\0" else "another <task"
-                return self._give_up(f"wanted </task>, got {got}: half a task", found)
+                return self._give_up(f"wanted </task>, got {got}: half a task", found, start[1])
             if len(self._data) > self._limit:
-                return self._too_large(start[1], found)
+                return self._give_up(self._too_large, found, start[1])
             self._looked = max(start.end(), len(self._data) - 80)  # an end may have come in half
             return False
         if end.end() > self._limit:
-            return self._too_large(start[1], found)
+            return self._give_up(self._too_large, found, start[1])
         self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), found)
         return True
 
     def _tell(self, tag: bytes, body: bytes, end: int, found: list[Task | Content | Fault]) -> None:
         self._drop(end)
-        task = _task(tag.decode("utf-8", "replace"), body.decode("utf-8", "replace"))
+        task = replace(_head(tag), params=_params(body.decode("utf-8", "replace")))
+        if not task.name:
+            got = _values(tag).get("name", "")
+            found.append(Fault(f"wanted <task> with the name of a task, got {got[:64]!r}", _head(tag)))
+            return
         found.append(task)
-        if not isinstance(task, Task) or task.name != FOLLOWED or len(task.params) != 2:
+        if task.name != FOLLOWED or len(task.params) != 2:
             return
         size = task.params[1].strip()
         if not (size.isascii() and size.isdecimal() and len(size) < 12 and 0 < int(size) <= self._limit):
@@ -136,13 +144,13 @@ class TaskReader:
         self._content = None
         return True
 
-    def _too_large(self, tag: bytes, found: list[Task | Content | Fault]) -> bool:
-        task = _task(tag.decode("utf-8", "replace"), "")
-        text = f"wanted a task of at most {self._limit} bytes, got more"
-        return self._give_up(text, found, task if isinstance(task, Task) else None)
+    @property
+    def _too_large(self) -> str:
+        return f"wanted a task of at most {self._limit} bytes, got more"
 
-    def _give_up(self, text: str, found: list[Task | Content | Fault], task: Task | None = None) -> bool:
-        found.append(Fault(text, task))
+    def _give_up(self, text: str, found: list[Task | Content | Fault], tag: bytes = b"") -> bool:
+        """Tell of a fault; `tag` is what stands behind `<task` in the one that it is in."""
+        found.append(Fault(text, _head(tag)))
         self._lost = True
         self._drop(1)  # at least the mark that was misunderstood
         return True
@@ -162,12 +170,16 @@ class TaskReader:
         self._looked = 0
 
 
-def _task(tag: str, body: str) -> Task | Fault:
-    values = {name: one or two for name, one, two in _VALUE.findall(tag)}
+def _values(tag: bytes) -> dict[str, str]:
+    return {name: one or two for name, one, two in _VALUE.findall(tag.decode("utf-8", "replace"))}
+
+
+def _head(tag: bytes) -> Task:
+    """What a tag says of its task; its name is "" where it cannot be one."""
+    values = _values(tag)
     name = values.get("name", "")
-    if not _NAME.fullmatch(name):
-        return Fault(f"wanted <task> with the name of a task, got {name[:64]!r}")
-    return Task(name, _number(values.get("ownerId")), _number(values.get("taskId")), _params(body))
+    known = name if _NAME.fullmatch(name) else ""
+    return Task(known, _number(values.get("ownerId")), _number(values.get("taskId")))
 
 
 def _number(text: str | None) -> int:

@@ -89,13 +89,16 @@ class Desk:
         """What is said as soon as a task has come."""
         if task.name not in ABLE | UNABLE:
             log.info("xface: wanted a task of the player, got %s", task.name)
-            yield ERROR
+            yield from self.refuse(task)
         elif task.name != "KILL_APP":
             yield from _told(task, Status.QUEUED)
 
     def refuse(self, task: Task) -> Iterator[Answer]:
-        """What is said of a task that is too large to be looked at."""
-        yield from _told(task, Status.ERROR)
+        """What is said of a task that is none of the player's, or of which only the head was read."""
+        if task.name in ABLE | UNABLE:
+            yield from _told(task, Status.ERROR)
+        else:
+            yield pack_note("ERROR", task.owner, task.id, Status.ERROR)
 
     def run(self, task: Task, brought: Brought, now: float) -> Iterator[Answer]:
         """Do what a task asks, once it has been accepted.

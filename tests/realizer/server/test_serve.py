@@ -158,18 +158,6 @@ def test_a_bad_session_name_is_refused_before_the_handshake() -> None:
     serving(test)
 
 
-@pytest.mark.parametrize("seen", ["abc", "-1", "1.5", "", "9" * 16])
-def test_a_seen_that_is_no_number_is_refused_before_the_handshake(seen: str) -> None:
-    async def test(server: Server) -> None:
-        with pytest.raises(InvalidStatus) as caught:
-            await connect(f"{server.url}?session=s&seen={seen}")
-        assert caught.value.response.status_code == 400
-        said = f"seen: wanted the number of the last feedback that came, got {seen!r}\n"
-        assert caught.value.response.body.decode() == said
-
-    serving(test)
-
-
 def fetch(url: str) -> tuple[int, str, bytes]:
     try:
         with urllib.request.urlopen(url, timeout=LIMIT) as answer:

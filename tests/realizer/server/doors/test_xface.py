@@ -154,7 +154,7 @@ def test_the_player_s_own_client_byte_by_byte() -> None:
         ),
         (
             b'<task name="DANCE" ownerId="1" taskId="1000005">\n</task>\0',
-            note(b"ERROR", 0, 7).replace(b'"1"', b'"0"'),
+            note(b"ERROR", 1000005, 7),
         ),
         (b'<task name="KILL_APP" ownerId="1" taskId="1000006">\n</task>\0', note(b"KILL_APP", 1000006, 3)),
     ]
@@ -390,25 +390,32 @@ def test_kill_app_ends_the_client_and_not_the_service() -> None:
     serving(test)
 
 
+READ = ("ERROR", 1, 5, 7)
+# What is sent, and the note it is answered by: with the ids that could be read.
 BAD = {
-    "rubbish": b"hello\0",
-    "binary": bytes(range(1, 256)) + b"\0",
-    "half a task": b'<task name="STOP_PLAYBACK" ownerId="1" taskId="5"\0',
-    "a task in a task": b'<task name="UPLOAD_FAP" ownerId="1" taskId="5"><param>2.1',
-    "no name": b'<task ownerId="1" taskId="5"></task>\0',
-    "an unknown task": b'<task name="DANCE" ownerId="1" taskId="5"></task>\0',
-    "another element": b"<notify/>\0",
-    "a task that never begins": b"<task " + b"x" * 5000 + b"\0",
+    "rubbish": (b"hello\0", ERROR),
+    "binary": (bytes(range(1, 256)) + b"\0", ERROR),
+    "half a tag": (b'<task name="STOP_PLAYBACK" ownerId="1" taskId="5"\0', ERROR),
+    "half a task": (b'<task name="UPLOAD_FAP" ownerId="1" taskId="5"><param>2.1\0', ("UPLOAD_FAP", 1, 5, 7)),
+    "a task in a task": (b'<task name="DANCE" ownerId="1" taskId="5"><param>2.1', READ),
+    "no name": (b'<task ownerId="1" taskId="5"></task>\0', READ),
+    "no name of one": (b'<task name="a b" ownerId="1" taskId="5"></task>\0', READ),
+    "no ids": (b'<task name="DANCE" ownerId="x"></task>\0', ERROR),
+    "an unknown task": (b'<task name="DANCE" ownerId="1" taskId="5"></task>\0', READ),
+    "another element": (b"<notify/>\0", ERROR),
+    "a task that never begins": (b"<task " + b"x" * 5000 + b"\0", ERROR),
 }
 
 
-@pytest.mark.parametrize("data", BAD.values(), ids=BAD)
-def test_what_is_no_task_is_one_error_and_the_next_task_counts(data: bytes) -> None:
+@pytest.mark.parametrize(("data", "note"), BAD.values(), ids=BAD)
+def test_what_is_no_task_is_one_error_and_the_next_task_counts(
+    data: bytes, note: tuple[str, int, int, int]
+) -> None:
     async def test(server: Server, door: XfaceDoor) -> None:
         async with Client(door.port) as client:
             client.send(data + task("STOP_PLAYBACK", 1, 9).encode())
             assert await client.statuses(9) == [1, 3]
-            assert client.notes[0] == ERROR
+            assert client.notes[0] == note
             assert len(client.notes) == 3
 
     serving(test)

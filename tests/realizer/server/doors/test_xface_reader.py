@@ -86,9 +86,14 @@ def test_a_task_that_is_too_large_is_known_by_its_head() -> None:
         assert rest == [STOP]
 
 
+def test_a_task_without_a_name_has_the_ids_it_has() -> None:
+    (fault,) = found(b'<task name="a b" ownerId="2" taskId="7"/>')
+    assert fault == Fault("wanted <task> with the name of a task, got 'a b'", Task("", 2, 7))
+
+
 def test_another_beginning_ends_half_a_task_where_there_is_no_nul() -> None:
-    fault, *rest = found(b'<task name="A"><param>1' + NEXT)
-    assert fault == Fault("wanted </task>, got another <task: half a task")
+    fault, *rest = found(b'<task name="A" taskId="3"><param>1' + NEXT)
+    assert fault == Fault("wanted </task>, got another <task: half a task", Task("A", 0, 3))
     assert rest == [STOP]
 
 

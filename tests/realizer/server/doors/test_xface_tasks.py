@@ -227,9 +227,11 @@ def test_what_only_the_player_itself_can_do_is_an_error(name: str) -> None:
     assert Talk().ask(name) == notes(name, 1, 1, 7)
 
 
-def test_an_unknown_task_is_the_error_that_belongs_to_no_task() -> None:
+def test_an_unknown_task_is_an_error_with_its_ids() -> None:
     talk = Talk()
-    assert talk._short(talk.desk.accept(Task("DANCE", 1, 5))) == [("ERROR", 0, 7)]
+    assert talk._short(talk.desk.accept(Task("DANCE", 1, 5))) == [("ERROR", 5, 7)]
+    assert talk._short(talk.desk.refuse(Task("", 1, 5))) == [("ERROR", 5, 7)]
+    assert talk._short(talk.desk.refuse(Task("UPLOAD_FAP", 1, 5))) == [("UPLOAD_FAP", 5, 7)]
 
 
 @pytest.mark.parametrize("name", sorted(ABLE | UNABLE))
