@@ -9,6 +9,8 @@ from realizer.server.doors.xface_wire import Task
 
 __all__ = ["Content", "Fault", "TaskReader"]
 
+UNREAD = Task("")
+
 
 @dataclass(frozen=True, slots=True)
 class Content:
@@ -27,7 +29,7 @@ class Fault:
     """
 
     text: str
-    task: Task = Task("")
+    task: Task = UNREAD
 
 
 _OPEN = re.compile(rb"<task(?=[\s/>])")
