@@ -28,7 +28,7 @@ from realizer.units import frame_count
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-__all__ = ["Performance", "Realization", "seen"]
+__all__ = ["Performance", "Realization", "counted", "seen", "warned"]
 
 # Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
 WINDOW = 10.0  # s
@@ -197,24 +197,13 @@ def seen(
     """
     schedules = [player.latest(s) for s in accepted]
     end = player.end
-    count = frame_count(end, fps)
-    if count > MOST_FRAMES:
-        raise RealizerError(
-            f"wanted at most {MOST_FRAMES} frames, got {count} of {end:g} s at {fps:g} fps: "
-            "play less of it, or at a lower rate"
-        )
-    times = np.arange(count) / fps
+    times = np.arange(counted(end, fps)) / fps
     characters: dict[str | None, Performance] = {}
     for index, name in enumerate(player.characters):
         step = max(1, int(WINDOW * fps))
         windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
         aus = AUFrames.joined(windows)
         characters[name] = Performance(aus, to_fap(aus, mapping))
-    speaking = player.speech()
-    # Those of planning say more than what is told of them; others arise while blocks play.
-    planned = {(w.id, w.type, w.text): w for w in (*refused, *(w for s in schedules for w in s.warnings))}
-    known = ((f.id, f.type, f.text) for f in told if isinstance(f, WarningFeedback))
-    warnings = tuple(planned.get(key) or Warning(*key) for key in known)
     return Realization(
         fps=fps,
         duration=end,
@@ -222,12 +211,35 @@ def seen(
         characters=characters,
         schedules=tuple(schedules),
         told=tuple(told),
-        warnings=warnings,
+        warnings=warned(told, schedules, refused),
         refused=tuple(w.text for w in refused),
-        speaking=speaking,
+        speaking=player.speech(),
         deformer=deformer,
         mapping=mapping,
     )
+
+
+def counted(duration: float, fps: float) -> int:
+    """The number of frames in 0..duration.
+
+    Raises:
+        RealizerError: there are too many.
+    """
+    if (count := frame_count(duration, fps)) > MOST_FRAMES:
+        raise RealizerError(
+            f"wanted at most {MOST_FRAMES} frames, got {count} of {duration:g} s at {fps:g} fps: "
+            "play less of it, or at a lower rate"
+        )
+    return count
+
+
+def warned(
+    told: Sequence[Feedback], schedules: Sequence[Schedule], refused: Sequence[Warning] = ()
+) -> tuple[Warning, ...]:
+    """The warnings among all feedback, as planning gave them where it did: that says more."""
+    planned = {(w.id, w.type, w.text): w for w in (*refused, *(w for s in schedules for w in s.warnings))}
+    known = ((f.id, f.type, f.text) for f in told if isinstance(f, WarningFeedback))
+    return tuple(planned.get(key) or Warning(*key) for key in known)
 
 
 def _performance_json(performance: Performance, visemes: Float64) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def replay(
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
     from realizer.server.journal.folder import read_record
-    from realizer.server.journal.playback import played
+    from realizer.server.journal.playback import played, told
 
     writer = None
     if output is not None:
@@ -53,11 +53,12 @@ def replay(
             writer = output_for(Path(output))
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="-o") from None
-    realization, told = played(read_record(record), fps=fps, face=face, voice=voice)
+    found, changed = read_record(record), {"fps": fps, "face": face, "voice": voice}
     if writer is None or output is None:
-        for text in told:
+        for text in told(found, **changed):
             click.echo(text)
         return 0
+    realization, _ = played(found, **changed)
     if writer.suffix in PICTURES:
         options.check_camera(realization.face_name, camera)
     drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)

@@ -13,7 +13,7 @@ from realizer.scheduling.timing import Schedule
 __all__ = ["ANTICIPATORS", "Cast"]
 
 # Schedules of blocks that have ended, kept for references to their sync points.
-PAST = 100
+PAST = 50  # 2 kB each
 PAST_POINTS = 50_000  # of all of them; the last one is kept in any case
 FOREVER = float("inf")
 # BMLA's name for what is no block: points in time that a client announces.
@@ -141,10 +141,7 @@ class Cast:
     def latest(self, schedule: Schedule) -> Schedule:
         """What has become of a schedule as a block had it when it was accepted."""
         playing = next((p for p in self._playing.values() if p.first is schedule), None)
-        if playing is None or playing.start == FOREVER:
-            return schedule
-        more = tuple(w for w in playing.schedule.warnings if w not in schedule.warnings)
-        return replace(playing.schedule, warnings=schedule.warnings + more)
+        return schedule if playing is None else playing.latest
 
 
 def _points(schedule: Schedule) -> int:

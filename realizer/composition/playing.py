@@ -113,6 +113,15 @@ class Playing:
         return self.plan.schedule
 
     @property
+    def latest(self) -> Schedule:
+        """What has become of `first`, with the warnings of both."""
+        first = self.first
+        if self.start == float("inf"):
+            return first
+        more = tuple(w for w in self.schedule.warnings if w not in first.warnings)
+        return replace(self.schedule, warnings=first.warnings + more)
+
+    @property
     def begun(self) -> bool:
         return self.state in (State.IN_EXEC, State.SUBSIDING)
 

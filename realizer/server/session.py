@@ -196,8 +196,10 @@ class Session:
             return
         t = now - self.opened
         # What was due is told before anything changes, whether somebody woke the session in time or not:
-        # who does all of it again from the journal is not woken in between.
+        # who does all of it again from the journal is not woken in between. Frames whose time has come are
+        # sent as they were planned then.
         self._publish(t)
+        self._effects += self.broadcast.frames_due(t)[0]
         if self.notes.grown and not self._compact(t):
             return
         kept = False
@@ -277,6 +279,7 @@ class Session:
             return
         t = now - self.opened
         self._publish(t)
+        self._effects += self.broadcast.frames_due(t)[0]
         if self._tell(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.intake.orders.answer(speak, result, t)
             self._work(t)
@@ -342,13 +345,17 @@ class Session:
             self._publish(now - self.opened)
             self._compact(now - self.opened)
 
-    def pass_time(self, t: float, look: Callable[[float], None] = lambda t: None) -> None:
+    def pass_time(
+        self, t: float, look: Callable[[float], None] = lambda t: None, *, since: float = 0.0
+    ) -> None:
         """Tell what comes due before `t` on the session clock, each at its own time; for who replays it.
 
         Args:
             look: is called with each of those times, before anything happens then.
+            since: what is owed at once is told then.
         """
         while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
+            due = max(due, since)
             look(due)
             self._publish(due)
 

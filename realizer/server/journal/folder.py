@@ -6,13 +6,13 @@ import contextlib
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
 from typing import Any
 
 from realizer.behaviours.kind import Position
-from realizer.server.journal.entry import Entry, JournalError
+from realizer.server.journal.entry import Entry, JournalError, Kept
 from realizer.settings import Settings
 
 __all__ = ["FolderJournal", "Record", "head", "read_record"]
@@ -33,7 +33,7 @@ class FolderJournal:
 
     def __init__(self, folder: Path, head: Mapping[str, Any]) -> None:
         self._folder = folder
-        self._head = dict(head)
+        self._head: dict[str, Any] = json.loads(json.dumps(head))  # as it is read again
         self._files: dict[str, FileIO] = {}
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -42,13 +42,72 @@ class FolderJournal:
 
     def begin(self, session: str, epoch: float) -> None:
         self.end(session)
+        self._begin(self._path(session, epoch), session, epoch)
+
+    def resume(self, session: str, kept: Kept) -> None:
+        """Go on with the record of a session that was taken over; what it lacks is written first.
+
+        Where there is none here that only lacks something at its end, or another process still writes it, a
+        new one begins with what is kept. It is played from there: from the checkpoint, if there is one.
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        self.end(session)
+        number, lacks = 1, None
+        while (path := self._path(session, kept.epoch, number)).exists():
+            if (lacks := self._join(session, path, kept)) is not None:
+                break
+            number += 1
+        if lacks is None:
+            self._begin(path, session, kept.epoch, kept.parts)
+            lacks = kept.entries
+        for entry in lacks:
+            self.add(session, entry)
+
+    def _path(self, session: str, epoch: float, number: int = 1) -> Path:
+        """Of a record; of those with higher numbers where one could not be gone on with."""
         began = time.strftime("%Y%m%dT%H%M%S", time.gmtime(epoch)) + f"{epoch % 1:.3f}"[1:]
-        path = self._folder / f"{session}-{began}{SUFFIX}"
+        more = "" if number == 1 else f"-{number}"
+        return self._folder / f"{session}-{began}{more}{SUFFIX}"
+
+    def _begin(self, path: Path, session: str, epoch: float, parts: Mapping[str, str] = {}) -> None:
+        told = {"session": session, "epoch": epoch, **self._head}
         try:
             file = self._files[session] = path.open("wb", buffering=0)
-            _write(file, json.dumps({"session": session, "epoch": epoch, **self._head}))
+            _taken(file)
+            _write(file, json.dumps(told | {"parts": dict(parts)} if parts else told))
         except OSError as error:
             raise JournalError(f"the record {path}: {error.strerror}") from None
+
+    def _join(self, session: str, path: Path, kept: Kept) -> list[Entry] | None:
+        """Open a record behind its last whole line; what it lacks, or None where it must not grow."""
+        try:
+            file = path.open("r+b", buffering=0)
+        except OSError:
+            return None
+        try:
+            if _taken(file) and (lacks := self._lacks(read_record(path), kept)) is not None:
+                file.seek(path.read_bytes().rfind(b"\n") + 1)
+                file.truncate()
+                self._files[session] = file
+                return lacks
+        except (JournalError, OSError):
+            pass  # it is no record, or not to be written: another one is
+        file.close()
+        return None
+
+    def _lacks(self, record: Record, kept: Kept) -> list[Entry] | None:
+        """What was done last and is not in a record; None where that is not all that it lacks."""
+        if any(record.head.get(name) != told for name, told in self._head.items()):
+            return None  # it is gone on with under other settings
+        have = list(record.entries)
+        if dict(record.parts) == dict(kept.parts):
+            return kept.entries[len(have) :] if have == kept.entries[: len(have)] else None
+        for count in range(min(len(have), len(kept.entries)), 0, -1):
+            if have[-count:] == kept.entries[:count]:
+                return kept.entries[count:]
+        return None
 
     def add(self, session: str, entry: Entry) -> None:
         if (file := self._files.get(session)) is None:
@@ -66,6 +125,19 @@ class FolderJournal:
     def close(self) -> None:
         for session in list(self._files):
             self.end(session)
+
+
+def _taken(file: FileIO) -> bool:
+    """Let nobody else go on with a file as long as it is open; False where another process has it."""
+    try:
+        import fcntl
+    except ImportError:  # not on every system: then nobody else is there either
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _write(file: FileIO, line: str) -> None:
@@ -106,10 +178,12 @@ class Record:
 
     Attributes:
         head: what was told first: `session`, `epoch`, `settings`, `scene`.
+        parts: what the session was where the record begins, as `Kept` has them; {}: it was new.
     """
 
     head: Mapping[str, Any]
     entries: tuple[Entry, ...]
+    parts: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_record(path: Path) -> Record:
@@ -119,20 +193,26 @@ def read_record(path: Path) -> Record:
         JournalError: it is none; with its line.
     """
     try:
-        first, *lines = path.read_text("utf-8").split("\n")
-    except (OSError, UnicodeDecodeError) as error:
-        raise JournalError(f"{path}: {error}") from None
+        first, *lines = path.read_bytes().split(b"\n")
+    except OSError as error:
+        raise JournalError(f"{path}: {error.strerror}") from None
     try:
         head = json.loads(first)
         head["epoch"] + 0.0, head["session"] + ""
-    except (ValueError, TypeError, KeyError):
-        raise JournalError(f"{path}:1: wanted the head of a record, got {first[:80]!r}") from None
+        parts = {name + "": text + "" for name, text in head.pop("parts", {}).items()}
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise JournalError(f"{path}:1: wanted the head of a record, got {_shown(first)!r}") from None
     entries = []
-    for number, line in enumerate(lines, 2):
-        if number == len(lines) + 1:
-            break  # what is behind the last line feed was not written to its end
+    # What is behind the last line feed was not written to its end.
+    for number, line in enumerate(lines[:-1], 2):
         try:
-            entries.append(Entry.read(line))
+            entries.append(Entry.read(line.decode()))
+        except UnicodeDecodeError:
+            raise JournalError(f"{path}:{number}: wanted UTF-8, got {_shown(line)!r}") from None
         except JournalError as error:
             raise JournalError(f"{path}:{number}: {error}") from None
-    return Record(head, tuple(entries))
+    return Record(head, tuple(entries), parts)
+
+
+def _shown(line: bytes) -> str:
+    return line[:80].decode(errors="replace")

@@ -16,6 +16,7 @@ from realizer.server.journal.folder import Record
 from realizer.server.journal.replay import replay
 from realizer.server.journal.viewer import Viewer
 from realizer.server.session import Session
+from realizer.server.speeches import OPEN
 from realizer.server.studio import Studio
 from realizer.settings import Settings, SettingsError
 
@@ -103,9 +104,13 @@ class _Again:
             replay(session, self._entries, studio.speak, look)
         finally:
             studio.close()
-        # What was being said when the record broke off has no end of its own.
-        session.player.stop(self.last, session.intake.speeches.open)
-        session.pass_time(float("inf"), look)
+        # What was being said when the record broke off has no end of its own: it ends with what is planned.
+        ends = [playing.end for playing in session.player.cast.alive()]
+        end = max((end for end in ends if end < self.last + OPEN / 2), default=self.last)
+        session.pass_time(end, look, since=self.last)
+        look(end)
+        session.player.stop(end, session.intake.speeches.open)
+        session.pass_time(float("inf"), look, since=end)
 
 
 class _Whole(FeedbackLog):

@@ -15,20 +15,25 @@ __all__ = ["caught_up", "replay", "restored"]
 
 
 def replay(
-    session: Session, entries: Iterable[Entry], speak: Callable[[Speak], Utterance | RealizerError]
+    session: Session,
+    entries: Iterable[Entry],
+    speak: Callable[[Speak], Utterance | RealizerError],
+    look: Callable[[float], None] = lambda t: None,
 ) -> list[Effect]:
     """Do to a new session what was done to one before.
 
     Args:
         session: its clock is its caller's: it was opened at 0, and is written for by nobody.
         speak: says it again; a voice says the same twice.
+        look: is called with every time at which something happens, before it does.
 
     Returns:
         What its shell still owes it: what was to be spoken and had not been.
     """
     owed: dict[int, Speak] = {}
     for entry in entries:
-        session.pass_time(entry.at)
+        session.pass_time(entry.at, look)
+        look(entry.at)
         match entry.kind:
             case "join":
                 session.connect(entry.number, entry.at)
