@@ -9,7 +9,6 @@ from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import World
 from realizer.errors import FaceError, VoiceError
-from realizer.mapping import mapping_of
 from realizer.server.clips import ClipError
 from realizer.server.connection import (
     Connection,
@@ -109,14 +108,14 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
 def _stop(session: Session, message: Stop, t: float) -> None:
     """End what is known of these blocks; one that has ended by itself has only been quicker."""
     intake, wanted = session.intake, None if message.blocks is None else set(message.blocks)
-    waiting = [w for w in intake.preparation.waiting if wanted is None or w.block.id in wanted]
-    known = {w.block.id for w in waiting}
-    intake.withdraw(waiting, t)
+    # What is not read may hold any of them.
+    unread = bool(intake.inbox)
+    known = intake.stop(wanted, t)
     session.player.stop(t, wanted)
     strange = [
         repr(id[:80])
         for id in message.blocks or ()
-        if not (id in known or id in intake.speeches or session.player.cast.knew(id))
+        if not (unread or id in known or id in intake.speeches or session.player.cast.knew(id))
     ]
     if strange:
         raise Wrong("blocks", f"wanted blocks that play or wait, got {', '.join(strange[:10])}")
@@ -185,13 +184,13 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
             subscription = old  # what was sent ahead is not sent again
         told |= {"rate": message.rate, "frame": subscription.next, "fps": 50.0}
     elif stream == "video":
-        subscription = session.broadcast.pictures(index, fps, _look(session, message, index), t)
+        subscription = session.broadcast.look(index, fps, _look(session, message, index), t)
         views = [view for view in session.views(but=old) if view is not subscription.view]
         beside = sum(view.look.size[0] * view.look.size[1] * view.timeline.fps for view in views)
         if (beyond := too_many_pixels(message.size, fps, session.settings, beside)) is not None:
             raise Wrong("fps", beyond)
         told |= {"fps": fps, "frame": subscription.next, "size": message.size}
-        told |= {"face": session.face_name(index), "media_type": PICTURES[message.format]}
+        told |= {"face": session.faces.name(index), "media_type": PICTURES[message.format]}
     else:
         if stream == "mesh":
             told |= _mesh_of(session, index)
@@ -222,7 +221,7 @@ def _look(session: Session, message: Subscribe, index: int) -> Look:
         raise Wrong("size", words)
     if message.light is not None and message.light not in presets():
         raise Wrong("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
-    face = session.face(index)
+    face = session.faces.of(index)
     if message.camera is not None and message.camera not in camera_names(face):
         raise Wrong("camera", f"wanted one of {', '.join(camera_names(face))}, got {message.camera!r}")
     behind = message.background or settings.background
@@ -243,10 +242,10 @@ def _look(session: Session, message: Subscribe, index: int) -> Look:
 def _mesh_of(session: Session, index: int) -> dict[str, Any]:
     from realizer.face import face_scale
 
-    face = session.face(index)
+    face = session.faces.of(index)
     scale, offset = face_scale(face)
     return {
-        "face": session.face_name(index),
+        "face": session.faces.name(index),
         "vertices": len(face.vertices),
         "scale": float(scale),
         "offset": [float(v) for v in offset],
@@ -255,21 +254,14 @@ def _mesh_of(session: Session, index: int) -> dict[str, Any]:
 
 def _character(session: Session, message: CharacterMessage) -> None:
     if message.face is not None:
-        from realizer.face import face_name, list_faces
-
-        known = [info.name for info in list_faces()]
-        if face_name(message.face) not in known:
-            # Where the folders lie is no client's business.
-            raise FaceError(f"wanted one of {', '.join(known)}, got {message.face!r}")
-        session.load_face(message.face)
-        mapping_of(message.face, session.settings.mapping)
+        session.faces.check(message.face)
     if message.voice is not None:
         from realizer.speech import find_voice
 
         find_voice(message.voice).close()  # one that is not there is said before anything is spoken
     index = index_of(session, message.id)
     if message.face is not None:
-        session.faces[index] = message.face
+        session.faces.given[index] = message.face
         session.broadcast.face_changed(index)
     if message.voice is not None:
         session.intake.voices[index] = message.voice
@@ -324,7 +316,7 @@ def _state(session: Session, connection: Connection, t: float) -> StateMessage:
         for w in session.intake.preparation.waiting
     ]
     faces = [
-        CharacterState(face=session.face_name(index), voice=session.intake.voices.get(index), **face)
+        CharacterState(face=session.faces.name(index), voice=session.intake.voices.get(index), **face)
         for index, face in enumerate(state["characters"])
     ]
     return StateMessage(

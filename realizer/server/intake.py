@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 
 from bml_schema import Block
@@ -11,7 +11,7 @@ from realizer.pipeline import as_it_is, warped
 from realizer.player import Player
 from realizer.scheduling.timing import Warning
 from realizer.server.effects import Effect
-from realizer.server.inbox import Inbox
+from realizer.server.inbox import Inbox, Stopped
 from realizer.server.limits import beyond
 from realizer.server.orders import Orders
 from realizer.server.preparation import Preparation, Waiting
@@ -70,11 +70,29 @@ class Intake:
         item = self.speeches.next() or self.inbox.next()
         if isinstance(item, Warning):
             self.refuse(item, t)
+        elif isinstance(item, Stopped):
+            self._prepare(item.block, t, stopped=True)
         elif item is not None:
             self._prepare(item, t)
         return item is not None
 
-    def _prepare(self, block: Block, t: float) -> None:
+    def stop(self, blocks: Collection[str] | None, t: float) -> set[str]:
+        """Give up what is not planned yet, read or not.
+
+        Args:
+            blocks: which; None for all.
+
+        Returns:
+            Those that had been read.
+        """
+        self.inbox.stop(blocks)
+        for block in self.speeches.held_back(blocks):
+            self._prepare(block, t, stopped=True)
+        waiting = [w for w in self.preparation.waiting if blocks is None or w.block.id in blocks]
+        self.withdraw(waiting, t)
+        return {w.block.id for w in waiting}
+
+    def _prepare(self, block: Block, t: float, *, stopped: bool = False) -> None:
         """Ask for the block's voice and acknowledge it; it is planned when nothing is missing."""
         if (fault := self._beyond_limits(block)) is not None:
             self.refuse(Warning(block.id, "CANNOT_CREATE_BEHAVIOR", fault), t, block.character_id)
@@ -89,7 +107,10 @@ class Intake:
         except Exception:
             self._internal(block, t)
             return
-        self._speak(waiting, wants)
+        if stopped:
+            self.withdraw([waiting], t)
+        else:
+            self._speak(waiting, wants)
 
     def submit_ready(self, t: float) -> bool:
         """Plan the first block that waits for nothing; False where all wait."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef, read
@@ -173,6 +174,17 @@ class Speeches:
         if isinstance(one, str) and not whole(one) and (speech.unsaid or not speech.closed):
             speech.parts.add(block.id)
         return block
+
+    def held_back(self, blocks: Collection[str] | None) -> list[Block]:
+        """The own blocks of these speeches, or of all (None), that `next` would have given."""
+        held = [
+            s
+            for s in self._speeches.values()
+            if not (s.asked or s.over) and (blocks is None or s.id in blocks)
+        ]
+        for speech in held:
+            speech.asked = True
+        return [_holder(speech) for speech in held]
 
     @property
     def has_next(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from itertools import permutations
 
 import numpy as np
@@ -184,6 +185,26 @@ def test_blocks_to_stop_that_nobody_knows_are_named_and_the_others_end(drive) ->
     assert error["message"] == "wanted blocks that play or wait, got 'x', 'y'"
     driver.run(0.1)
     assert "a:end" in client.ids
+
+
+@pytest.mark.parametrize("blocks", [["b", "s"], None])
+def test_what_was_sent_and_is_not_read_does_not_play_once_it_is_stopped(drive, blocks) -> None:
+    driver = drive()
+    for message in (
+        NOD.format("a") + NOD.format("b") + NOD.format("c"),
+        json.dumps({"type": "speech", "id": "s", "append": "One. "}),
+        json.dumps({"type": "stop", "blocks": blocks}),
+        NOD.format("d"),
+    ):
+        driver.session.receive(1, message, driver.opened)  # as if they came at once: one document is read
+    driver.collect()
+    client = driver.run(10.0)
+    assert not client.of("error")
+    ends = {f.id: f.status for f in client.feedback if getattr(f, "id", "").count(":") == 1}
+    stopped = {"b", "s"} if blocks else {"b", "c", "s"}
+    for name in "bcds":  # the first one had been read
+        assert ends[f"{name}:end"] == ("REVOKED" if name in stopped else "DONE")
+        assert (f"{name}:start" in ends) == (name not in stopped)
 
 
 def test_a_block_that_waits_for_its_voice_is_known_and_so_is_one_that_has_just_ended(drive) -> None:

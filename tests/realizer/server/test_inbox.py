@@ -7,13 +7,13 @@ import pytest
 from bml_schema import Block
 from realizer.scheduling.timing import Warning
 from realizer.server import inbox
-from realizer.server.inbox import Inbox
+from realizer.server.inbox import Inbox, Stopped
 from realizer.settings import Settings
 
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'
 
 
-def read(box: Inbox) -> list[Block | Warning]:
+def read(box: Inbox) -> list[Block | Stopped | Warning]:
     found = []
     while (item := box.next()) is not None:
         found.append(item)
@@ -37,6 +37,29 @@ def test_a_message_that_is_too_long_is_refused_by_name() -> None:
     assert (refused.id, refused.type) == ("a", "PARSING_FAILURE")
     assert "at most 40 bytes" in refused.text
     assert not box
+
+
+def names(box: Inbox) -> str:
+    """Ids in order, those that are stopped in brackets."""
+    return " ".join(f"({i.block.id})" if isinstance(i, Stopped) else i.id for i in read(box))
+
+
+def test_what_is_stopped_before_it_is_read_comes_out_as_such_and_what_comes_later_does_not() -> None:
+    box = Inbox(Settings())
+    box.put(WAIT.format("a") + WAIT.format("b") + WAIT.format("c"))
+    first = box.next()
+    assert isinstance(first, Block)
+    assert first.id == "a"
+    box.put(WAIT.format("b"))
+    box.stop(["b", "x"])
+    box.put(WAIT.format("b") + WAIT.format("x"))
+    assert names(box) == "(b) c (b) b x"
+    box.stop(["b"])  # there is none
+    box.put(WAIT.format("b"))
+    box.put(WAIT.format("c"))
+    box.stop(None)
+    box.put(WAIT.format("d"))
+    assert names(box) == "(b) (c) d"
 
 
 def test_too_many_messages_are_refused() -> None:
