@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from realizer.errors import VoiceError
 from realizer.speech.engine_process import Engine, EngineProcess
-from realizer.speech.espeak_events import timeline, write_document
+from realizer.speech.espeak_answer import read_answer
+from realizer.speech.espeak_document import write_document
+from realizer.speech.espeak_events import timeline
 from realizer.speech.kept import Kept
 from realizer.speech.ssml import Break, read_script
 from realizer.speech.utterance import STRETCH, Say, Utterance
@@ -98,8 +98,7 @@ class EspeakVoice:
         document = write_document(script)
         head, body = self._process.ask({"op": "say", "text": document.text, "voice": voice, "wpm": wpm})
         rate: int = hello["rate"]
-        pcm = np.frombuffer(body, "<i2")  # over bytes: nobody can write to what is kept
-        events = [(int(k), int(s), int(p), str(t)) for k, s, p, t in head["events"]]
+        events, pcm = read_answer(head, body)
         times = timeline(document, events, pcm, rate, lambda words: self._spoken_alone(voice, words))
         if not any(phoneme.ipa for phoneme in times.phonemes) and not script.is_silent:
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")

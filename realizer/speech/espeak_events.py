@@ -2,49 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from xml.sax.saxutils import escape
-
-import numpy as np
+from functools import lru_cache
 
 from realizer.arrays import Int16
+from realizer.speech.espeak_answer import END, MARK, PHONEME, WORD, Event
+from realizer.speech.espeak_document import Document
 from realizer.speech.merged import bare, cuts, is_vowel
-from realizer.speech.prosody import PLAIN
-from realizer.speech.ssml import Break, Mark, Part, Script, Tag, write_tag
 from realizer.speech.utterance import Phoneme, Word
-from realizer.speech.words import PlacedMark, words_in
 
-__all__ = ["Document", "Timeline", "timeline", "write_document"]
+__all__ = ["Timeline", "timeline"]
 
-WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
 STRESS = {"ˈ": 1, "ˌ": 2}
 SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
 LEAST_CLOSURE = 0.01  # s
-# Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
-OCTAVES = 0.72
-MOST_PITCH = 198.0  # %; its setting ends there
-STOPS = re.compile(r"\.+(?!\w)")
 KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
 
-Event = tuple[int, int, int, str]
 Spoken = Callable[[Sequence[str]], Sequence[Sequence[str]]]
-
-
-@dataclass(frozen=True, slots=True)
-class Document:
-    """What espeak-ng is given.
-
-    Attributes:
-        text: SSML; marks are named m0, m1, ...
-        words: (word, place) with places as espeak-ng counts them: characters of `text` from 1.
-        marks: in the order of the text.
-    """
-
-    text: str
-    words: tuple[tuple[str, int], ...]
-    marks: tuple[PlacedMark, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,60 +38,6 @@ class Group:
     words: list[int] = field(default_factory=list)
 
 
-def write_document(script: Script) -> Document:
-    """The script as SSML: inside <speak>, attributes in double quotes, only elements that are spoken."""
-    text = "<speak>"
-    words: list[tuple[str, int]] = []
-    marks: list[PlacedMark] = []
-    for part in _stops_first(script.parts):
-        if isinstance(part, str):
-            words += [(word, len(text) + len(escape(part[:at])) + 1) for word, at in words_in(part)]
-            text += escape(part)
-        elif isinstance(part, Mark):
-            text += f'<mark name="m{len(marks)}"/>'
-            marks.append(PlacedMark(part.name, len(words), False))
-        elif isinstance(part, Break):
-            text += f'<break time="{round(part.seconds * 1000)}ms"/>'
-            marks = [PlacedMark(m.name, m.word, m.paused or m.word == len(words)) for m in marks]
-        else:
-            text += write_tag(_in_its_units(part))
-    return Document(text + "</speak>", tuple(words), tuple(marks))
-
-
-def _stops_first(parts: Sequence[Part]) -> list[Part]:
-    """The parts, full stops that stand behind a mark before it: alone there espeak-ng says "dot"."""
-    moved: list[Part] = []
-    for part in parts:
-        stops = STOPS.match(part) if isinstance(part, str) else None
-        at = len(moved)
-        while at and isinstance(moved[at - 1], Mark):
-            at -= 1
-        said = moved[at - 1] if at else None
-        if stops is None or at == len(moved) or not isinstance(said, str) or said[-1].isspace():
-            moved.append(part)
-            continue
-        moved[at - 1] = said + stops[0]
-        if rest := str(part)[stops.end() :]:
-            moved.append(rest)
-    return moved
-
-
-def _in_its_units(tag: Tag) -> Tag:
-    """The tag with volume and pitch of <prosody> as espeak-ng means them.
-
-    It reads decibels and semitones as per cent, and its pitch is a setting and not a factor.
-    """
-    if tag.name != "prosody" or tag.attributes is None:
-        return tag
-    given = dict(tag.attributes)
-    manner = PLAIN.within(given)
-    if "volume" in given:
-        given["volume"] = f"{100 * manner.volume:.1f}%"
-    if manner.pitch != PLAIN.pitch:  # of Hz it alone knows what they are
-        given["pitch"] = f"{min(MOST_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
-    return Tag(tag.name, tuple(given.items()))
-
-
 def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Timeline:
     """The times of everything in seconds; phonemes tile 0..len(pcm)/rate without a gap.
 
@@ -127,9 +48,10 @@ def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int,
         rate: Hz.
         spoken: words -> the phonemes of each alone; only asked where espeak-ng merged words.
     """
-    begins, sounds, word_events = _sounds(_linked(events), len(pcm))
+    events = _linked(events)
+    begins, sounds, word_events = _sounds(events, len(pcm))
     words = _words(document, begins, sounds, word_events, len(pcm), spoken)
-    marks = _marks(document, _linked(events), words)
+    marks = _marks(document, events, words)
     phonemes = _phonemes(_with_closures(begins, sounds, pcm, rate), sounds, len(pcm), rate)
     return Timeline(
         words=tuple(
@@ -260,14 +182,15 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
     that follow it would close when the burst is heard.
     """
     begins = list(begins)
+    loud = (pcm > SILENCE) | (pcm < -SILENCE)
+    mostly = [True, *loud.take([here - 1 for here in begins[1:]], mode="wrap").tolist()]
     for k in range(1, len(begins)):
         before, here = begins[k - 1], begins[k]
-        if not sounds[k] or not sounds[k - 1] or is_vowel(bare(sounds[k])):
+        if mostly[k] or before == here or not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
             continue
-        if abs(int(pcm[here - 1])) > SILENCE:  # mostly
-            continue
-        loud = np.flatnonzero(np.abs(pcm[before:here].astype(np.int32)) > SILENCE)
-        quiet = before + (int(loud[-1]) + 1 if len(loud) else 0)
+        backwards = loud[before:here][::-1]
+        still = int(backwards.argmax())  # 0 also where nothing is loud
+        quiet = here - still if still else before
         if here - quiet >= LEAST_CLOSURE * rate:
             begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (here - before)))
     return begins
@@ -275,14 +198,12 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
 
 def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int) -> tuple[Phoneme, ...]:
     found: list[tuple[int, str, int]] = [(0, "", 0)] if not begins or begins[0] > 0 else []
-    for k, (sample, sound) in enumerate(zip(begins, sounds, strict=True)):
-        until = begins[k + 1] if k + 1 < len(begins) else end
+    for sample, until, sound in zip(begins, [*begins[1:], end], sounds, strict=True):
         if until <= sample:
             continue
-        ipa = sound.replace("ˈ", "").replace("ˌ", "")
+        ipa, stress = _plain(sound)
         if not ipa and found and not found[-1][1]:
             continue  # two pauses are one
-        stress = next((STRESS[c] for c in sound if c in STRESS), 0)
         found.append((sample, ipa, stress))
     ends = [sample for sample, _, _ in found[1:]] + [end]
     return tuple(
@@ -290,3 +211,16 @@ def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int)
         for (sample, ipa, stress), until in zip(found, ends, strict=True)
         if until > sample
     )
+
+
+# The same few hundred sounds are heard again and again.
+@lru_cache(maxsize=2048)
+def _plain(sound: str) -> tuple[str, int]:
+    """The sound without its stress, and that."""
+    stress = next((STRESS[c] for c in sound if c in STRESS), 0)
+    return sound.replace("ˈ", "").replace("ˌ", ""), stress
+
+
+@lru_cache(maxsize=2048)
+def _is_vowel(sound: str) -> bool:
+    return is_vowel(bare(sound))

@@ -4,7 +4,8 @@ espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said
 loaded in a process of its own.
 
     hello     {"rate", "variants": [name], "voices": [{"name", "id", "languages": [[priority, tag]]}]}
-    say       {"text", "voice", "wpm"} -> {"events": [[type, sample, place, text], ...]} and int16 PCM
+    say       {"text", "voice", "wpm"} -> {"events": n, "marks": [name of each event that is a mark]} and
+              n bytes of events, as they lie in the engine's memory, and int16 PCM
     phonemes  {"voice", "words"} -> {"phonemes": [[ipa, ...], ...]}
 """
 
@@ -25,8 +26,7 @@ LONGEST_SOUND = 1800  # s; a text that lasts longer is refused
 SYNCHRONOUS, PHONEME_EVENTS, PHONEME_IPA, DONT_EXIT = 2, 1, 2, 0x8000
 UTF8, SSML, END_PAUSE = 1, 0x10, 0x1000
 RATE = 1  # parameter number: words a minute
-WORD, SENTENCE, MARK, END, PHONEME = 1, 2, 3, 5, 7
-KEPT = (WORD, SENTENCE, MARK, END, PHONEME)
+MARK = 3  # type of an event; 0 stands behind the last one
 
 
 class EventId(ctypes.Union):
@@ -44,6 +44,10 @@ class Event(ctypes.Structure):
         ("user_data", ctypes.c_void_p),
         ("id", EventId),
     )
+
+
+INTS = ctypes.POINTER(ctypes.c_int)
+FIELDS = ctypes.sizeof(Event) // ctypes.sizeof(ctypes.c_int)
 
 
 class VoiceEntry(ctypes.Structure):
@@ -109,6 +113,13 @@ class Engine:
 
         self.voice = ""
         self.voices = self._voices()
+        self.sound: list[bytes] = []
+        self.heard = 0
+        self.events: list[bytes] = []
+        self.marks: list[str] = []
+        # Made once and here: what a fork is the first to touch costs it more than its work on it.
+        self.callback = SynthCallback(self._hear)
+        lib.espeak_SetSynthCallback(self.callback)
         # The voice that is asked for most; an installation may lack English.
         english = (v["id"] for v in self.voices if any(tag == "en-us" for _, tag in v["languages"]))
         with contextlib.suppress(StopIteration, RuntimeError):
@@ -135,32 +146,28 @@ class Engine:
         return found
 
     def say(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
-        sound: list[bytes] = []
-        events: list[tuple[int, int, int, str]] = []
-        heard = 0
-
-        def hear(wave: Any, count: int, event: Any) -> int:
-            nonlocal heard
-            if wave and count > 0:
-                sound.append(ctypes.string_at(wave, 2 * count))
-                heard += count
-            index = 0
-            while event[index].type != 0:
-                e = event[index]
-                if e.type in KEPT:
-                    events.append((e.type, e.sample, e.text_position, label(e)))
-                index += 1
-            return int(heard > LONGEST_SOUND * self.rate)
-
+        self.sound, self.heard, self.events, self.marks = [], 0, [], []
         self._choose(request["voice"])
-        callback = SynthCallback(hear)  # kept until the end of the synthesis
-        self.lib.espeak_SetSynthCallback(callback)
         self.lib.espeak_SetParameter(RATE, request["wpm"], 0)
         document = request["text"].encode() + b"\0"
         self.lib.espeak_Synth(document, len(document), 0, 1, 0, UTF8 | SSML | END_PAUSE, None, None)
-        if heard > LONGEST_SOUND * self.rate:
+        if self.heard > LONGEST_SOUND * self.rate:
             raise RuntimeError(f"the text lasts longer than {LONGEST_SOUND} s")
-        return {"events": events}, sound
+        events = b"".join(self.events)
+        return {"events": len(events), "marks": self.marks}, [events, *self.sound]
+
+    def _hear(self, wave: Any, count: int, event: Any) -> int:
+        """Keep a piece of sound and the events in it; not 0 where that was enough."""
+        if wave and count > 0:
+            self.sound.append(ctypes.string_at(wave, 2 * count))
+            self.heard += count
+        fields, at = ctypes.cast(event, INTS), 0
+        while (kind := fields[at]) != 0:
+            if kind == MARK:  # its name lies elsewhere in memory
+                self.marks.append(text(event[at // FIELDS].id.name or b""))
+            at += FIELDS
+        self.events.append(ctypes.string_at(event, at * ctypes.sizeof(ctypes.c_int)))
+        return int(self.heard > LONGEST_SOUND * self.rate)
 
     def phonemes(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         self._choose(request["voice"])
@@ -201,16 +208,6 @@ def find_library() -> tuple[str, str | None]:
 
 def text(raw: bytes) -> str:
     return raw.decode("utf-8", "replace")
-
-
-def label(event: Any) -> str:
-    """The phoneme's IPA, the mark's name, or nothing."""
-    if event.type == PHONEME:
-        # Eight bytes in the event itself, without an end where all eight are used.
-        return text(ctypes.string_at(ctypes.addressof(event.id), 8).split(b"\0")[0])
-    if event.type == MARK:
-        return text(event.id.name or b"")
-    return ""
 
 
 def load(arguments: list[str]) -> Engine:

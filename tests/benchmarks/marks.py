@@ -16,7 +16,8 @@ import numpy as np
 from realizer.arrays import Float64
 from realizer.speech import EspeakVoice, Say
 from realizer.speech.espeak import choose_voice
-from realizer.speech.espeak_events import PHONEME, WORD, write_document
+from realizer.speech.espeak_answer import PHONEME, WORD, read_answer
+from realizer.speech.espeak_document import write_document
 from realizer.speech.ssml import read_script
 
 __all__ = ["TEXTS", "Errors", "errors"]
@@ -82,14 +83,14 @@ def _reported(voice: EspeakVoice, text: str, language: str) -> tuple[dict[int, f
     hello = process.hello()
     document = write_document(read_script(Say(text)))
     name, _ = choose_voice(hello, None, language)
-    head, _ = process.ask({"op": "say", "text": document.text, "voice": name, "wpm": 175})
+    events, _ = read_answer(*process.ask({"op": "say", "text": document.text, "voice": name, "wpm": 175}))
     at: dict[int, int] = {}
     latest = -1
-    for k, (kind, sample, place, label) in enumerate(head["events"]):
+    for k, (kind, sample, place, label) in enumerate(events):
         if kind == PHONEME and label:
             latest = sample
         elif kind == WORD:
-            later = next((s for t, s, _, _ in head["events"][k:] if t == PHONEME), sample)
+            later = next((s for t, s, _, _ in events[k:] if t == PHONEME), sample)
             at[place] = later if sample <= latest else sample
     # After some punctuation the place is that of the blank before the word.
     rate = hello["rate"]
@@ -98,9 +99,7 @@ def _reported(voice: EspeakVoice, text: str, language: str) -> tuple[dict[int, f
         for k, (_, place) in enumerate(document.words)
         if place in at or place - 1 in at
     }
-    begins = [
-        sample for kind, sample, _, label in head["events"] if kind == WORD or (kind == PHONEME and label)
-    ]
+    begins = [sample for kind, sample, _, label in events if kind == WORD or (kind == PHONEME and label)]
     return words, np.array(begins) / rate
 
 

@@ -19,7 +19,6 @@ from realizer.errors import VoiceError
 from realizer.speech import engine_process
 from realizer.speech.engine_process import RUN
 from realizer.speech.espeak import ENGINE, EspeakVoice, choose_voice
-from realizer.speech.espeak_worker import Event, label
 from realizer.speech.kept import MOST
 from realizer.speech.utterance import Say, Utterance
 
@@ -422,15 +421,6 @@ def test_phonemes_are_ipa_and_nothing_but_ipa(voice: EspeakVoice, language: str,
     assert len(heard) > 10
     assert not set(heard) & set("()�\x00_ˈˌ͡"), heard
     assert all(len(phoneme.ipa.encode()) <= 8 for phoneme in said.phonemes)
-
-
-def test_a_phoneme_of_eight_bytes_is_read_whole() -> None:
-    event = Event(type=7)
-    event.id.string = "ˈaɪəɹ".encode()[:8]
-    assert len("ˈaɪəɹ".encode()) == 9
-    assert label(event) == "ˈaɪə�"  # eight bytes, no end: nothing of what follows is read
-    event.id.string = "ˈaʊə".encode()
-    assert label(event) == "ˈaʊə"
 
 
 def test_rate_makes_speech_faster_within_what_the_engine_can(voice: EspeakVoice) -> None:

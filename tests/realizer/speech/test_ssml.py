@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.errors import VoiceError
-from realizer.speech.espeak_events import write_document
+from realizer.speech.espeak_document import write_document
 from realizer.speech.ssml import MOST_TEXT, Break, Mark, Tag, read_script
 from realizer.speech.utterance import Say
 
@@ -39,21 +39,6 @@ def test_only_elements_and_attributes_of_speech_are_kept() -> None:
 
 def test_a_bml_sync_is_a_mark() -> None:
     assert read_script(Say('a <bml:sync id="x"/>b')).marks == ("x",)
-
-
-def test_attributes_are_written_in_double_quotes() -> None:
-    text = write_document(read_script(Say("<sub alias='say \"this\" &amp; that'>x</sub>"))).text
-    assert text == '<speak><sub alias="say  this  &amp; that">x</sub></speak>'
-
-
-def test_places_count_characters_of_what_is_written() -> None:
-    document = write_document(read_script(Say('a &amp; b <mark name="z"/>c')))
-    assert [(word, document.text[place - 1 :][: len(word)]) for word, place in document.words] == [
-        ("a", "a"),
-        ("&", "&"),
-        ("b", "b"),
-        ("c", "c"),
-    ]
 
 
 def test_the_longest_text_is_still_taken() -> None:
