@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import zlib
 from collections import deque
 from collections.abc import Iterable
+from itertools import chain
+from typing import NamedTuple
 
 from bml_schema import Feedback
 
@@ -13,6 +16,18 @@ __all__: list[str] = []
 FRESH = 60.0  # s
 MOST = 10_000
 ROOM = 2**17
+# Messages are much alike: so many characters, once they are not the newest, take a ninth of that together.
+PACK = 2**14
+BETWEEN = "\0"  # no XML has it
+
+
+class _Pack(NamedTuple):
+    """Messages that belong together, and when the last of them was told."""
+
+    count: int
+    size: int
+    told: float
+    data: bytes
 
 
 class FeedbackLog:
@@ -31,13 +46,16 @@ class FeedbackLog:
     def __init__(self, epoch: float | None = None) -> None:
         self.newest = 0
         self._epoch = epoch
-        self._kept: deque[tuple[float, str]] = deque()  # (when it was told, its text)
+        self._packs: deque[_Pack] = deque()
+        self._recent: list[str] = []
+        self._unpacked = 0  # characters of these
+        self._count = 0  # of all that is kept
         self._size = 0
 
     @property
     def first(self) -> int:
         """Seq of the oldest message that is kept; of the next one where none is."""
-        return self.newest - len(self._kept) + 1
+        return self.newest - self._count + 1
 
     def add(self, feedback: Feedback, now: float) -> str:
         """Number a message and keep it; its text.
@@ -57,13 +75,37 @@ class FeedbackLog:
             self._keep(text, now)
 
     def _keep(self, text: str, now: float) -> None:
-        kept = self._kept
-        kept.append((now, text))
+        self._recent.append(text)
+        self._count += 1
         self._size += len(text)
-        while len(kept) > MOST or (self._size > ROOM and kept[0][0] < now - FRESH):
-            self._size -= len(kept.popleft()[1])
+        self._unpacked += len(text)
+        if self._unpacked > 2 * PACK:
+            self._pack(now)
+        packs = self._packs
+        while packs and (self._count > MOST or (self._size > ROOM and packs[0].told < now - FRESH)):
+            self._count -= packs[0].count
+            self._size -= packs.popleft().size
+
+    def _pack(self, now: float) -> None:
+        """Put the older half of what is not packed together."""
+        count = size = 0
+        while size < PACK:
+            size += len(self._recent[count])
+            count += 1
+        data = zlib.compress(BETWEEN.join(self._recent[:count]).encode(), 1)
+        del self._recent[:count]
+        self._packs.append(_Pack(count, size, now, data))
+        self._unpacked -= size
 
     def since(self, seq: int) -> list[str]:
         """The kept messages from `seq` on, in order."""
-        count = min(self.newest - seq + 1, len(self._kept))
-        return [self._kept[n][1] for n in range(-count, 0)]
+        wanted = min(self.newest - seq + 1, self._count)
+        if wanted <= len(self._recent):
+            return self._recent[len(self._recent) - wanted :] if wanted > 0 else []
+        missing, packs = wanted - len(self._recent), []
+        for pack in reversed(self._packs):
+            if missing <= 0:
+                break
+            packs.append(zlib.decompress(pack.data).decode().split(BETWEEN))
+            missing -= pack.count
+        return list(chain(*reversed(packs), self._recent))[-wanted:]

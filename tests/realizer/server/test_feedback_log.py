@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from bml_schema import BlockProgress, SyncPointProgress, parse_feedback
-from realizer.server.feedback_log import FRESH, MOST, ROOM, FeedbackLog
+from realizer.server.feedback_log import FRESH, MOST, PACK, ROOM, FeedbackLog
 
 
 def filled(count: int, step: float = 1.0) -> FeedbackLog:
@@ -36,14 +39,22 @@ def test_what_was_told_in_the_last_minute_is_kept_and_of_what_is_older_only_so_m
     assert FRESH / 0.05 <= len(texts) < 6000
     assert sum(map(len, texts)) > ROOM  # the last minute alone is larger here
     slow = filled(6000, step=10.0)
-    assert ROOM * 0.9 < sum(map(len, slow.since(1))) <= ROOM
+    assert ROOM - 1.1 * PACK < sum(map(len, slow.since(1))) <= ROOM
     assert numbers(slow, 1) == list(range(slow.first, 6001))
 
 
 def test_there_is_a_limit_even_to_what_was_told_just_now() -> None:
     log = filled(MOST + 5, step=0.0)
-    assert (log.first, log.newest) == (6, MOST + 5)
-    assert len(log.since(1)) == MOST
+    assert log.newest == MOST + 5
+    assert MOST - PACK / 100 < len(log.since(1)) == log.newest - log.first + 1 <= MOST
+
+
+@given(seq=st.integers(-5, 700))
+def test_what_is_packed_is_as_it_was_told(seq: int) -> None:
+    log = FeedbackLog()
+    told = [log.add(BlockProgress(id=f"b{n}:end", global_time=n * 0.1), n * 0.1) for n in range(600)]
+    assert sum(map(len, told)) > 4 * PACK
+    assert log.since(seq) == told[max(seq - 1, 0) :]
 
 
 def test_what_was_told_before_can_be_put_back() -> None:
