@@ -19,7 +19,7 @@ from realizer.server.cycles import Cycles
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import ANYBODY, Hub, HubError, Visitor
-from realizer.server.journal import Journal, JournalError, Log, journal_at
+from realizer.server.journal import Journal, JournalError, Kept, Recorder, journal_at
 from realizer.server.journal.folder import FolderJournal, head
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.replay import caught_up, restored
@@ -69,7 +69,7 @@ class Shell:
         self._cycles = Cycles()
         self._closed = False
         self._journal: Journal | None = None
-        self._record: Log | None = None
+        self._record: Recorder | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
         self._taken_over: dict[str, float] = {}  # session -> until when clients come back to it; loop time
 
@@ -107,7 +107,7 @@ class Shell:
         """Sessions take no more documents from now on."""
         self._ending = True
         for session in self._hub.sessions.values():
-            session.intake.ending = True
+            session.ending = True
 
     @property
     def busy(self) -> bool:
@@ -191,9 +191,8 @@ class Shell:
             except Exception:
                 log.exception("session %s cannot be gone on with", name)
                 raise JournalError(f"session {name} cannot be gone on with: internal error") from None
-            session.notes = Notes(name, journal, kept=kept)
-            if self._record is not None:
-                log.warning("session %s is gone on with from the journal: it is recorded no further", name)
+            session.notes = self._notes(name, journal, kept)
+            await self._loop.run_in_executor(None, session.notes.resume, kept)
             at = caught_up(session, at, seen)
             owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
             now = self._loop.time()
@@ -258,13 +257,15 @@ class Shell:
     def _make(self, id: str, now: float, named: bool) -> Session:
         epoch = time.time()
         session = self._new(id, now, named=named, epoch=epoch)
-        journal = self._journal if named else None
-        session.notes = Notes(id, journal, self._record, stopped=self.metrics.record_stopped)
+        session.notes = self._notes(id, self._journal if named else None)
         try:
             session.notes.begin(epoch)
         except JournalError as error:
             raise HubError(503, str(error)) from None
         return session
+
+    def _notes(self, id: str, journal: Journal | None, kept: Kept | None = None) -> Notes:
+        return Notes(id, journal, self._record, stopped=self.metrics.record_stopped, kept=kept)
 
     def _new(self, id: str, now: float, *, named: bool, epoch: float) -> Session:
         session = Session(
@@ -276,7 +277,7 @@ class Shell:
             capabilities=self._capabilities,
             epoch=epoch,
         )
-        session.intake.ending = self._ending
+        session.ending = self._ending
         return session
 
     def _pump(self, session: Session) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Log, Lost
+from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Log, Lost, Recorder
 
-__all__ = ["Entry", "Journal", "JournalError", "Kept", "Log", "Lost", "journal_at"]
+__all__ = ["Entry", "Journal", "JournalError", "Kept", "Log", "Lost", "Recorder", "journal_at"]
 
 
 def journal_at(where: str) -> Journal:

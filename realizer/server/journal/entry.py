@@ -10,7 +10,7 @@ from typing import Literal, Protocol, get_args
 
 from realizer.errors import RealizerError
 
-__all__ = ["KEPT", "Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost"]
+__all__ = ["KEPT", "Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost", "Recorder"]
 
 # Sessions whose process died and that nobody came back to are forgotten after so long.
 KEPT = 7 * 24 * 3600  # s
@@ -140,5 +140,17 @@ class Journal(Log, Protocol):
         Raises:
             Lost: another process has taken the session over.
             JournalError: it cannot be written, and all is as it was.
+        """
+        ...
+
+
+class Recorder(Log, Protocol):
+    """Where sessions are written to be played again."""
+
+    def resume(self, session: str, kept: Kept) -> None:
+        """Go on with the record of a session that was taken over. May read a long file.
+
+        Raises:
+            JournalError: it cannot be written.
         """
         ...

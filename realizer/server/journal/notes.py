@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Kind, Log, Lost
+from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Kind, Lost, Recorder
 
 __all__ = ["Notes"]
 
@@ -37,7 +37,7 @@ class Notes:
         self,
         session: str,
         journal: Journal | None = None,
-        record: Log | None = None,
+        record: Recorder | None = None,
         *,
         stopped: Callable[[], None] = lambda: None,
         kept: Kept | None = None,
@@ -70,6 +70,10 @@ class Notes:
         if self._journal is not None:
             self._journal.begin(self._session, epoch)
         self._recorded(lambda record: record.begin(self._session, epoch))
+
+    def resume(self, kept: Kept) -> None:
+        """The session was taken over: its record goes on."""
+        self._recorded(lambda record: record.resume(self._session, kept))
 
     def keep(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
         """What must not be done unless it is kept.
@@ -136,7 +140,7 @@ class Notes:
                 self._entries,
             )
 
-    def _recorded(self, write: Callable[[Log], None]) -> None:
+    def _recorded(self, write: Callable[[Recorder], None]) -> None:
         """A record has all or ends: one with a hole would be played otherwise than the session was."""
         if self._record is None:
             return
