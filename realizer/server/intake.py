@@ -32,14 +32,12 @@ class Intake:
         owe: takes what is to be done for them.
 
     Attributes:
-        ending: no more documents are taken.
         voices: index of a character -> the voice it was given.
     """
 
     def __init__(
         self, name: str, settings: Settings, player: Player, owe: Callable[[Iterable[Effect]], None]
     ) -> None:
-        self.ending = False
         self.voices: dict[int, str] = {}
         self.preparation = Preparation()
         self.speeches = Speeches(player)
@@ -163,8 +161,6 @@ class Intake:
         self.preparation.remove(gone)
 
     def _beyond_limits(self, block: Block) -> str | None:
-        if self.ending:
-            return "the service is ending and takes no more documents"
         busy = len(self.preparation) + self._player.alive
         return beyond(block, self._settings, busy, self._player.characters)
 

@@ -7,11 +7,11 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from bml_schema import WarningFeedback
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError
 from realizer.player import HISTORY, Player
-from realizer.scheduling.timing import Warning
 from realizer.server.broadcast import Broadcast
 from realizer.server.clips import ClipError, Clips
 from realizer.server.connection import STUCK, Connection, PictureSubscription, Subscription, View
@@ -66,6 +66,7 @@ class Session:
         history: seconds that have passed of which frames can still be asked for.
 
     Attributes:
+        ending: no more documents are taken.
         run: the frames of its only client for which nobody need ask it; None where there is more to it.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
@@ -89,6 +90,7 @@ class Session:
         self.opened = now
         self.named = named
         self.closed = False
+        self.ending = False
         self.empty_since: float | None = now
         self.notes = Notes(id)
         self.faces = Faces(settings)
@@ -218,6 +220,8 @@ class Session:
                         self._tell(t, "text", connection, json.dumps({"type": "character", "id": name}))
             elif kept := self._keep(t, "text", connection, message):
                 follow(self, self._connections[connection], control, t)
+        elif self.ending:
+            self._refuse(message, "the service is ending and takes no more documents")
         elif kept := self._keep(t, "text", connection, message):
             self.intake.put(message, t)
         if not self.closed and self._work(t) and not kept:
@@ -234,11 +238,21 @@ class Session:
             log.error("session %s: %s", self.id, error)
             words = f"this could not be kept, so it is not taken: {error}"
             if isinstance(message, str) and message.lstrip("\ufeff \t\r\n").startswith("<"):
-                self.intake.refuse(Warning(name_of(message), "CANNOT_CREATE_BEHAVIOR", words), t)
+                self._refuse(message, words)
             else:
                 self.reply(connection, ErrorMessage(code="journal", message=words))
             return False
         return True
+
+    def _refuse(self, message: str, words: str) -> None:
+        """Tell at once that documents are not taken, without a number.
+
+        They are not in the journal: who goes on with the session from there would number all else otherwise.
+        """
+        told = WarningFeedback(id=name_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words).to_xml()
+        for one in self._connections.values():
+            if one.feedback is not None and one.feedback.takes(told):
+                self._effects.append(Send(one.id, told))
 
     def _tell(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
         """Write into the journal what has happened; False where the session is another process's now."""

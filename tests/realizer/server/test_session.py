@@ -13,7 +13,7 @@ from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.errors import RenderError, VoiceError
 from realizer.server import feedback_log
 from realizer.server.effects import Close
-from realizer.server.journal.entry import Entry, Lost
+from realizer.server.journal.entry import Entry, JournalError, Lost
 from realizer.server.journal.local import LocalJournal
 from realizer.server.journal.notes import Notes
 from realizer.server.wire import FrameKind
@@ -185,9 +185,37 @@ def test_binary_in_is_answered_with_an_error(driver) -> None:
 
 
 def test_no_documents_are_taken_while_the_service_ends(driver) -> None:
-    driver.session.intake.ending = True
+    driver.session.ending = True
     (warning,) = warnings(driver.send(NOD.format("b")))
     assert "ending" in warning.text
+    assert warning.seq is None, "another service, that goes on with the session, would not count it"
+
+
+def test_what_is_not_kept_has_no_number_and_leaves_what_is_told_as_it_was() -> None:
+    class Full(LocalJournal):
+        full = False
+
+        def add(self, session: str, entry: Entry) -> None:
+            if self.full:
+                raise JournalError("no room")
+            super().add(session, entry)
+
+    driver, journal = Driver(named=True), Full(":memory:")
+    driver.session.notes = Notes("test", journal)
+    driver.session.notes.begin(0.0)
+    client = driver.send({"type": "speech", "id": "turn", "append": "One. "})
+    journal.full = True
+    driver.send('<bml id="turn"><wait id="w"/></bml>')
+    journal.full = False
+    driver.send({"type": "speech", "id": "turn", "append": "Two.", "close": True})
+    driver.run(10)
+    (warning,) = warnings(client)
+    assert (warning.id, warning.seq) == ("turn", None)
+    assert "no room" in warning.text
+    told = sorted(f.seq for f in client.feedback if f.seq is not None)
+    assert len(told) == len(client.feedback) - 1
+    assert told == list(range(1, len(told) + 1))
+    assert "turn.2:end" in client.ids, "the speech of that name goes on"
 
 
 # voices -----------------------------------------------------------------------------------------
