@@ -23,7 +23,15 @@ SECRET = 32  # characters; HS256 is as strong as that (RFC 7518, 3.2)
 
 
 class SettingsError(RealizerError):
-    """A setting with a wrong value; the text says which, what was wanted and what came."""
+    """A setting with a wrong value; the text says which, what was wanted and what came.
+
+    Attributes:
+        setting: its name; "" where it is none.
+    """
+
+    def __init__(self, text: str, setting: str = "") -> None:
+        super().__init__(text)
+        self.setting = setting
 
 
 def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[[Any], Any]:
@@ -97,15 +105,21 @@ def _colour(value: Any) -> str:
     return value
 
 
+def _path(value: Any) -> Path:
+    if not isinstance(value, str | Path):
+        raise ValueError("the name of a file or folder")
+    return Path(value)
+
+
 def _folder(value: Any) -> Path:
-    path = Path(value)
+    path = _path(value)
     if not path.is_dir():
         raise ValueError("a folder that is there")
     return path
 
 
 def _file(value: Any) -> Path:
-    path = Path(value)
+    path = _path(value)
     if not path.is_file():
         raise ValueError("a file that is there")
     return path
@@ -116,7 +130,7 @@ def _switch_or_file(value: Any) -> str:
     try:
         return "on" if _flag(value) else "off"
     except ValueError:
-        if not Path(value).is_file():
+        if not isinstance(value, str | Path) or not Path(value).is_file():
             raise ValueError("on, off, or a file that is there") from None
         return str(value)
 
@@ -223,7 +237,9 @@ class Settings:
         secret=True,  # a password may be in it
     )
     record: Path | None = _setting(
-        None, _optional(Path), "a folder to record all sessions in, for `realizer replay`; none: not recorded"
+        None,
+        _optional(_path),
+        "a folder to record all sessions in, for `realizer replay`; none: not recorded",
     )
     asap_ports: tuple[int, int] | None = _setting(
         None, _optional(_ports), "of Asap's TCP: BML in, feedback to this port of the client; none: no door"
@@ -261,7 +277,7 @@ class Settings:
         None, _optional(_colour), "of pictures that name none; none: the light's own"
     )
     fps: float = _setting(25.0, _number(float, 0.01, 240), "frames a second of streams that name no rate")
-    scene: Path | None = _setting(None, _optional(Path), "a file of targets every session starts with")
+    scene: Path | None = _setting(None, _optional(_path), "a file of targets every session starts with")
     media: Path | None = _setting(None, _optional(_folder), "the folder of the files that documents may name")
     expressions: Path | None = _setting(
         None, _optional(_folder), "a folder of expressions of one's own; none: those that ship"
@@ -315,7 +331,7 @@ class Settings:
                 object.__setattr__(self, f.name, f.metadata["read"](value))
             except ValueError as wanted:
                 got = "something else" if f.metadata["secret"] else repr(value)
-                raise SettingsError(f"setting {f.name}: wanted {wanted}, got {got}") from None
+                raise SettingsError(f"setting {f.name}: wanted {wanted}, got {got}", f.name) from None
         if self.tls_key is not None and self.tls_cert is None:
             raise SettingsError("setting tls_key: wanted tls_cert too, got none")
         if self.tls_cert is not None and self.workers > 1:
@@ -354,18 +370,25 @@ class Settings:
         values: dict[str, Any] = {}
         if file is not None:
             try:
-                values |= tomllib.loads(file.read_text("utf-8"))
-            except (OSError, tomllib.TOMLDecodeError) as error:
+                values |= tomllib.loads(file.read_text("utf-8-sig"))
+            except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
                 raise SettingsError(f"{file}: {error}") from None
+        sources = dict.fromkeys(values, str(file))
         for name, value in environment.items():
             if name.startswith(PREFIX) and name not in OTHERS:
                 setting = name.removeprefix(PREFIX).lower()
                 if setting in known:
-                    values[setting] = value
+                    values[setting], sources[setting] = value, name
                 elif meant := _meant(setting, known):
                     # What was to be closed by it would stand open.
                     raise SettingsError(f"variable {name}: wanted {PREFIX}{meant.upper()}?")
-        values |= {name: value for name, value in (flags or {}).items() if value is not None}
         if unknown := sorted(values.keys() - known):
-            raise SettingsError(f"setting {unknown[0]}: wanted one of {', '.join(sorted(known))}")
-        return cls(**values)
+            wanted = _meant(unknown[0], known) or f"one of {', '.join(sorted(known))}"
+            raise SettingsError(f"setting {unknown[0]}: wanted {wanted} ({file})")
+        told = {name: value for name, value in (flags or {}).items() if value is not None}
+        try:
+            return cls(**values | told)
+        except SettingsError as error:
+            if error.setting in told or error.setting not in sources:
+                raise
+            raise SettingsError(f"{error} ({sources[error.setting]})", error.setting) from None

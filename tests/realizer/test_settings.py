@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import contextlib
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -65,11 +66,45 @@ def test_an_unknown_name_in_the_file_is_refused(tmp_path: Path) -> None:
         Settings.read(file=file, environment={})
 
 
-def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
+def test_a_name_in_the_file_that_was_written_wrong_is_told_what_was_meant(tmp_path: Path) -> None:
     file = tmp_path / "realizer.toml"
-    file.write_text("port 1")
+    file.write_text("max-rate = 1\n")
+    with pytest.raises(SettingsError, match=r"setting max-rate: wanted max_rate \(.*realizer\.toml\)"):
+        Settings.read(file=file, environment={})
+
+
+@pytest.mark.parametrize("written", [b"port 1", b'host = "\xff"', b"port = 1\nport = 2"])
+def test_a_file_that_is_not_toml_is_named(written: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_bytes(written)
     with pytest.raises(SettingsError, match=r"realizer\.toml"):
         Settings.read(file=file, environment={})
+
+
+def test_a_file_may_begin_as_editors_of_windows_begin_it(tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_bytes(b"\xef\xbb\xbffps = 30\r\n")
+    assert Settings.read(file=file, environment={}).fps == 30
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(Settings)])
+@pytest.mark.parametrize("value", ["[1]", "{ a = 1 }", "2020-01-01", "-0.5"])
+def test_no_value_of_a_file_is_more_than_refused(name: str, value: str, tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_text(f"{name} = {value}\n")
+    with contextlib.suppress(SettingsError):
+        Settings.read(file=file, environment={})
+
+
+def test_a_wrong_value_says_where_it_stands(tmp_path: Path) -> None:
+    file = tmp_path / "realizer.toml"
+    file.write_text("record = 5\nport = 1\n")
+    with pytest.raises(SettingsError, match=r"setting record: wanted .*, got 5 \(.*realizer\.toml\)"):
+        Settings.read(file=file, environment={})
+    with pytest.raises(SettingsError, match=r"setting port: wanted .*, got 'x' \(REALIZER_PORT\)"):
+        Settings.read(file=file, environment={"REALIZER_PORT": "x", "REALIZER_RECORD": ""})
+    with pytest.raises(SettingsError, match=r"setting port: wanted .*, got -1$"):
+        Settings.read({"port": -1}, file=file, environment={"REALIZER_PORT": "x", "REALIZER_RECORD": ""})
 
 
 @pytest.mark.parametrize(

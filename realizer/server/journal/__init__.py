@@ -17,6 +17,10 @@ def journal_at(where: str) -> Journal:
         from realizer.server.journal.shared import SharedJournal
 
         return SharedJournal(where)
+    if "://" in where.removeprefix("sqlite://"):  # as it came it may have a password in it
+        raise JournalError(
+            "the journal: wanted a file, or redis://HOST:PORT/NUMBER, got an address of another kind"
+        )
     from realizer.server.journal.local import LocalJournal
 
     return LocalJournal(where.removeprefix("sqlite://"))

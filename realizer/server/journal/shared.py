@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import secrets
 import time
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,12 @@ __all__ = ["SharedJournal"]
 PATIENCE = 1.0  # s for an answer
 # Everybody waits for it meanwhile: who has not answered in that time is not asked again before so long.
 PAUSE = 4.0  # s
+
+# What may stand before it, and after it, is nobody's business: passwords.
+ADDRESS = re.compile(
+    r"(?P<scheme>rediss?)://([^/?#]*@)?(?P<place>(\[[0-9a-fA-F:.]+\]|[^@:/?#\[\]]*)(:\d+)?(/\d*)?)(\?[^#]*)?"
+    r"|(?P<unix>unix)://([^/?#]*@)?(?P<path>/[^@?#]*)(\?[^#]*)?"
+)
 
 # KEYS: of the head (owner, epoch), of the list of entries, and of the parts by name. Nobody comes between
 # the look and the write, and who restarts the store finds all of a script's writes in its log, or none.
@@ -63,7 +70,16 @@ class SharedJournal:
             from redis.retry import Retry
         except ImportError:
             raise JournalError("a journal in Redis: pip install 'bml-realizer[cluster]'") from None
-        self._url = url.rpartition("@")[2]  # a password is nobody's business
+        if (found := ADDRESS.fullmatch(url)) is None:
+            raise JournalError(
+                "the journal: wanted redis://USER:PASSWORD@HOST:PORT/NUMBER, or unix:///PATH, got another; "
+                "in a password / ? # @ % are written as %2F %3F %23 %40 %25"
+            )
+        self._url = (
+            "{scheme}://{place}".format_map(found.groupdict())
+            if found["scheme"]
+            else f"unix://{found['path']}"
+        )
         self._owner = secrets.token_hex(8)
         self._counts: dict[str, int] = {}  # session -> how many entries it has
         self._pause_ends = 0.0
@@ -78,7 +94,8 @@ class SharedJournal:
                 # One that restarts is there again at once, or not at all; a write twice is as one.
                 retry=Retry(NoBackoff(), 1, (redis.ConnectionError,)),
             )
-        except ValueError as error:
+            self._store.connection_pool.make_connection()  # which knows what may stand behind the "?"
+        except (ValueError, TypeError) as error:
             raise JournalError(f"the journal {self._url}: {error}") from None
         scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, END))
         self._add, self._take, self._compact, self._end = scripts

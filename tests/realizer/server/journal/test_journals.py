@@ -163,3 +163,26 @@ def test_a_file_that_is_no_journal_is_not_written_to(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match="not a database"):
         journal_at(str(path))
     assert path.read_text().startswith("something of mine")
+
+
+@pytest.mark.parametrize(
+    ("where", "says"),
+    [
+        ("redis://:hunter2@127.0.0.1:1/0", r"the journal redis://127\.0\.0\.1:1/0: .*refused"),
+        ("redis://127.0.0.1:1/0?password=hunter2", r"the journal redis://127\.0\.0\.1:1/0: .*refused"),
+        ("redis://127.0.0.1:1/0?pasword=hunter2", "unexpected keyword argument 'pasword'"),
+        ("redis://127.0.0.1:1/0?db=hunter2", "Invalid value for 'db'"),
+        ("redis://:hunter2#x@127.0.0.1:1/0", "wanted redis://"),
+        ("redis://:x#hunter2@127.0.0.1:1/0", "wanted redis://"),
+        ("redis://joe:1/hunter2@127.0.0.1:1/0", "wanted redis://"),
+        ("redis://:hunter2@127.0.0.1:1/first", "wanted redis://"),
+        ("unix://joe:hunter2@/no/such/socket", "the journal unix:///no/such/socket: "),
+        ("postgres://joe:hunter2@127.0.0.1/it", "wanted a file, or redis://"),
+        ("Redis://:hunter2@127.0.0.1", "wanted a file, or redis://"),
+        ("sqlite:///no/such/folder/x.db", "the journal /no/such/folder/x.db: unable to open"),
+    ],
+)
+def test_an_address_that_is_no_journals_is_refused_without_its_password(where: str, says: str) -> None:
+    with pytest.raises(JournalError, match=says) as refused:
+        journal_at(where)
+    assert "hunter2" not in str(refused.value)
