@@ -21,6 +21,7 @@ from realizer.server.messages import (
     PROTOCOL,
     STREAMS,
     SUPPORTED,
+    Changed,
     Control,
     ErrorCode,
     ErrorMessage,
@@ -49,6 +50,7 @@ REQUESTS: dict[str, type[BaseModel]] = {
 REPLIES: dict[str, type[BaseModel]] = {
     "welcome": Welcome,
     "subscribed": Subscribed,
+    "changed": Changed,
     "state": StateMessage,
     "pong": Pong,
     "gap": Gap,
@@ -146,7 +148,14 @@ def _operations() -> Iterator[tuple[str, dict[str, Any]]]:
             answers = [_out(answer) for answer in (*ANSWERS[name], "error")]
             operation["reply"] = {"channel": channel, "messages": refs(answers)}
         yield f"receive-{name}", operation
-    for name in ("feedback", "error-message", "frame", "schedule", *(stream for stream, _ in _kinds())):
+    for name in (
+        "feedback",
+        "error-message",
+        "changed",
+        "frame",
+        "schedule",
+        *(stream for stream, _ in _kinds()),
+    ):
         yield f"send-{name}", {"action": "send", "channel": channel, "messages": refs([_out(name)])}
 
 

@@ -119,6 +119,7 @@ def test_what_the_service_says_fits_the_file() -> None:
         *({"type": "subscribe", "stream": s, "encoding": "json"} for s in ("fap", "au", "arkit", "schedule")),
         *({"type": "subscribe", "stream": s, "fps": 10} for s in ("mesh", "audio", "feedback")),
         {"type": "subscribe", "stream": "smell"},
+        {"type": "character", "face": "ben"},
         {"type": "set", "aus": {"12": 0.5}},
         {"type": "state"},
         {"type": "ping", "id": "x"},

@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Any
 
 from realizer.client.live import Client
+from realizer.client.mail import ClientError
 from realizer.client.plain import SyncClient
 from realizer.server.messages import PROTOCOL
 
@@ -22,7 +23,8 @@ def connect(url: str, *, token: str | None = None) -> Connecting:
 
     Raises:
         OSError: nobody listens there.
-        ClientError: the service speaks another version of the protocol, or wants another token.
+        ClientError: the service speaks another version of the protocol, wants another token, or refuses what
+            the address says; or it is no such service.
     """
     return Connecting(url, token)
 
@@ -39,9 +41,16 @@ class Connecting:
 
     async def __aenter__(self) -> Client:
         from websockets.asyncio.client import connect as dial
+        from websockets.exceptions import InvalidStatus, WebSocketException
 
-        self._dial = dial(self._url, compression=None, max_size=None, max_queue=None)
-        self._client = Client(await self._dial.__aenter__(), self._url, self._token)
+        try:
+            self._dial = dial(self._url, compression=None, max_size=None, max_queue=None)
+            socket = await self._dial.__aenter__()
+        except InvalidStatus as refused:
+            raise _refusal(refused.response.status_code, bytes(refused.response.body)) from None
+        except WebSocketException as error:
+            raise ClientError(f"{self._url}: {error}") from None
+        self._client = Client(socket, self._url, self._token)
         said = {"version": PROTOCOL} if self._token is None else {"version": PROTOCOL, "token": self._token}
         try:
             self._client.welcome = await self._client.ask("hello", **said)
@@ -65,3 +74,9 @@ class Connecting:
     ) -> None:
         assert self._plain is not None
         self._plain.close()
+
+
+def _refusal(status: int, body: bytes) -> ClientError:
+    """Why a service lets nobody in, in its own words."""
+    said = body.decode("utf-8", "replace").strip() or f"the service answers with the status {status}"
+    return ClientError(said, "token" if status in (401, 403) else "connection")

@@ -47,13 +47,21 @@ class Client:
         return list(self._mail.errors)
 
     async def send(self, bml: str) -> None:
-        """Send one or more BML documents."""
+        """Send one or more BML documents.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
         self._mail.sent(bml)
-        await self._socket.send(bml)
+        await self._post(bml)
 
     async def control(self, type: str, **fields: Any) -> None:
-        """Send a control message that has no answer, such as `stop` or `scene`; see `errors`."""
-        await self._socket.send(json.dumps({"type": type, **fields}))
+        """Send a control message that has no answer, such as `stop` or `scene`; see `errors`.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
+        await self._post(json.dumps({"type": type, **fields}))
 
     async def ask(self, type: str, **fields: Any) -> dict[str, Any]:
         """Send a control message and wait for its answer: hello, subscribe, state, ping.
@@ -130,7 +138,11 @@ class Client:
                 return
 
     async def frames(self, stream: str) -> AsyncIterator[Frame]:
-        """Frames of a stream as they come: WireFrame, or a dictionary where the encoding is JSON."""
+        """Frames of a stream as they come: WireFrame, or a dictionary where the encoding is JSON.
+
+        A WireFrame has in `told` what the service has told of its stream when it came. That changes while a
+        mesh runs, when its character gets another face; `vertices` of a mesh goes by it.
+        """
         kept = self._mail.of(stream)
         with contextlib.suppress(ClientError):
             while True:
@@ -167,8 +179,16 @@ class Client:
         self._mail.sent(bml)
         until = Until(self._mail.last_block)
         self._mail.follow(until)
-        await self._socket.send(bml)
+        await self._post(bml)
         return until
+
+    async def _post(self, text: str) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            await self._socket.send(text)
+        except ConnectionClosed:
+            await self._wait(lambda: False)  # until the reader knows why
 
     async def _read(self) -> None:
         from websockets.exceptions import ConnectionClosed

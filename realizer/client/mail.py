@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import deque
+from dataclasses import replace
 from html import unescape
 from typing import Any, Protocol
 
@@ -59,6 +60,10 @@ class Follower(Protocol):
         """One message of feedback; most are of others."""
         ...
 
+    def blame(self, error: dict[str, Any]) -> None:
+        """An error about a message that has no answer; most are of others."""
+        ...
+
 
 class Mail:
     """What has come and nobody has taken yet.
@@ -76,11 +81,13 @@ class Mail:
         self._asked: str | None = None
         self._answer: dict[str, Any] | None = None
         self._followers: list[Follower] = []
+        self._told: dict[tuple[str, int], dict[str, Any]] = {}  # stream, index -> what its frames mean
 
     def put(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
             frame = unpack(message)
-            self.of(PAYLOADS[frame.kind][0]).append(frame)
+            stream = PAYLOADS[frame.kind][0]
+            self.of(stream).append(replace(frame, told=self._told.get((stream, frame.character))))
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] == "schedule" or "values" in reply:
@@ -122,6 +129,9 @@ class Mail:
 
     def _reply(self, reply: dict[str, Any]) -> None:
         asked = self._asked
+        if reply["type"] in ("subscribed", "changed"):
+            key = reply["stream"], reply.get("index", 0)
+            self._told[key] = self._told.get(key, {}) | reply
         if reply["type"] == "error":
             # Where it says nothing of where, it is about text that was no message at all.
             mine = reply.get("where", f"{asked}").partition(".")[0] in (asked, "type")
@@ -131,6 +141,8 @@ class Mail:
             self._asked, self._answer = None, reply
         elif reply["type"] in ("error", "gap"):
             self.errors.append(reply)
+            for one in self._followers:
+                one.blame(reply)
 
 
 class Until:
@@ -163,6 +175,9 @@ class Until:
                 self.last = self.last or feedback
             case PredictionFeedback():
                 self._planned |= any(b.id == self.block and b.global_end is not None for b in feedback.blocks)
+
+    def blame(self, error: dict[str, Any]) -> None:
+        """What is wrong with a block is told in feedback."""
 
     def end(self) -> BlockProgress:
         """What told the end.

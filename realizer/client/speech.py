@@ -25,6 +25,7 @@ class Heard:
         points: sync of the text -> when it was said, seconds on the session clock.
         end: that it has ended; `said` where it was cut off.
         refused: why it is not said at all.
+        fault: why what was sent is no part of it: one of that id was closed and is still being said.
     """
 
     def __init__(self, id: str) -> None:
@@ -32,6 +33,20 @@ class Heard:
         self.points: dict[str, float] = {}
         self.end: BlockProgress | None = None
         self.refused: str | None = None
+        self.fault: dict[str, Any] | None = None
+
+    def blame(self, error: dict[str, Any]) -> None:
+        """An error about a message that has no answer; most are of others."""
+        if (error.get("where"), error.get("id")) == ("speech.id", self._id):
+            self.fault = error
+
+    def check(self) -> None:
+        """
+        Raises:
+            ClientError: what was sent is no part of it.
+        """
+        if self.fault is not None:
+            raise ClientError.of(self.fault)
 
     def tell(self, feedback: Feedback) -> None:
         """One message of feedback; most are of others."""
@@ -51,7 +66,7 @@ class Heard:
 
     @property
     def over(self) -> bool:
-        return self.end is not None or self.refused is not None
+        return any(known is not None for known in (self.end, self.refused, self.fault))
 
     def point(self, sync: str) -> float:
         """When a sync was said.
@@ -59,6 +74,7 @@ class Heard:
         Raises:
             ClientError: it never will be.
         """
+        self.check()
         if sync not in self.points:
             raise ClientError(self.refused or f"the speech {self._id} has ended without a sync {sync!r}")
         return self.points[sync]
@@ -69,6 +85,7 @@ class Heard:
         Raises:
             ClientError: it was refused.
         """
+        self.check()
         if self.end is None:
             raise ClientError(self.refused or f"the speech {self._id} has not ended")
         return self.end
@@ -96,23 +113,38 @@ class Speech:
         self._wait = wait
         self._opening = opening
         self._unsent = ""
+        self._closed = False
+        self._sending = asyncio.Lock()
         self._pausing: asyncio.Task[None] | None = None
 
     async def append(self, text: str) -> None:
         """Say more: text with <sync id="m"/>, SSML and behaviours in it, each sentence when it is whole.
 
         It is sent at once, or a moment after the last message was.
+
+        Raises:
+            ClientError: it was closed, here or by the service, because the connection that it came by had
+                ended before it was whole. Or this connection has ended.
         """
+        self.heard.check()
+        if self._closed:
+            raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
         self._unsent += text
         if self._pausing is None or self._pausing.done():
             await self._flush()
             self._pausing = asyncio.create_task(self._pause())
 
     async def close(self) -> None:
-        """Nothing follows: what is left is said."""
-        if self._unsent:
-            await self._flush()
-        await self._send(close=True)
+        """Nothing follows: what is left is said. Once more does nothing.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        if self.heard.fault is None:
+            await self._flush(close=True)
 
     async def stop(self) -> None:
         """Fall silent at once."""
@@ -137,10 +169,14 @@ class Speech:
         await self._wait(lambda: self.heard.over)
         return self.heard.ended()
 
-    async def _flush(self) -> None:
-        text, self._unsent = self._unsent, ""
-        for at in range(0, max(1, len(text)), LONGEST):
-            await self._send(append=text[at : at + LONGEST])
+    async def _flush(self, *, close: bool = False) -> None:
+        async with self._sending:  # in order: a text may take several messages
+            text, self._unsent = self._unsent, ""
+            least = 0 if close else 1  # to append nothing begins a speech too
+            for at in range(0, max(least, len(text)), LONGEST):
+                await self._send(append=text[at : at + LONGEST])
+            if close:
+                await self._send(close=True)
 
     async def _pause(self) -> None:
         """Send what comes, a few times a second; a connection that has ended tells so whoever waits."""

@@ -115,12 +115,18 @@ class Broadcast:
         """A subscription to pictures, from `now` on."""
         return self.pictures.subscription(self.timeline(index, fps), index, look, now)
 
-    def face_changed(self, index: int) -> None:
-        """The face of a character is another one: meshes and pictures follow from the next frame on."""
+    def face_changed(self, index: int) -> list[tuple[int, FrameSubscription]]:
+        """The face of a character is another one: meshes and pictures follow from the next frame on.
+
+        Returns:
+            Who gets meshes of it, each with the id of its connection: they must be told what these mean now.
+        """
         for (character, _), timeline in self._timelines.items():
             if character == index:
                 timeline.forget()
         self.pictures.face_changed(index)
+        members = [member for lane in self._lanes for member in lane.members]
+        return [(c.id, s) for c, s in members if s.stream == "mesh" and s.index == index]
 
     def gets(self, connections: Iterable[Connection]) -> None:
         """Who gets what from now on."""

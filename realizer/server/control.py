@@ -26,6 +26,7 @@ from realizer.server.messages import (
     STREAMS,
     Anticipate,
     BlockState,
+    Changed,
     CharacterMessage,
     CharacterState,
     Control,
@@ -93,8 +94,12 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
             case Ping():
                 session.reply(connection.id, Pong(id=message.id, time=t))
     except (Wrong, SpeechError) as error:
-        where = f"{message.type}.{error.where}"
-        session.reply(connection.id, ErrorMessage(code="invalid", message=str(error), where=where))
+        where, speech = (
+            f"{message.type}.{error.where}",
+            message.id if isinstance(message, SpeechMessage) else None,
+        )
+        told = ErrorMessage(code="invalid", message=str(error), where=where, id=speech)
+        session.reply(connection.id, told)
     except ClipError as error:
         session.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
     except FaceError as error:
@@ -262,7 +267,9 @@ def _character(session: Session, message: CharacterMessage) -> None:
     index = index_of(session, message.id)
     if message.face is not None:
         session.faces.given[index] = message.face
-        session.broadcast.face_changed(index)
+        for connection, mesh in session.broadcast.face_changed(index):
+            told = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
+            session.reply(connection, Changed(**told, **_mesh_of(session, index)))
     if message.voice is not None:
         session.intake.voices[index] = message.voice
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,12 @@ PAYLOADS: Mapping[FrameKind, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class WireFrame:
-    """One binary message taken apart; `character` is the index that `subscribed` told."""
+    """One binary message taken apart.
+
+    Attributes:
+        character: the index that `subscribed` told.
+        told: what `subscribed`, or `changed` since, told of its stream, where a client has put it here.
+    """
 
     kind: FrameKind
     frame: int
@@ -81,6 +87,7 @@ class WireFrame:
     payload: bytes
     character: int = 0
     forget: bool = False
+    told: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @property
     def values(self) -> Int32 | Float32 | Int16:
@@ -99,6 +106,18 @@ class WireFrame:
             case FrameKind.MESH:
                 return np.frombuffer(self.payload, "<i2").reshape(-1, 3)
         raise WireError("a picture has no values: wanted a frame of numbers")
+
+    @property
+    def vertices(self) -> Float32:
+        """(n, 3) float32, metres.
+
+        Raises:
+            WireError: it is no mesh, or nobody has told its scale.
+        """
+        if self.kind is not FrameKind.MESH or self.told is None:
+            raise WireError(f"wanted a mesh whose stream was told of, got {self.kind.name}")
+        scale, offset = self.told["scale"], self.told["offset"]
+        return (self.values * np.float32(scale) + np.array(offset, np.float32)).astype(np.float32)
 
 
 def pack(

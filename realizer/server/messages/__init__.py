@@ -16,6 +16,7 @@ from realizer.server.messages.parse import SUPPORTED, Control, parse_control
 from realizer.server.messages.replies import (
     BlockState,
     Capabilities,
+    Changed,
     CharacterState,
     ErrorCode,
     ErrorMessage,
@@ -56,6 +57,7 @@ __all__ = [
     "Anticipate",
     "BlockState",
     "Capabilities",
+    "Changed",
     "CharacterMessage",
     "CharacterState",
     "Control",

@@ -11,6 +11,7 @@ from realizer.server.messages.common import PROTOCOL, Reply, Seconds
 __all__ = [
     "BlockState",
     "Capabilities",
+    "Changed",
     "CharacterState",
     "ErrorCode",
     "ErrorMessage",
@@ -99,6 +100,20 @@ class Subscribed(Reply):
     elements: list[str] | None = Field(None, description="feedback: which of it comes")
 
 
+class Changed(Reply):
+    """The character of a `mesh` has another face: what its values mean from `frame` on."""
+
+    type: Literal["changed"] = "changed"
+    stream: str
+    character: str | None = Field(None, description="as `subscribe` named it")
+    index: int = Field(0, description="the low byte of the flags of binary frames")
+    frame: int
+    face: str = Field(description="the rest mesh is at /faces/NAME")
+    vertices: int
+    scale: float = Field(description="metres = int16 x scale + offset")
+    offset: list[float]
+
+
 class BlockState(Reply):
     """A block that plays, waits or is being prepared."""
 
@@ -172,6 +187,7 @@ class ErrorMessage(Reply):
     code: ErrorCode
     message: str = Field(description="what was wanted and what came")
     where: str | None = Field(None, description="message type and field")
+    id: str | None = Field(None, description="of the speech whose message it was")
 
 
 class Gap(Reply):

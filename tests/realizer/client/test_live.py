@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bml_schema.feedback import WarningFeedback
 from realizer.client import ClientError, connect
+from realizer.face import load_face
 from realizer.server.serve import Server
 from realizer.server.wire import WireFrame
 from realizer.settings import Settings
@@ -182,6 +184,74 @@ def test_feedback_ends_with_the_connection() -> None:
             assert [f async for f in client.feedback()] == []
             with pytest.raises(ClientError, match="has ended"):
                 await client._wait(lambda: False)
+
+    serving(test)
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        lambda client: client.send(WAIT.format("b")),
+        lambda client: client.play(WAIT.format("b")),
+        lambda client: client.control("stop"),
+        lambda client: client.ask("ping"),
+        lambda client: client.subscribe("fap"),
+    ],
+)
+def test_whatever_is_said_over_a_connection_that_has_ended_is_an_error_of_ours(say: Any) -> None:
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent")
+        async with asyncio.timeout(LIMIT), Server(settings) as server, connect(server.url) as client:
+            await server.close()
+            with pytest.raises(ClientError, match="the connection has ended: the service ends") as caught:
+                await say(client)
+            assert caught.value.code == "connection"
+
+    asyncio.run(run())
+
+
+def test_what_the_service_refuses_of_an_address_is_told_in_its_words() -> None:
+    async def test(url: str) -> None:
+        for bad, says in (
+            (f"{url}?session=a b", "session: wanted 1..64 letters"),
+            (
+                f"{url}?session=a&seen=abc",
+                "seen: wanted the number of the last feedback that came, got 'abc'",
+            ),
+            (url.replace("/ws", "/other"), "wanted a WebSocket at /ws or /check"),
+            (url.replace("ws:", "http:"), "http"),
+        ):
+            with pytest.raises(ClientError, match=says):
+                async with connect(bad.replace(" ", "%20")):
+                    pass
+
+    serving(test)
+
+
+def test_a_mesh_is_read_by_the_face_it_has_though_that_changes_while_it_runs() -> None:
+    async def test(url: str) -> None:
+        rests = {face: load_face(face) for face in ("ada", "ben")}
+        async with connect(url) as client:
+            await client.control("character", face="ada")
+            await client.subscribe("fap")
+            told = await client.subscribe("mesh", fps=50)
+            assert told["face"] == "ada"
+            numbers, shown = [], []
+            async for frame in client.frames("mesh"):
+                assert isinstance(frame, WireFrame)
+                assert frame.told is not None
+                numbers.append(frame.frame)
+                shown.append(frame.told["face"])
+                # A face moves by centimetres; by another one's scale it would be another face.
+                assert np.abs(frame.vertices - rests[shown[-1]].vertices).max() < 0.03
+                if shown == ["ada"] * 3:
+                    await client.control("character", face="ben")
+                if shown[-3:] == ["ben"] * 3:
+                    break
+            assert frame.told["type"] == "changed"
+            assert frame.told["frame"] == frame.frame - 2
+            assert numbers == list(range(told["frame"], told["frame"] + len(numbers)))
+            assert not client.errors
 
     serving(test)
 

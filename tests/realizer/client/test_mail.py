@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
 from realizer.client.mail import KEPT, ClientError, Mail, Until
-from realizer.server.wire import FrameKind, pack
+from realizer.server.wire import FrameKind, WireError, pack
 
 
 @pytest.fixture
@@ -49,6 +49,26 @@ def test_frames_are_kept_by_stream_the_newest_ones(mail, kind) -> None:
         mail.put(pack(kind, k, k / 25, np.zeros(2, "<f4").tobytes()))
     ((_, frames),) = mail.frames.items()
     assert [frame.frame for frame in frames] == list(range(5, KEPT + 5))
+
+
+def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
+    mesh = {"stream": "mesh", "index": 1, "scale": 2.0, "offset": [0.0, 0.0, 1.0]}
+    frame = pack(FrameKind.MESH, 0, 0.0, np.array([1, 2, 3], "<i2").tobytes(), character=1)
+    mail.ask("subscribe")
+    mail.put(json.dumps({"type": "subscribed", "fps": 25.0, **mesh}))
+    mail.put(frame)
+    mail.put(json.dumps({"type": "changed", **mesh, "scale": 1.0}))
+    mail.put(frame)
+    mail.put(frame[:2] + b"\0" + frame[3:])  # of another character
+    first, second, other = mail.of("mesh")
+    assert first.vertices.tolist() == [[2.0, 4.0, 7.0]]
+    assert second.vertices.tolist() == [[1.0, 2.0, 4.0]]
+    assert second.told["fps"] == 25.0
+    assert first == second
+    with pytest.raises(WireError, match="wanted a mesh whose stream was told of, got MESH"):
+        _ = other.vertices
+    assert mail.answer()["scale"] == 2.0
+    assert not mail.errors
 
 
 def test_json_frames_and_schedules_are_frames(mail) -> None:

@@ -49,6 +49,9 @@ def test_tokens_that_come_at_once_go_together_and_a_stop_waits_for_none() -> Non
             await asyncio.sleep(0)
         await speech.append("three")
         await speech.close()
+        await speech.close()
+        with pytest.raises(ClientError, match="the speech s1 was closed"):
+            await speech.append("four")
         assert sent[0][1]["language"] == "nl"
         assert (
             "".join(str(fields.get("append", "")) for _, fields in sent) == "One " + "two " * 5000 + "three"
@@ -78,6 +81,31 @@ def test_a_speech_is_stopped_and_says_what_was_heard() -> None:
             assert (end.said or "").startswith("One two")
             with pytest.raises(ClientError, match="without a sync 'x'"):
                 await speech.until("x")
+
+    serving(test)
+
+
+def test_a_speech_that_was_closed_when_its_connection_ended_takes_no_more_from_who_comes_back() -> None:
+    async def test(url: str) -> None:
+        async with connect(f"{url}?session=show") as client:
+            lost = client.speech("s1")
+            speech = await lost.__aenter__()
+            await speech.append("One two three four five six seven eight nine ten. ")
+            await client.ask("ping")
+            await client.close()
+            with pytest.raises(ClientError, match="the connection has ended"):
+                await speech.append("Eleven. ")
+        async with connect(f"{url}?session=show&seen=0") as client:
+            async with client.speech("s1") as again:
+                await again.append("Eleven. ")
+                with pytest.raises(ClientError, match="'s1' was closed and is being said") as caught:
+                    await again.ended()
+                assert caught.value.code == "invalid"
+                with pytest.raises(ClientError, match="'s1' was closed and is being said"):
+                    await again.append("Twelve. ")
+            async with client.speech("s2") as other:
+                await other.append("One.")
+            assert (await other.ended()).status == "DONE"
 
     serving(test)
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from realizer.animation.targets import axis
+from realizer.face import load_face
+from realizer.server.wire import unpack
 from realizer.tables.emotions import emotion_faces
 
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
@@ -174,6 +176,31 @@ def test_an_unknown_face_is_told_by_the_known_ones_and_no_folders(face, name: st
     (error,) = face.driver.clients[1].of("error")
     assert (error["code"], error["where"]) == ("face", "character.face")
     assert error["message"] == f"wanted one of ada, ben, ida, got {name!r}"
+
+
+def test_who_gets_meshes_is_told_of_another_face_before_the_first_one_of_it(drive) -> None:
+    driver = drive(idle=False)
+    for number in (2, 3, 4):
+        driver.join(number)
+    driver.send({"type": "subscribe", "stream": "mesh", "fps": 25}, 1)
+    driver.send({"type": "subscribe", "stream": "mesh", "fps": 10, "character": "Ada"}, 2)
+    driver.send({"type": "subscribe", "stream": "mesh", "fps": 10, "character": "Ben"}, 3)
+    driver.send({"type": "subscribe", "stream": "fap"}, 4)
+    driver.run(1.0)
+    driver.send({"type": "character", "id": "Ada", "face": "ben"}, 3)
+    driver.run(2.0)
+    first, ada, ben, fap = (driver.clients[number] for number in (1, 2, 3, 4))
+    assert ben.of("changed") == fap.of("changed") == []
+    for client, name, fps in ((first, None, 25), (ada, "Ada", 10)):
+        (told,) = client.of("changed")
+        assert (told["stream"], told.get("character"), told["face"]) == ("mesh", name, "ben")
+        assert told["vertices"] == len(load_face("ben").vertices)
+        kinds = [m if isinstance(m, str) else unpack(m) for m in client.messages]
+        at = next(k for k, m in enumerate(kinds) if isinstance(m, str) and '"changed"' in m)
+        before, after = kinds[at - 1], kinds[at + 1]
+        assert (before.frame + 1, len(before.values)) == (told["frame"], len(load_face("ada").vertices))
+        assert (after.frame, len(after.values)) == (told["frame"], told["vertices"])
+        assert told["frame"] == fps + 1
 
 
 def test_blocks_to_stop_that_nobody_knows_are_named_and_the_others_end(drive) -> None:
