@@ -3,15 +3,18 @@
     text to FAP, without speech     nods, expressions, gazes and idle motion; the bytes of the .fap file
     text to FAP, silent voice       the same with sentences whose times come from rules
     text to FAP, espeak             with espeak-ng, which never says a sentence twice here
+      espeak-ng alone               the floor: the same sentences by the engine in one process, nothing else
     openfacefx, text to curves      the sentences of the row above it but one, as long as there, by the peer
     film                            512x512 .mp4 by two workers (`--films 16`, which take a minute)
 
 Each of documents of 4 s, as a dialogue has them, and of 30 s. By core: by the processor time of this process
 and of the engine that speaks for it, which is what a batch on idle cores takes; less noise: the same, were
-the machine always as calm as at its best in this run; by clock: with whatever else it did. Noise is how much
-more processor time than at that best a fixed piece of work took between the documents, median and nine in
-ten: at 100 % the machine was half as fast. The peer makes 15 visemes, blinks, brows and head from text and a
-length; it reads no BML, plans nothing and blends nothing. Measures only; nothing asserts a time.
+the machine always as calm as at its best in this run; by clock: with whatever else it did. Engine is the part
+of a document that is the engine's process, which forks for each sentence, so that what it says does not
+depend on what it said before. Noise is how much more processor time than at that best a fixed piece of work
+took between the documents, median and nine in ten: at 100 % the machine was half as fast. The peer makes
+15 visemes, blinks, brows and head from text and a length; it reads no BML, plans nothing and blends nothing.
+Measures only; nothing asserts a time.
 """
 
 from __future__ import annotations
@@ -25,6 +28,8 @@ import time
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import islice
+from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
@@ -32,11 +37,14 @@ os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
 from realizer.batch.processes import Processes
 from realizer.batch.task import Options, Task
 from realizer.batch.work import Worker
+from realizer.speech.espeak import WORDS_A_MINUTE
+from realizer.speech.espeak_worker import load
 
 LENGTHS = (4, 30)  # s, about
 DOCUMENTS = 40
 FILM = 8  # s
 FPS = 25
+ENGLISH = "gmw/en-US"  # the engine's own name of the voice that the documents are said by
 SENTENCES = (
     "Good morning, this is number {k} speaking.",
     "I was wondering whether you had seen my {size} {colour} umbrella.",
@@ -148,7 +156,7 @@ def row(name: str, works: Iterator[Callable[[], float]], engine: Callable[[], fl
     print(
         f"{name:30}{statistics.mean(played):7.1f} s{sum(played) / used:9.0f} x"
         f"{sum(played) / used * noise.factor:9.0f} x"
-        f"{sum(played) / clock:9.0f} x{1000 * used / len(played):9.1f} ms{noise}",
+        f"{sum(played) / clock:9.0f} x{1000 * used / len(played):9.1f} ms{1000 * others:7.1f} ms{noise}",
         flush=True,
     )
     return sum(played) / used
@@ -170,6 +178,33 @@ def fap(name: str, voice: str, seconds: int, *, speech: bool) -> float:
     cost = row(name, iter(rest), lambda: spent_by(worker.voice_pid))
     worker.close()
     return cost
+
+
+def floor(seconds: int, least: float) -> None:
+    """What espeak-ng takes for the sentences by itself; to be called in a process of its own.
+
+    Args:
+        least: of the noise.
+    """
+    Noise.least = least
+    engine = load([])
+    worker = Worker(Options(formats=(".vtt",), voice="espeak"))
+
+    def said(k: int) -> Callable[[], float]:
+        (task,) = islice(tasks(k + 1, seconds, speech=True), k, None)
+        length = float(worker.perform(task).row["duration"])
+        texts = [f"<speak>{words}</speak>" for words in sentences(k, seconds)]
+
+        def say() -> float:
+            for text in texts:
+                engine.say({"text": text, "voice": ENGLISH, "wpm": WORDS_A_MINUTE})
+            return length
+
+        return say
+
+    works = [said(k) for k in range(1, DOCUMENTS + 1)]
+    worker.close()
+    row("  espeak-ng alone", iter(works))
 
 
 def peer(seconds: int, ours: float) -> None:
@@ -232,13 +267,17 @@ def main() -> None:
         film(films)
         return
     heads = (
-        f"{'by core':>11}{'less noise':>11}{'by clock':>11}{'a document':>12}{'noise':>9}{'nine in ten':>12}"
+        f"{'by core':>11}{'less noise':>11}{'by clock':>11}{'a document':>12}{'engine':>10}"
+        f"{'noise':>9}{'nine in ten':>12}"
     )
     print(f"{'':30}{'each':>9}{heads}")
     for seconds in LENGTHS:
         fap("text to FAP, without speech", "silent", seconds, speech=False)
         silent = fap("text to FAP, silent voice", "silent", seconds, speech=True)
         fap("text to FAP, espeak", "espeak", seconds, speech=True)
+        alone = get_context("spawn").Process(target=floor, args=(seconds, Noise.least))
+        alone.start()
+        alone.join()
         peer(seconds, silent)
 
 
