@@ -94,12 +94,9 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
             case Ping():
                 session.reply(connection.id, Pong(id=message.id, time=t))
     except (Wrong, SpeechError) as error:
-        where, speech = (
-            f"{message.type}.{error.where}",
-            message.id if isinstance(message, SpeechMessage) else None,
-        )
-        told = ErrorMessage(code="invalid", message=str(error), where=where, id=speech)
-        session.reply(connection.id, told)
+        where = f"{message.type}.{error.where}"
+        id = message.id if isinstance(message, SpeechMessage) else None
+        session.reply(connection.id, ErrorMessage(code="invalid", message=str(error), where=where, id=id))
     except ClipError as error:
         session.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
     except FaceError as error:

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from realizer.face import face_scale, load_face
+
 from .test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
@@ -125,6 +127,27 @@ def test_frames_come_as_numbers(page, stream, options, values, kind) -> None:  #
       return [names.length, frame.stream, frame.values().length, frame.values().constructor.name];
     }"""
     assert page.evaluate(script, [stream, options]) == [values, stream, values, kind]
+
+
+def test_a_frame_brings_what_it_means_also_after_its_character_has_another_face(page) -> None:  # type: ignore[no-untyped-def]
+    script = """async (faces) => {
+      const shown = [];
+      let done;
+      const all = new Promise((resolve) => (done = resolve));
+      realizer.ask({ type: "character", face: faces[0] });
+      await realizer.subscribe("mesh", { fps: 30 }, ({ told, values }) => {
+        shown.push([told.face, told.scale, values().length === 3 * told.vertices]);
+        if (shown.length === 2) realizer.ask({ type: "character", face: faces[1] });
+        if (told.face === faces[1]) done();
+      });
+      await all;
+      realizer.unsubscribe("mesh");
+      return [shown[0], shown.at(-1)];
+    }"""
+    before, after = page.evaluate(script, ["ada", "ben"])
+    for name, (face, scale, whole) in zip(("ada", "ben"), (before, after), strict=True):
+        assert (face, whole) == (name, True)
+        assert scale == pytest.approx(float(face_scale(load_face(name))[0]))
 
 
 def test_a_picture_is_the_bytes_of_its_file(page) -> None:  # type: ignore[no-untyped-def]

@@ -224,6 +224,20 @@ def test_another_face_is_chosen_on_the_page(page) -> None:  # type: ignore[no-un
     page.wait_for_function(f"realizerPage.stage.shownFrames > {shown} + 5")
 
 
+def test_a_face_that_somebody_else_has_chosen_is_shown(page) -> None:  # type: ignore[no-untyped-def]
+    page.wait_for_function("realizerPage.stage.shownFrames > 1")
+    mine = page.locator("#faces button[aria-pressed='true']").text_content().lower()
+    other = next(info.name for info in list_faces() if info.name != mine)
+    page.evaluate("(face) => realizerPage.link.ask({ type: 'character', face })", other)
+    page.wait_for_selector(f"#faces button[aria-pressed='true']:has-text('{other.capitalize()}')")
+    page.wait_for_function(f"realizerPage.stage.name === '{other}'")
+    shown = page.evaluate("realizerPage.stage.shownFrames")
+    page.wait_for_function(f"realizerPage.stage.shownFrames > {shown} + 5")
+    vertices = load_face(other).vertices
+    width = page.evaluate("Math.max(...realizerPage.stage.mesh.geometry.attributes.position.array)")
+    assert width == pytest.approx(vertices.max(), abs=0.01), "by the scale of that face"
+
+
 def test_the_face_is_there_and_alive(page) -> None:  # type: ignore[no-untyped-def]
     page.wait_for_function("realizerPage.stage.shownFrames > 5")
     skin = pixel(picture(page), 0.5, 0.5)

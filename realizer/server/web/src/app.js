@@ -65,6 +65,10 @@ link.onreply = (message) => {
   if (message.type === "welcome") faces = message.capabilities.faces ?? [];
   if (message.type === "state") showVoice(message.characters[0]?.voice ?? message.voice.name);
   if (message.type === "subscribed" && message.stream === "mesh") showFace(message);
+  if (message.type === "changed") {
+    stage.reset();
+    showFace(message);
+  }
   if (message.type === "subscribed" && message.stream === "audio") sound.rate = message.rate;
   if (message.type === "subscribed" && message.stream in timeline.kinds) timeline.kinds[message.stream].begin(message.names);
   if (message.type === "error") {
@@ -75,7 +79,7 @@ link.onreply = (message) => {
 link.onframe = (frame) => {
   if (frame.stream === "mesh") {
     clock.heard(frame.time, performance.now() / 1000);
-    stage.add(frame.time, frame.values());
+    stage.add(frame.time, frame.values(), frame.told?.face);
   } else if (frame.stream === "audio") {
     if (timeline.scrub !== null) return;
     sound.packet(frame.time, frame.values(), frame.forget);
@@ -124,14 +128,9 @@ async function showFace(message) {
   }
 }
 
-// A button for each face there is: the character gets it, and the mesh begins anew.
+// A button for each face there is: the character gets it, and whoever looks is told.
 function showFaces({ face }) {
-  choose(at("faces"), faces, face, (name) => {
-    link.ask({ type: "character", face: name });
-    link.unsubscribe("mesh");
-    stage.reset();
-    link.subscribe("mesh", { fps: MESH_RATE });
-  });
+  choose(at("faces"), faces, face, (name) => link.ask({ type: "character", face: name }));
 }
 
 // A button for each light there is; the one that is pressed is told by its table.

@@ -58,7 +58,8 @@ export class RealizerError extends Error {
  *   onlost()                    the connection is gone; another one is tried
  *   onfeedback(element, seq)    BML feedback, as an XML element
  *   onreply(message)            every JSON message that is not a frame: welcome, subscribed, state, error, ...
- *   onframe(frame)              every frame of every stream, see `frameOf`
+ *   onframe(frame)              every frame of every stream, see `frameOf`; its `told` is what `subscribed`, or
+ *                               `changed` since, told of its stream: of a mesh the face, scale and offset
  */
 export class Realizer {
   onopen = nothing;
@@ -73,7 +74,7 @@ export class Realizer {
   #tries = 0;
   #closed = false;
   #asked = []; // { message, resolve, reject } of questions without an answer yet
-  #streams = new Map(); // "stream/character" -> { message, take, index of the character }
+  #streams = new Map(); // "stream/character" -> { message, take, told: what its frames mean }
   #unsent = []; // what is to be played when the connection is there
   #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
 
@@ -157,7 +158,7 @@ export class Realizer {
   subscribe(stream, options = {}, take = nothing) {
     const message = { type: "subscribe", stream, ...options };
     const key = keyOf(message);
-    this.#streams.set(key, { message, take, index: 0 });
+    this.#streams.set(key, { message, take, told: { index: 0 } });
     const answer = this.ask(message);
     answer.catch(() => {
       if (this.#streams.get(key)?.message === message) this.#streams.delete(key);
@@ -206,16 +207,21 @@ export class Realizer {
     if (message.type === "schedule" || Array.isArray(message.values)) return this.#frame(jsonFrameOf(message));
     // Another life of the session: its numbers start again.
     if (message.type === "gap") this.seen = null;
-    if (message.type === "subscribed" && this.#streams.has(keyOf(message))) this.#streams.get(keyOf(message)).index = message.index;
+    if (message.type === "subscribed" || message.type === "changed") {
+      const stream = this.#streams.get(keyOf(message));
+      if (stream) stream.told = { ...stream.told, ...message };
+    }
     this.#answer(message);
     this.onreply(message);
   }
 
   #frame(frame) {
-    for (const { message, take, index } of this.#streams.values()) {
+    for (const { message, take, told } of this.#streams.values()) {
       // JSON names the character as the subscription did, binary frames say its index.
-      const own = frame.kind === undefined ? message.character : index;
-      if (message.stream === frame.stream && own === frame.character) take(frame);
+      const own = frame.kind === undefined ? message.character : told.index;
+      if (message.stream !== frame.stream || own !== frame.character) continue;
+      frame.told = told;
+      take(frame);
     }
     this.onframe(frame);
   }

@@ -27,11 +27,12 @@ export class Stage {
 
   // Show a face by name; stream positions are int16 x scale + offset.
   async load(name, scale, offset) {
-    const path = encodeURIComponent(name);
+    const path = encodeURIComponent((this.awaited = name));
     const [look, glb] = await Promise.all([
       fetch(`look.json?face=${path}`).then((answer) => checked(answer).json()),
       fetch(`faces/${path}`).then((answer) => checked(answer).arrayBuffer()),
     ]);
+    if (this.awaited !== name) return; // another one has been asked for meanwhile
     const { attributes, indices } = readGlb(glb);
     const geometry = new BufferGeometry();
     const put = (as, { array, size, normalized }) => geometry.setAttribute(as, new BufferAttribute(array, size, normalized));
@@ -41,7 +42,7 @@ export class Stage {
     put("gloss", attributes._GLOSS);
     geometry.setIndex(new BufferAttribute(indices, 1));
     geometry.computeVertexNormals();
-    Object.assign(this, { look, preset: look.camera, scale, offset });
+    Object.assign(this, { name, look, preset: look.camera, scale, offset });
     for (const part of [this.mesh, this.furrows?.mesh, this.glints?.mesh]) part?.geometry.dispose();
     this.scene.clear();
     this.mesh = new Mesh(geometry, this.material);
@@ -82,10 +83,11 @@ export class Stage {
     this.frames = [];
   }
 
-  add(time, values) {
+  // Vertices of the face of that name.
+  add(time, values, face) {
     const late = this.frames.at(-1);
     if (late && time <= late.time) return;
-    this.frames.push({ time, values });
+    this.frames.push({ time, values, face });
     while (this.frames[0].time < time - KEPT) this.frames.shift();
   }
 
@@ -112,7 +114,7 @@ export class Stage {
     const a = this.frames[first];
     const b = this.frames[first + 1] ?? a;
     const position = this.mesh.geometry.attributes.position;
-    if (a.values.length !== position.array.length) return;
+    if (a.face !== this.name) return; // which is still being loaded
     const t = b.time > a.time ? Math.min(1, Math.max(0, (playhead - a.time) / (b.time - a.time))) : 0;
     if (this.shown === a.values && this.shownAt === t) return;
     this.shown = a.values;
