@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from random import Random
@@ -116,6 +116,9 @@ class Memory:
         if session not in self.entries:
             return None
         return Kept(EPOCH, list(self.entries[session]), dict(self.parts[session]))
+
+    def taken(self, sessions: Collection[str]) -> set[str]:
+        return set()
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         if self._full():

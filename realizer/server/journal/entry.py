@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, get_args
 
@@ -125,6 +125,14 @@ class Journal(Log, Protocol):
 
     def take(self, session: str) -> Kept | None:
         """Take a session over, to be gone on with; None where it is not there.
+
+        Raises:
+            JournalError: it cannot be read.
+        """
+        ...
+
+    def taken(self, sessions: Collection[str]) -> set[str]:
+        """Those of them that another process has taken over. May be called in another thread, and wait.
 
         Raises:
             JournalError: it cannot be read.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import secrets
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from time import time
 
@@ -30,6 +31,7 @@ SELECT id, epoch + max(
         WHERE session = id AND name = 'state' AND json_valid(text)), 0)
 ) FROM sessions
 """
+TAKEN = "SELECT id FROM sessions WHERE owner != ? AND id IN (SELECT value FROM json_each(?))"
 # How long a write waits for another worker's.
 BUSY = 2.0  # s
 
@@ -84,6 +86,11 @@ class LocalJournal:
                 "SELECT name, text FROM parts WHERE session = ?", (session,)
             ).fetchall()
         return None if mine is None else Kept(mine[0], [Entry.read(line) for (line,) in lines], dict(parts))
+
+    def taken(self, sessions: Collection[str]) -> set[str]:
+        # A connection of its own: the other one is of the thread that writes.
+        with self._told(), contextlib.closing(sqlite3.connect(self._path, timeout=BUSY)) as file:
+            return {id for (id,) in file.execute(TAKEN, (self._owner, json.dumps(list(sessions))))}
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         with self._at_once():

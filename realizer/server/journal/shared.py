@@ -6,7 +6,7 @@ import contextlib
 import re
 import secrets
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
@@ -129,6 +129,14 @@ class SharedJournal:
         texts = dict(zip(parts[::2], parts[1::2], strict=True))
         self._counts[session] = len(lines)
         return Kept(float(epoch), [Entry.read(line) for line in lines], texts)
+
+    def taken(self, sessions: Collection[str]) -> set[str]:
+        with self._told():
+            pipe = self._store.pipeline(transaction=False)
+            for session in sessions:
+                pipe.hget(_keys(session)[0], "owner")
+            owners = dict(zip(sessions, pipe.execute(), strict=True))
+        return {session for session, owner in owners.items() if owner not in (None, self._owner)}
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         gone = [name for name, text in parts.items() if text is None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import uuid
 from pathlib import Path
 
@@ -57,6 +58,27 @@ def test_who_has_lost_a_session_is_told_when_it_writes(where: str, session: str)
     other.add(session, ENTRIES[1])
     one.end(session)  # which is not its any more
     assert one.take(session) == Kept(0.0, [ENTRIES[1]])
+
+
+def test_who_looks_finds_which_sessions_are_another_s_now_and_changes_nothing(
+    where: str, session: str
+) -> None:
+    one, other = journal_at(where), journal_at(where)
+    mine, gone, never = session, f"{session}-gone", f"{session}-never"
+    one.begin(mine, 0.0)
+    one.begin(gone, 0.0)
+    other.take(gone)
+    found: list[set[str]] = []
+    looking = threading.Thread(target=lambda: found.append(one.taken([mine, gone, never])))
+    looking.start()
+    looking.join()
+    assert found == [{gone}]
+    assert one.taken([]) == one.taken([mine]) == set()
+    assert other.taken([gone]) == set()
+    one.add(mine, ENTRIES[0])
+    assert other.take(mine) == Kept(0.0, ENTRIES[:1])
+    one.close()
+    other.close()
 
 
 def test_a_session_that_ended_or_never_was_is_not_taken(where: str, session: str) -> None:
