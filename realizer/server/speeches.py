@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-from bml_schema import Block, BlockProgress, Feedback, SyncRef, read
-from realizer.behaviours import VOCABULARY
+from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.composition.references import redirected, references
 from realizer.player import Player
-from realizer.server.clauses import Clauses, whole
 from realizer.server.messages import SpeechMessage
-from realizer.server.pieces import Piece, clip_block, text_block
+from realizer.server.pieces import Piece
+from realizer.server.turn import Turn
 
 __all__ = ["SpeechError", "Speeches"]
 
@@ -26,7 +24,6 @@ AHEAD = 6
 MOST = 500_000  # characters of one speech that wait; nine hours
 MOST_SPEECHES = 1_000  # of a session
 CUT_OFF = ("INTERRUPTED", "REVOKED")
-ENDS = "speech-"  # an anticipator: when a speech ends
 
 
 class SpeechError(ValueError):
@@ -35,61 +32,6 @@ class SpeechError(ValueError):
     def __init__(self, where: str, text: str) -> None:
         super().__init__(text)
         self.where = where
-
-
-@dataclass(frozen=True, slots=True)
-class _Clip:
-    """A recording that is said after the text before it."""
-
-    id: str
-
-
-@dataclass(eq=False)
-class _Speech:
-    """One speech.
-
-    Attributes:
-        piece: the last one that was made.
-        unsaid: what is in no piece yet.
-        marks: sync -> the piece it stands in.
-        parts: pieces that are part of a sentence only.
-        owed: pieces that were made and are not planned yet, in order.
-        ahead: pieces that are planned and have not ended, in order.
-        said: the words that were heard of the pieces that have ended.
-        asked: its own block was given out.
-        closed: nothing follows.
-        over: it was cut off.
-        spoken: when the last piece that has ended did, seconds on the session clock.
-        end: when its own block is anticipated to end.
-    """
-
-    id: str
-    connection: int
-    composition: str
-    piece: Piece
-    clauses: Clauses = field(default_factory=Clauses)
-    unsaid: deque[str | _Clip] = field(default_factory=deque)
-    marks: dict[str, str] = field(default_factory=dict)
-    parts: set[str] = field(default_factory=set)
-    owed: list[str] = field(default_factory=list)
-    ahead: list[str] = field(default_factory=list)
-    said: list[str] = field(default_factory=list)
-    asked: bool = False
-    closed: bool = False
-    over: bool = False
-    spoken: float = 0.0
-    end: float = 0.0
-
-    def close(self) -> None:
-        """Nothing follows: what is left is whole."""
-        self.unsaid.extend(self.clauses.feed("", close=True))
-        self.closed = True
-
-    def done(self, piece: str) -> None:
-        """A piece has ended, or never comes."""
-        for pieces in (self.owed, self.ahead):
-            if piece in pieces:
-                pieces.remove(piece)
 
 
 class Speeches:
@@ -101,7 +43,7 @@ class Speeches:
 
     def __init__(self, player: Player) -> None:
         self._player = player
-        self._speeches: dict[str, _Speech] = {}
+        self._speeches: dict[str, Turn] = {}
 
     def __len__(self) -> int:
         return len(self._speeches)
@@ -122,7 +64,7 @@ class Speeches:
             if len(self._speeches) >= MOST_SPEECHES:
                 raise SpeechError("id", f"wanted at most {MOST_SPEECHES} speeches at a time")
             piece = Piece(message.id, 0, message.character, message.language)
-            speech = _Speech(message.id, connection, message.composition, piece, spoken=t)
+            speech = Turn(message.id, connection, message.composition, piece, spoken=t)
             self._speeches[message.id] = speech
             self._anticipate(speech, t + OPEN, t)
         elif speech.over:
@@ -134,12 +76,9 @@ class Speeches:
                 "id", f"wanted a speech that is open, {message.id!r} was closed and is being said"
             )
         text = message.append or ""
-        waiting = sum(len(one) for one in speech.unsaid if isinstance(one, str))
-        if waiting + len(text) > MOST:
+        if speech.waiting + len(text) > MOST:
             raise SpeechError("append", f"wanted at most {MOST} characters that wait to be said, got more")
-        speech.unsaid.extend(speech.clauses.feed(text, close=message.clip is not None))
-        if message.clip is not None:
-            speech.unsaid.append(_Clip(message.clip))
+        speech.add(text, message.clip)
         if message.close:
             speech.close()
 
@@ -161,19 +100,7 @@ class Speeches:
         speech = next(filter(self._has_next, self._speeches.values()), None)
         if speech is None:
             return None
-        if not speech.asked:
-            speech.asked = True
-            return _holder(speech)
-        one = speech.unsaid.popleft()
-        number = speech.piece.number + 1
-        piece = speech.piece = replace(speech.piece, number=number, marks=dict(speech.marks))
-        block = clip_block(one.id, piece) if isinstance(one, _Clip) else text_block(one, piece)
-        said = next((node for node in block.behaviours if node.id == speech.id), None)
-        speech.marks |= dict.fromkeys(getattr(said, "marked", ()), block.id)
-        speech.owed.append(block.id)
-        if isinstance(one, str) and not whole(one) and (speech.unsaid or not speech.closed):
-            speech.parts.add(block.id)
-        return block
+        return speech.next_piece() if speech.asked else speech.around()
 
     def held_back(self, blocks: Collection[str] | None) -> list[Block]:
         """The own blocks of these speeches, or of all (None), that `next` would have given."""
@@ -182,9 +109,7 @@ class Speeches:
             for s in self._speeches.values()
             if not (s.asked or s.over) and (blocks is None or s.id in blocks)
         ]
-        for speech in held:
-            speech.asked = True
-        return [_holder(speech) for speech in held]
+        return [speech.around() for speech in held]
 
     @property
     def has_next(self) -> bool:
@@ -197,7 +122,7 @@ class Speeches:
         if speech is None or block.id == speech.id:
             return redirected(block, self._found) if any(map(self._names, references(block))) else block
         holder = self._player.cast.find(speech.id)
-        before = [id for id in (*speech.ahead, *speech.owed) if id != block.id]
+        before = [id for id in speech.left if id != block.id]
         if holder is not None and holder.waiting:
             before += [wait.block.block.id for wait in holder.waits]
         return replace(block, append_after=tuple(before))
@@ -209,21 +134,16 @@ class Speeches:
 
     def lacks(self, block: Block) -> bool:
         """Whether it names a sync of a speech that may still come."""
-        for ref in filter(self._names, references(block)):
-            speech = self._speeches[ref.block or ""]
-            piece = speech.marks.get(ref.sync or "")
-            if (piece is None and not (speech.closed and not speech.unsaid)) or piece in speech.owed:
-                return True
-        return False
+        named = filter(self._names, references(block))
+        return any(self._speeches[ref.block or ""].lacks(ref.sync or "") for ref in named)
 
     # what became of them ------------------------------------------------------------------------
 
     def planned(self, block: str) -> None:
         """A block was taken in."""
         speech = self._of(block)
-        if speech is not None and block in speech.owed:
-            speech.done(block)
-            speech.ahead.append(block)
+        if speech is not None:
+            speech.planned(block)
 
     def refused(self, block: str) -> None:
         """A block will not play; without the one that holds it together a speech is over."""
@@ -245,7 +165,7 @@ class Speeches:
             speech.done(block)
             speech.spoken = max(speech.spoken, feedback.global_time)
             return feedback, frozenset()
-        left = frozenset({*speech.ahead, *speech.owed})
+        left = frozenset(speech.left)
         if feedback.status not in CUT_OFF:
             self._forget(speech.id)
             return feedback, left
@@ -286,16 +206,16 @@ class Speeches:
 
     # inside -------------------------------------------------------------------------------------
 
-    def _of(self, block: str) -> _Speech | None:
+    def _of(self, block: str) -> Turn | None:
         name, _, number = block.rpartition(".")
         return self._speeches.get(name if number.isdigit() and name in self._speeches else block)
 
-    def _has_next(self, speech: _Speech) -> bool:
+    def _has_next(self, speech: Turn) -> bool:
         if speech.over:
             return False
         if not speech.asked:
             return True
-        ready = bool(speech.unsaid) and len(speech.ahead) + len(speech.owed) < AHEAD
+        ready = bool(speech.unsaid) and len(speech.left) < AHEAD
         return ready and self._player.cast.find(speech.id) is not None
 
     def _names(self, ref: SyncRef) -> bool:
@@ -311,12 +231,11 @@ class Speeches:
         return ref if piece is None else replace(ref, block=piece)
 
     def _forget(self, id: str) -> None:
-        del self._speeches[id]
-        self._player.lapse(ENDS + id)
+        self._player.lapse(self._speeches.pop(id).anticipator)
 
-    def _anticipate(self, speech: _Speech, end: float, t: float) -> None:
+    def _anticipate(self, speech: Turn, end: float, t: float) -> None:
         speech.end = end
-        self._player.anticipate(ENDS + speech.id, {"end": end}, t)
+        self._player.anticipate(speech.anticipator, {"end": end}, t)
 
     def _words(self, piece: str, t: float) -> list[str]:
         """The words of a piece that have sounded."""
@@ -328,10 +247,3 @@ class Speeches:
             return heard.split()
         order = sorted(playing.speech.values(), key=lambda s: s.start)
         return [word.text for speaking in order for word in speaking.utterance.words]
-
-
-def _holder(speech: _Speech) -> Block:
-    wait = f'<wait id="{speech.id}" start="0" end="anticipators:{ENDS}{speech.id}:end"/>'
-    (block,) = read(replace(speech.piece, number=0).document(wait), VOCABULARY)
-    assert isinstance(block, Block)
-    return replace(block, id=speech.id, composition=speech.composition)
