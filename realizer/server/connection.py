@@ -63,10 +63,11 @@ class View:
 
 @dataclass(eq=False)
 class PictureSubscription:
-    """Pictures of a view; `next` is the oldest frame that is still of use."""
+    """Pictures of a view; `next` is the oldest frame that is still of use, `index` what tells them apart."""
 
     view: View
     next: int
+    index: int
 
 
 @dataclass(eq=False)
@@ -110,7 +111,7 @@ class Connection:
         feedback: which of it; None for none.
         backlog: bytes that wait to be sent, as the shell told.
         dropped: frames, pictures and sound packets it did not get because it was slow.
-        subscriptions: (stream, character) -> what it gets.
+        subscriptions: (stream, character, view) -> what it gets.
     """
 
     id: int
@@ -118,7 +119,7 @@ class Connection:
     feedback: FeedbackFilter | None = FeedbackFilter()
     backlog: int = 0
     dropped: int = 0
-    subscriptions: dict[tuple[str, str | None], Subscription] = field(default_factory=dict)
+    subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
 
     @property
     def slow(self) -> bool:

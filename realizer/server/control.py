@@ -14,6 +14,7 @@ from realizer.server.connection import (
     Connection,
     FeedbackFilter,
     FrameSubscription,
+    PictureSubscription,
     PlanSubscription,
     SoundSubscription,
     Subscription,
@@ -72,7 +73,7 @@ def follow(session: Session, connection: Connection, message: Control, t: float)
             case Unsubscribe():
                 if message.stream == "feedback":
                     connection.feedback = None
-                connection.subscriptions.pop(_key(session, message.stream, message.character), None)
+                connection.subscriptions.pop(_key(session, message), None)
             case SceneMessage():
                 session.player.set_scene(
                     None
@@ -166,7 +167,7 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
         session.reply(connection.id, Subscribed(stream=stream, encoding=encoding, **told))
         return
     index = index_of(session, message.character)
-    key = _key(session, stream, message.character)
+    key = _key(session, message)
     if stream == "schedule":
         connection.subscriptions[key] = PlanSubscription(
             None if message.character is None else index, message.character
@@ -191,7 +192,9 @@ def _subscribe(session: Session, connection: Connection, message: Subscribe, t: 
         beside = sum(view.look.size[0] * view.look.size[1] * view.timeline.fps for view in views)
         if (beyond := too_many_pixels(message.size, fps, session.settings, beside)) is not None:
             raise Wrong("fps", beyond)
-        told |= {"fps": fps, "frame": subscription.next, "size": message.size}
+        if message.view is not None:
+            subscription.index = told["index"] = _index_of_view(connection, old)
+        told |= {"fps": fps, "frame": subscription.next, "size": message.size, "view": message.view}
         told |= {"face": session.faces.name(index), "media_type": PICTURES[message.format]}
     else:
         if stream == "mesh":
@@ -334,14 +337,26 @@ def _state(session: Session, connection: Connection, t: float) -> StateMessage:
     )
 
 
-def _key(session: Session, stream: str, character: str | None) -> tuple[str, str | None]:
+def _key(session: Session, message: Subscribe | Unsubscribe) -> tuple[str, str | None, str | None]:
     """What a subscription is replaced by; the first character is who is meant where nobody is named.
 
-    But of sound and plans: those that name nobody are of all.
+    But of sound and plans: those that name nobody are of all. Only videos have views.
     """
+    stream, character = message.stream, message.character
     if stream not in ("audio", "schedule") and character == session.player.characters[0]:
-        return stream, None
-    return stream, character
+        character = None
+    return stream, character, message.view if stream == "video" else None
+
+
+def _index_of_view(connection: Connection, old: Subscription | None) -> int:
+    """What tells the pictures of a view from all others of a connection, and of no view; as it was before."""
+    pictures = [s for s in connection.subscriptions.values() if isinstance(s, PictureSubscription)]
+    if isinstance(old, PictureSubscription):
+        return old.index
+    free = set(range(MAX_CHARACTERS, 256)) - {s.index for s in pictures}
+    if not free:
+        raise Wrong("view", f"wanted at most {256 - MAX_CHARACTERS} views")
+    return min(free)
 
 
 def index_of(session: Session, character: str | None) -> int:

@@ -29,7 +29,7 @@ class Pictures:
         """A look at one character, from `now` on."""
         first = first_at(now, timeline.fps)
         view = View(timeline, index, self._faces.name(index), look, first)
-        return PictureSubscription(self._views.setdefault(view.key, view), first)
+        return PictureSubscription(self._views.setdefault(view.key, view), first, index)
 
     def face_changed(self, index: int) -> None:
         """The next pictures show another face."""
@@ -86,6 +86,6 @@ class Pictures:
                     connection.dropped += 1
                     continue
                 time = view.drawing / view.timeline.fps
-                data = pack(FrameKind.PICTURE, view.drawing, time, picture, character=view.index)
+                data = pack(FrameKind.PICTURE, view.drawing, time, picture, character=subscription.index)
                 effects.append(Send(connection.id, data))
         return effects, lookers

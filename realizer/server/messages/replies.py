@@ -96,6 +96,7 @@ class Subscribed(Reply):
     offset: list[float] | None = None
     rate: int | None = Field(None, description="audio: samples a second")
     size: list[int] | None = None
+    view: str | None = Field(None, description="video: as `subscribe` named it; its `index` is its own")
     media_type: str | None = None
     elements: list[str] | None = Field(None, description="feedback: which of it comes")
 

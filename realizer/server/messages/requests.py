@@ -59,7 +59,8 @@ class Hello(Message):
 class Subscribe(Message):
     """Asks for a stream; answered by `subscribed`. The same stream of the same character is replaced.
 
-    Any number of streams run side by side. Every connection gets all feedback until it asks for some of it.
+    Any number of streams run side by side, of one character also several videos, each with a `view` of its
+    own. Every connection gets all feedback until it asks for some of it.
     """
 
     model_config = ConfigDict(
@@ -97,6 +98,9 @@ class Subscribe(Message):
         description="video: a colour, or of PNG and WebP transparent; None: the service's, or the light's",
     )
     format: Picture = Field("jpeg", description="video: what the pictures are")
+    view: str | None = Field(
+        None, max_length=64, description="video: a name; those of different names run side by side"
+    )
     quality: Whole = Field(85, ge=1, le=100, description="video: of JPEG and WebP")
     asked: bool = Field(False, description="au: as asked for, before the rules of co-occurrence")
     elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
@@ -111,6 +115,7 @@ class Unsubscribe(Message):
     type: Literal["unsubscribe"]
     stream: Stream
     character: str | None = Field(None, max_length=256)
+    view: str | None = Field(None, max_length=64, description="of a video that was given one")
 
 
 class Point(Message):

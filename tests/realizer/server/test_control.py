@@ -275,6 +275,38 @@ def test_the_pictures_of_a_session_are_bounded_together_and_a_shared_one_counts_
     assert look(2, camera="three-quarter") == "subscribed"
 
 
+def test_videos_of_one_character_with_views_of_their_own_run_side_by_side(drive) -> None:
+    driver = drive()
+
+    def look(**asked) -> int:
+        message = {"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 10, **asked}
+        told = driver.send(message).of("subscribed")[-1]
+        assert told.get("view") == asked.get("view")
+        return int(told["index"])
+
+    plain, side, far = look(), look(view="side", camera="three-quarter"), look(view="far", fps=5)
+    assert plain == 0
+    assert len({plain, side, far}) == 3
+    for draw in driver.draws:
+        driver.session.drawn(draw.id, f"{draw.look.camera}".encode(), driver.opened)
+    driver.collect()
+    assert {frame.character: frame.payload for frame in driver.clients[1].frames} == {
+        plain: b"front",
+        side: b"three-quarter",
+        far: b"front",
+    }
+    assert look(view="side") == side, "the same again, in its place"
+    assert len(driver.session.views()) == 2, "who looks alike looks at the same pictures"
+    driver.send({"type": "unsubscribe", "stream": "video", "view": "far"})
+    driver.send({"type": "unsubscribe", "stream": "video"})
+    assert look(view="new") not in (plain, side)
+    assert len(driver.session.views()) == 1
+    for number in range(238):
+        look(view=f"v{number}")
+    error = driver.send({"type": "subscribe", "stream": "video", "view": "one more"}).of("error")[-1]
+    assert (error["where"], error["message"]) == ("subscribe.view", "wanted at most 240 views")
+
+
 def test_times_are_told_to_the_microsecond(drive) -> None:
     driver = drive()
     driver.run(1 / 3)

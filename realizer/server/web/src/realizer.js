@@ -38,7 +38,7 @@ const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", pin
 const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
 const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
-const keyOf = ({ stream, character }) => `${stream}/${character ?? ""}`;
+const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character ?? "", view ?? ""]);
 
 /** Why the service did not follow; `code` and `where` as its message `error` has them. */
 export class RealizerError extends Error {
@@ -74,7 +74,7 @@ export class Realizer {
   #tries = 0;
   #closed = false;
   #asked = []; // { message, resolve, reject } of questions without an answer yet
-  #streams = new Map(); // "stream/character" -> { message, take, told: what its frames mean }
+  #streams = new Map(); // stream, character and view -> { message, take, told: what its frames mean }
   #unsent = []; // what is to be played when the connection is there
   #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
 
@@ -166,10 +166,10 @@ export class Realizer {
     return answer;
   }
 
-  /** End a stream. */
-  unsubscribe(stream, character) {
-    this.#streams.delete(keyOf({ stream, character }));
-    this.#post({ type: "unsubscribe", stream, ...(character === undefined ? {} : { character }) });
+  /** End a stream; `view` is that of a video that was given one. */
+  unsubscribe(stream, character, view) {
+    this.#streams.delete(keyOf({ stream, character, view }));
+    this.#post({ type: "unsubscribe", stream, character, view });
   }
 
   /**
@@ -230,9 +230,8 @@ export class Realizer {
     const error = message.type === "error";
     const fits = error
       ? ({ message: { type } }) => message.where?.split(".")[0] === type
-      : ({ message: { type, stream, character } }) =>
-          ANSWERS[type] === message.type &&
-          (type !== "subscribe" || keyOf({ stream, character }) === keyOf(message));
+      : ({ message: { type, ...asked } }) =>
+          ANSWERS[type] === message.type && (type !== "subscribe" || keyOf(asked) === keyOf(message));
     const k = this.#asked.findIndex(fits);
     if (k < 0) return;
     const [{ resolve, reject }] = this.#asked.splice(k, 1);
