@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.live import Client
-from realizer.client.mail import Frame
+from realizer.client.mail import ClientError, Frame
 from realizer.client.speech import SyncSpeech
 
 __all__ = ["SyncClient"]
@@ -109,7 +109,9 @@ class SyncClient:
         return self._do(self._client.film(path, bml, fps=fps, **look))
 
     def close(self) -> None:
-        """Say goodbye."""
+        """Say goodbye. Once more does nothing."""
+        if self._loop.is_closed():
+            return
         try:
             self._do(_left(self._opening, None))
             self._do(self._loop.shutdown_asyncgens())
@@ -121,6 +123,9 @@ class SyncClient:
             yield item
 
     def _do(self, work: Coroutine[Any, Any, T]) -> T:
+        if self._loop.is_closed():
+            work.close()
+            raise ClientError("the connection has ended: it was closed here")
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
 
     def _end(self) -> None:

@@ -75,6 +75,16 @@ def test_what_is_refused_is_raised_and_the_thread_ends(url) -> None:
     assert "realizer client" not in [thread.name for thread in threading.enumerate()]
 
 
+def test_who_says_goodbye_twice_has_said_it_once_and_says_no_more(url) -> None:
+    with connect(url) as client:
+        client.close()
+        with pytest.raises(ClientError, match="the connection has ended"):
+            client.play(WAIT.format("b"))
+        with pytest.raises(ClientError, match="the connection has ended"):
+            next(client.feedback())
+    client.close()
+
+
 def test_nobody_there_is_an_os_error() -> None:
     with pytest.raises(OSError, match="Connect"), connect("ws://127.0.0.1:9/ws"):
         pass
