@@ -24,8 +24,8 @@ BETWEEN = "\0"  # no XML has it
 class _Pack(NamedTuple):
     """Messages that belong together, and when the last of them was told."""
 
-    count: int
-    size: int
+    messages: int
+    characters: int
     told: float
     data: bytes
 
@@ -83,8 +83,8 @@ class FeedbackLog:
             self._pack(now)
         packs = self._packs
         while packs and (self._count > MOST or (self._size > ROOM and packs[0].told < now - FRESH)):
-            self._count -= packs[0].count
-            self._size -= packs.popleft().size
+            self._count -= packs[0].messages
+            self._size -= packs.popleft().characters
 
     def _pack(self, now: float) -> None:
         """Put the older half of what is not packed together."""
@@ -107,5 +107,5 @@ class FeedbackLog:
             if missing <= 0:
                 break
             packs.append(zlib.decompress(pack.data).decode().split(BETWEEN))
-            missing -= pack.count
+            missing -= pack.messages
         return list(chain(*reversed(packs), self._recent))[-wanted:]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from realizer.expressions import library_of
 from realizer.server.limits import MAX_CHARACTERS
 from realizer.server.messages import MAX_CONTROL, MAX_FPS, PICTURES, STREAMS, Capabilities, Limits, Welcome
+from realizer.settings import Settings
 
 if TYPE_CHECKING:
     from realizer.server.session import Session
@@ -44,3 +46,27 @@ def greeting(session: Session, t: float) -> Welcome:
             keep=s.keep,
         ),
     )
+
+
+def capabilities(settings: Settings) -> dict[str, Any]:
+    """What `welcome` tells beside streams; names, as documents and messages take them."""
+    from realizer.animation.targets import AU_NAMES
+    from realizer.behaviours import KINDS
+    from realizer.emotion.words import known_words
+    from realizer.face import list_faces, load_face
+    from realizer.render.cameras import camera_names
+    from realizer.render.light import presets
+    from realizer.speech import voices
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
+
+    return {
+        "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
+        "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},
+        "emotions": sorted(known_words()),
+        "expressions": sorted(library_of(settings.expressions)),
+        "aus": list(AU_NAMES()),
+        "faces": [face.name for face in list_faces()],
+        "voices": [voice.name for voice in voices() if voice.available],
+        "cameras": list(camera_names(load_face(settings.face, deformer=settings.deformer))),
+        "lights": list(presets()),
+    }

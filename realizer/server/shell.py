@@ -6,25 +6,18 @@ import asyncio
 import functools
 import itertools
 import logging
-import time
-from collections.abc import Mapping
 from typing import Any
 
-from realizer.behaviours.kind import Position
-from realizer.expressions import library_of
-from realizer.mapping import mapping_of
 from realizer.server.alarms import Alarms
 from realizer.server.connection import SLOW
 from realizer.server.cycles import Cycles
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
-from realizer.server.hub import ANYBODY, Hub, HubError, Visitor
-from realizer.server.journal import Journal, JournalError, Kept, Recorder, journal_at
-from realizer.server.journal.folder import FolderJournal, head
-from realizer.server.journal.notes import Notes
-from realizer.server.journal.replay import caught_up, restored
+from realizer.server.hub import ANYBODY, Hub, Visitor
+from realizer.server.journal.replay import caught_up
 from realizer.server.limits import memory
 from realizer.server.metrics import Metrics
+from realizer.server.origin import Origin
 from realizer.server.session import Session
 from realizer.server.studio import Studio
 from realizer.server.workers import worker_of
@@ -52,24 +45,20 @@ class Shell:
         self.settings = settings
 
         def ours(session: str) -> bool:
-            if self._journal is not None and session not in self._hub.sessions:
+            if self._origin.journal is not None and session not in self._hub.sessions:
                 return False  # another process may have it: only `restore` asks, before somebody joins
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
-        self._hub = Hub(self._make, settings, ours)
-        self._studio = Studio(settings.deformer)
         self.metrics = Metrics(worker)
+        self._origin = Origin(settings, self.metrics)
+        self._hub = Hub(self._origin.new, settings, ours)
+        self._studio = Studio(settings.deformer)
         self._clients: dict[int, Client] = {}
         self._reading: dict[Session, None] = {}  # those with documents to read or plan, in turn
         self._numbers = itertools.count(1)
         self._sweeper: asyncio.TimerHandle | None = None
-        self._scene: Mapping[str, Position] | None = None
-        self._capabilities: dict[str, Any] = {}
-        self._ending = False
         self._cycles = Cycles()
         self._closed = False
-        self._journal: Journal | None = None
-        self._record: Recorder | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
         self._taken_over: dict[str, float] = {}  # session -> until when clients come back to it; loop time
 
@@ -84,28 +73,12 @@ class Shell:
         """
         self._loop = asyncio.get_running_loop()
         self._alarms = Alarms(self._loop, self._tick)
-        if self.settings.journal is not None:
-            self._journal = journal_at(self.settings.journal)
-        if self.settings.scene is not None:
-            from realizer.scene import parse_scene
-
-            self._scene = parse_scene(self.settings.scene.read_text("utf-8"))
-        if self.settings.record is not None:
-            self._record = FolderJournal(self.settings.record, head(self.settings, self._scene))
-        # A face that is not there is said before a door opens.
-        from realizer.face import load_face
-
-        await self._loop.run_in_executor(
-            None, lambda: load_face(self.settings.face, deformer=self.settings.deformer)
-        )
-        mapping_of(self.settings.face, self.settings.mapping)
-        library_of(self.settings.expressions)
-        self._capabilities = await self._loop.run_in_executor(None, _capabilities, self.settings)
+        await self._origin.load()
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
 
     def end(self) -> None:
         """Sessions take no more documents from now on."""
-        self._ending = True
+        self._origin.ending = True
         for session in self._hub.sessions.values():
             session.ending = True
 
@@ -123,9 +96,7 @@ class Shell:
             self._sweeper.cancel()
         for session in self._hub.sessions.values():
             session.close()
-        for journal in (self._journal, self._record):
-            if journal is not None:
-                journal.close()
+        self._origin.close()
         await self._loop.run_in_executor(None, self._studio.close)
 
     def health(self) -> dict[str, object]:
@@ -167,11 +138,11 @@ class Shell:
         Raises:
             JournalError: the journal cannot be read.
         """
-        if self._journal is None or name is None:
+        if self._origin.journal is None or name is None:
             return
         if name not in self._hub.sessions:
             if name not in self._restoring:
-                self._restoring[name] = self._loop.create_task(self._restore(self._journal, name, seen or 0))
+                self._restoring[name] = self._loop.create_task(self._restore(name, seen or 0))
             await asyncio.shield(self._restoring[name])
         session = self._hub.sessions.get(name)
         if session is not None and name in self._taken_over and session.log.newest < (seen or 0):
@@ -179,29 +150,14 @@ class Shell:
             session.opened -= caught_up(session, now, seen or 0) - now
             self._pump(session)
 
-    async def _restore(self, journal: Journal, name: str, seen: int) -> None:
+    async def _restore(self, name: str, seen: int) -> None:
         try:
-            if (kept := journal.take(name)) is None:
+            found = await self._origin.brought_back(name, seen, self._studio.speak)
+            if found is None:
                 return
-            session = self._new(name, 0.0, named=True, epoch=kept.epoch)
-            try:
-                at, owed = await self._loop.run_in_executor(None, restored, session, kept, self._studio.speak)
-            except JournalError:
-                raise
-            except Exception:
-                log.exception("session %s cannot be gone on with", name)
-                raise JournalError(f"session {name} cannot be gone on with: internal error") from None
-            session.notes = self._notes(name, journal, kept)
-            await self._loop.run_in_executor(None, session.notes.resume, kept)
-            at = caught_up(session, at, seen)
-            owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
-            now = self._loop.time()
-            session.opened = now - max(at, time.time() - kept.epoch)
-            for connection in session.connections:  # which went with the other process
-                session.disconnect(connection, now)
+            session, owed = found
             self._hub.sessions[name] = session
-            self._taken_over[name] = now + self.settings.keep
-            log.info("session %s is gone on with, %d entries long", name, len(kept.entries))
+            self._taken_over[name] = self._loop.time() + self.settings.keep
             for effect in owed:
                 self._do(session, effect)
             self._pump(session)
@@ -253,32 +209,6 @@ class Shell:
             self._arm(left)
 
     # sessions -----------------------------------------------------------------------------------
-
-    def _make(self, id: str, now: float, named: bool) -> Session:
-        epoch = time.time()
-        session = self._new(id, now, named=named, epoch=epoch)
-        session.notes = self._notes(id, self._journal if named else None)
-        try:
-            session.notes.begin(epoch)
-        except JournalError as error:
-            raise HubError(503, str(error)) from None
-        return session
-
-    def _notes(self, id: str, journal: Journal | None, kept: Kept | None = None) -> Notes:
-        return Notes(id, journal, self._record, stopped=self.metrics.record_stopped, kept=kept)
-
-    def _new(self, id: str, now: float, *, named: bool, epoch: float) -> Session:
-        session = Session(
-            id,
-            self.settings,
-            now,
-            named=named,
-            scene=self._scene,
-            capabilities=self._capabilities,
-            epoch=epoch,
-        )
-        session.ending = self._ending
-        return session
 
     def _pump(self, session: Session) -> None:
         """Do what a session wants done, then wake it when it next has something."""
@@ -395,27 +325,3 @@ class Shell:
         for place, session in enumerate(grown):
             self._loop.call_later(SWEEP * place / len(grown), self._rest, session)
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)
-
-
-def _capabilities(settings: Settings) -> dict[str, Any]:
-    """What `welcome` tells beside streams; names, as documents and messages take them."""
-    from realizer.animation.targets import AU_NAMES
-    from realizer.behaviours import KINDS
-    from realizer.emotion.words import known_words
-    from realizer.face import list_faces, load_face
-    from realizer.render.cameras import camera_names
-    from realizer.render.light import presets
-    from realizer.speech import voices
-    from realizer.tables.lexemes import face_lexemes, head_lexemes
-
-    return {
-        "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
-        "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},
-        "emotions": sorted(known_words()),
-        "expressions": sorted(library_of(settings.expressions)),
-        "aus": list(AU_NAMES()),
-        "faces": [face.name for face in list_faces()],
-        "voices": [voice.name for voice in voices() if voice.available],
-        "cameras": list(camera_names(load_face(settings.face, deformer=settings.deformer))),
-        "lights": list(presets()),
-    }
