@@ -9,17 +9,13 @@ import os
 import re
 import socket
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 
+from tests.benchmarks.packets import HELLO, greet, masked, messages
 from tests.told import numbers
 
-__all__ = ["at_once", "come_and_go", "files_open", "greet", "half_closed", "joined", "masked", "well_told"]
+__all__ = ["at_once", "come_and_go", "files_open", "half_closed", "joined", "well_told"]
 
-HELLO = (
-    "GET /ws?session={} HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
-)
 DOCUMENT = '<bml id="{}"><head id="n" lexeme="NOD" end="0.6"/><wait id="w" duration="0.3"/></bml>'
 GOODBYE = b"\x88\x80" + bytes(4)
 
@@ -29,29 +25,11 @@ def files_open(process: int) -> int:
     return len(list(Path(f"/proc/{process}/fd").iterdir()))
 
 
-def masked(text: str) -> bytes:
-    """A text message as a client sends it, with a mask of zeros, which changes nothing."""
-    body = text.encode()
-    if len(body) < 126:
-        return bytes([0x81, 0x80 | len(body)]) + bytes(4) + body
-    return struct.pack(">BBH", 0x81, 0xFE, len(body)) + bytes(4) + body
-
-
 def joined(port: int, session: str) -> socket.socket:
     """A client that was let in."""
     one = socket.create_connection(("127.0.0.1", port), 60)
     greet(one, session)
     return one
-
-
-def greet(one: socket.socket, session: str) -> None:
-    """Ask to be let in, and read that it is so."""
-    one.sendall(HELLO.format(session).encode())
-    head = b""
-    while b"\r\n\r\n" not in head:
-        head += (more := one.recv(4096))
-        assert more, "the service hung up"
-    assert head.startswith(b"HTTP/1.1 101"), head
 
 
 def come_and_go(port: int, many: int, names: int) -> None:
@@ -86,23 +64,6 @@ def half_closed(port: int, session: str) -> bytes:
         return b"".join(iter(lambda: one.recv(65536), b""))
 
 
-def _messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(opcode, payload) of what has come whole; it is taken out of `data`."""
-    at = 0
-    while len(data) >= at + 2:
-        size, head = data[at + 1] & 0x7F, 2
-        if size >= 126:
-            form, head = (">H", 4) if size == 126 else (">Q", 10)
-            if len(data) < at + head:
-                break
-            (size,) = struct.unpack_from(form, data, at + 2)
-        if len(data) < at + head + size:
-            break
-        yield data[at] & 0x0F, bytes(data[at + head : at + head + size])
-        at += head + size
-    del data[:at]
-
-
 async def _client(port: int, session: str, blocks: list[str], all_in: asyncio.Barrier) -> list[str]:
     """Stream, send all at the moment at which everybody does, and hear every block end: the feedback."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
@@ -117,7 +78,7 @@ async def _client(port: int, session: str, blocks: list[str], all_in: asyncio.Ba
         while left or not frames:
             data += (more := await reader.read(65536))
             assert more, "the service hung up"
-            for code, payload in _messages(data):
+            for code, payload in messages(data):
                 frames += code == 2
                 if code == 1 and payload.startswith(b"<"):
                     told.append(text := payload.decode())

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import base64
 import json
-import os
 import random
 import re
 import select
 import socket
 import struct
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from urllib.parse import urlsplit
 
 import numpy as np
+from packets import greet, masked, messages
 
-__all__ = ["FPS", "Crowd"]
+__all__ = ["FPS", "POSIX", "Crowd", "joined"]
 
 FPS = 25
 CALM = 0.5  # s
@@ -50,54 +48,17 @@ class Peer:
     newest: int | None = None  # number of its newest frame
 
 
-def masked(text: str) -> bytes:
-    """A WebSocket text message as a client sends it; the mask is 0, which changes nothing."""
-    data = text.encode()
-    head = bytes([0x81, 0x80 | len(data)]) if len(data) < 126 else struct.pack(">BBH", 0x81, 0xFE, len(data))
-    return head + bytes(4) + data
-
-
-def messages(data: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(opcode, payload) of all that have come whole; they are taken out of `data`."""
-    at = 0
-    while len(data) >= at + 2:
-        size, head = data[at + 1] & 0x7F, 2
-        if size == 126:
-            if len(data) < at + 4:
-                break
-            size, head = struct.unpack_from(">H", data, at + 2)[0], 4
-        elif size == 127:
-            if len(data) < at + 10:
-                break
-            size, head = struct.unpack_from(">Q", data, at + 2)[0], 10
-        if len(data) < at + head + size:
-            break
-        yield data[at] & 0x0F, bytes(data[at + head : at + head + size])
-        at += head + size
-    del data[:at]
-
-
 def joined(url: str, session: str, plays: bool) -> Peer:
     """A connection that has opened and asked for frames."""
-    parts = urlsplit(url)
-    host, _, port = parts.netloc.rpartition(":")
+    host, _, port = urlsplit(url).netloc.rpartition(":")
     peer = socket.create_connection((host, int(port)), 20)
     peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    key = base64.b64encode(os.urandom(16)).decode()
-    peer.sendall(
-        f"GET /ws?session={session} HTTP/1.1\r\nHost: {parts.netloc}\r\nUpgrade: websocket\r\n"
-        f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
-    )
-    data = bytearray()
-    while b"\r\n\r\n" not in data:
-        data += peer.recv(4096)
-    head, _, rest = bytes(data).partition(b"\r\n\r\n")
-    assert b" 101 " in head.split(b"\r\n")[0], head
+    rest = greet(peer, session)
     if plays:
         peer.sendall(masked(json.dumps(SCENE)))
         peer.sendall(masked(json.dumps({"type": "subscribe", "stream": "fap", "fps": FPS})))
     peer.setblocking(False)
-    return Peer(peer, bytearray(rest))
+    return Peer(peer, rest)
 
 
 class Crowd:

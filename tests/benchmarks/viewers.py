@@ -22,7 +22,9 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from sessions import POSIX, joined, masked, messages, noise, served, spent
+from listeners import POSIX, joined
+from packets import masked, messages
+from sessions import noise, served, spent
 
 FPS = 25
 EVERY = 3.0  # s between two documents

@@ -31,7 +31,8 @@ from realizer.server.serve import Server
 from realizer.server.wire import FrameKind, unpack
 from realizer.settings import Settings
 from realizer.speech.espeak import EspeakVoice
-from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, masked, well_told
+from tests.benchmarks.packets import masked
+from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, well_told
 from tests.told import numbers
 
 LIMIT = 60  # s; a hung test ends
