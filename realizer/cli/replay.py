@@ -13,7 +13,7 @@ __all__: list[str] = []
 
 
 @click.command()
-@click.argument("record", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("record", type=click.Path(exists=True, path_type=Path))
 @click.option("-o", "--output", metavar="OUT", help="Where to; its suffix picks the encoding.")
 @click.option("--fps", type=options.Number(0, 240, min_open=True), help="Frames a second.")
 @click.option("--face", metavar="NAME", help="Another face than it had.")
@@ -39,11 +39,13 @@ def replay(
 ) -> int:
     """Play a session again that `serve --record DIR` wrote.
 
-    Prints its feedback, or writes frames, pictures, sound or a film of it. Everything is done at its own
-    time, without a clock: what went wrong once goes wrong again, so a record is the best report of a fault.
+    RECORD is a file, or a folder that has one. Prints its feedback, or writes frames, pictures, sound or a
+    film of it, as they were live. Everything is done at its own time, without a clock: what went wrong once
+    goes wrong again, so a record is the best report of a fault.
     """
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
+    from realizer.server.journal import JournalError
     from realizer.server.journal.folder import read_record
     from realizer.server.journal.playback import played, told
 
@@ -53,12 +55,16 @@ def replay(
             writer = output_for(Path(output))
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="-o") from None
-    found, changed = read_record(record), {"fps": fps, "face": face, "voice": voice}
-    if writer is None or output is None:
-        for text in told(found, **changed):
-            click.echo(text)
-        return 0
-    realization, _ = played(found, **changed)
+    changed = {"fps": fps, "face": face, "voice": voice}
+    try:
+        found = read_record(record)
+        if writer is None or output is None:
+            for text in told(found, **changed):
+                click.echo(text)
+            return 0
+        realization, _ = played(found, **changed)
+    except JournalError as error:  # of the file: nothing is missing here
+        raise click.ClickException(str(error)) from None
     if writer.suffix in PICTURES:
         options.check_camera(realization.face_name, camera)
     drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)

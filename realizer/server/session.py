@@ -11,7 +11,7 @@ from bml_schema import WarningFeedback
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError
-from realizer.player import HISTORY, Player
+from realizer.player import Player
 from realizer.server.broadcast import Broadcast
 from realizer.server.clips import ClipError, Clips
 from realizer.server.connection import STUCK, Connection, PictureSubscription, Subscription, View
@@ -63,7 +63,6 @@ class Session:
         scene: where targets are, to begin with.
         capabilities: what `welcome` tells.
         epoch: POSIX seconds at `now`, told with every time; None leaves them out.
-        history: seconds that have passed of which frames can still be asked for.
 
     Attributes:
         ending: no more documents are taken.
@@ -83,7 +82,6 @@ class Session:
         scene: Mapping[str, Position] | None = None,
         capabilities: Mapping[str, Any] | None = None,
         epoch: float | None = None,
-        history: float = HISTORY,
     ) -> None:
         self.id = id
         self.settings = settings
@@ -104,7 +102,6 @@ class Session:
             media=settings.media,
             clips=self.clips.recordings,
             expressions=settings.expressions,
-            history=history,
             cooccurrence=settings.cooccurrence,
             prosody=settings.prosody,
             takes=lambda index: self.faces.of(index).takes,

@@ -18,6 +18,8 @@ from realizer.settings import Settings
 __all__ = ["FolderJournal", "Record", "head", "read_record"]
 
 SUFFIX = ".jsonl"
+SHOWN_RECORDS = 20  # of those one can choose from
+ROUNDING = 1e-6  # s; of times that went from one clock to another
 
 
 class FolderJournal:
@@ -189,29 +191,51 @@ class Record:
 def read_record(path: Path) -> Record:
     """A record; the last line of one that broke off may be half.
 
+    Args:
+        path: its file, or a folder where there is no other.
+
     Raises:
         JournalError: it is none; with its line.
     """
     try:
+        if path.is_dir():
+            path = _only(path)
         first, *lines = path.read_bytes().split(b"\n")
     except OSError as error:
         raise JournalError(f"{path}: {error.strerror}") from None
     try:
         head = json.loads(first)
-        head["epoch"] + 0.0, head["session"] + ""
+        _time(head["epoch"])
+        head["session"] + ""
         parts = {name + "": text + "" for name, text in head.pop("parts", {}).items()}
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise JournalError(f"{path}:1: wanted the head of a record, got {_shown(first)!r}") from None
-    entries = []
+    entries: list[Entry] = []
     # What is behind the last line feed was not written to its end.
     for number, line in enumerate(lines[:-1], 2):
         try:
-            entries.append(Entry.read(line.decode()))
+            entry = Entry.read(line.decode())
+            _time(entry.at, entries[-1].at if entries else 0.0)
+            entries.append(entry)
         except UnicodeDecodeError:
             raise JournalError(f"{path}:{number}: wanted UTF-8, got {_shown(line)!r}") from None
-        except JournalError as error:
+        except (JournalError, ValueError) as error:
             raise JournalError(f"{path}:{number}: {error}") from None
     return Record(head, tuple(entries), parts)
+
+
+def _time(at: float, least: float = float("-inf")) -> None:
+    if not least - ROUNDING <= at < float("inf"):
+        raise ValueError(f"at: wanted seconds, not before {least:g}, got {at:g}")
+
+
+def _only(folder: Path) -> Path:
+    found = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX)
+    if len(found) != 1:
+        names = "".join(f"\n  {path}" for path in found[:SHOWN_RECORDS])
+        more = "\n  ..." if len(found) > SHOWN_RECORDS else ""
+        raise JournalError(f"{folder}: wanted one record (*{SUFFIX}), got {len(found)}{names}{more}")
+    return found[0]
 
 
 def _shown(line: bytes) -> str:
