@@ -85,7 +85,19 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     stays = np.zeros(n, bool)
     stays[list(ground.points.values())] = True
     stays[lips.fade > 0.5] = True
-    return [_spared(part, person, scalp, stays) for part in made]
+    made = [_spared(part, person, scalp, stays) for part in made]
+    _line_mouth(made[0], person, lips, look)
+    return made
+
+
+def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[float]]) -> None:
+    patch = skin.patch
+    assert patch is not None
+    assert skin.occlusion is not None
+    deep = person.ground.point("2.2")[2] - skin.vertices[:, 2]
+    # Right behind the corners it stays dark: seen from the side, closed lips show a hair of it.
+    corners = smooth(np.abs(lips.u), 0.70, 0.92) * smooth(lips.fade, 0.45, 0.75)
+    paint.paint_mouth(skin.colours, skin.occlusion, patch.mix @ (lips.inside * (1 - corners)), deep, colours)
 
 
 def _spared(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
@@ -119,7 +131,7 @@ def _tongue(person: Person, recipe: Recipe) -> Part:
     shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
     colours: Float64 = np.array(recipe.colours["tongue"], float) * shade[:, None]
     deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
-    light = 0.60 * smooth(deep, 0.65, 0.0) + 0.06
+    light = 0.60 * smooth(deep, 0.58, 0.0) + 0.06
     return Part("tongue", tongue, place, tongue.triangles, colours, np.full(len(place), 0.35), light)
 
 

@@ -19,6 +19,7 @@ __all__: list[str] = []
 
 BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
 PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
+SINKS = 0.35, 0.70  # how far the tongue's back and tip sink with the jaw: a tongue is lifted, or none is seen
 CLIMB = 0.4  # metres that the tongue's tip rises for each metre forwards
 SLACK = 30  # times that the throat's part in the jaw is softened
 LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
@@ -66,9 +67,9 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     under += throat * (ground.smoothed(under, SLACK) - under)
     drag = under / under[chin]
     drag = np.minimum(drag, 1)
-    tongue = np.zeros(len(ground.at))
-    tongue[np.unique(ground.mesh.quads["helper-tongue"])] = 1
-    opens = drag * (1 - lips.around) + tongue
+    along = _along_tongue(ground)
+    tongue = (along >= 0) * 1.0
+    opens = drag * (1 - lips.around) + tongue * np.interp(along, (0, 1), SINKS)
     arm = ground.at - pivot
     turn_cos, turn_sin = np.zeros_like(arm), np.zeros_like(arm)
     # Turned by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
@@ -230,12 +231,19 @@ def _ears(ground: Ground) -> dict[int, Float64]:
     return out
 
 
+def _along_tongue(ground: Ground) -> Float64:
+    """(n,) 0 at the tongue's back, 1 at its tip; -1 on all that is no tongue."""
+    mine = np.unique(ground.mesh.quads["helper-tongue"])
+    depth = ground.at[mine, 2]
+    along = np.full(len(ground.at), -1.0)
+    along[mine] = (depth - depth.min()) / np.ptp(depth)
+    return along
+
+
 def _tongue(ground: Ground) -> dict[int, Float64]:
-    at = ground.at
-    mine = np.zeros(len(at), bool)
-    mine[np.unique(ground.mesh.quads["helper-tongue"])] = True
-    back, front = at[mine, 2].min(), at[mine, 2].max()
-    along = np.where(mine, np.clip((at[:, 2] - back) / (front - back), 0, 1), 0)
+    at, along = ground.at, _along_tongue(ground)
+    mine = along >= 0
+    along = np.maximum(along, 0)
     tip, body = ground.points["6.1"], ground.points["6.2"]
     bend = smooth(along, 0.35, 1.0) * along
     arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * mine

@@ -133,10 +133,13 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
 
 UPPER = (8.4, 6.8, 7.6, 7.0, 6.6, 9.5)  # mm: widths of the teeth of one side, from the middle
 LOWER = (5.4, 5.9, 6.7, 7.0, 7.0, 10.0)
+# Of the light, how much reaches a tooth from the gum at the tongue to the gum at the lips.
+SHADES = (0.55, 0.78, 0.75, 1, 1, 0.8, 0.55, 0.4)
+WARM = np.array([1.0, 0.78, 0.64])  # what light is left behind the teeth has been on tongue and cheeks
 
 
 def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[str, list[float]]) -> Part:
-    """An arch of twelve teeth with gums.
+    """An arch of twelve teeth with gums, seen from outside and from the tongue.
 
     Args:
         front: (3,) the biting edge between the two middle teeth.
@@ -178,9 +181,11 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
         edge = (lift[k] + (0.5 if gap else 0.0)) / 1000
         height = crown[k] / 1000
         dark = (0.72 if gap else 1.0) * (1 - 0.05 * k)
-        # From behind the biting edge over the front to the gum.
+        # From the gum at the tongue over the biting edge and the front to the gum at the lips.
         for dy, dn, tint in (
-            (edge + 0.0012, -0.0024, white * dark * 0.8),
+            (height + 0.0030, -0.0064, gum * WARM * 0.8),
+            (height * 0.80, -0.0050, root * dark * WARM),
+            (edge + 0.0012, -0.0024, white * dark * (0.4 + 0.4 * WARM)),
             (edge, -0.0002, white * dark),
             (height * 0.45, 0.0004, white * dark),
             (height * 0.86 - (0.001 if gap else 0), 0.0000, root * dark),
@@ -196,12 +201,12 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
             )
             tints.append(tint)
     vertices = np.array(rows)
-    triangles = grid(len(side), 6)
+    triangles = grid(len(side), len(SHADES))
     if up < 0:
         triangles = triangles[:, [0, 2, 1]]
     gloss = np.full(len(vertices), 0.75)
     # Light reaches the front teeth between open lips and not the back of the mouth.
     depth_in = (front[2] - vertices[:, 2]) / depth
     occlusion = 0.86 * smooth(depth_in, 0.75, 0.02) + 0.12
-    occlusion *= np.tile([0.6, 1, 1, 0.8, 0.55, 0.4], len(side))
+    occlusion *= np.tile(SHADES, len(side))
     return Part(name, None, vertices, triangles, np.array(tints), gloss, occlusion)
