@@ -30,6 +30,7 @@ from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Utterance
 from tests.mutants import mutants
+from tests.waking import wakes
 
 __all__ = ["BODIES", "CONTROLS", "FILTERS", "HEADS", "NAMES", "Interleaving", "Memory", "no_error", "spoken"]
 
@@ -305,7 +306,7 @@ class Interleaving:
         """Wake sessions when they want to be, each as often as it must be."""
         ticks = 0
         while True:
-            due = [(d, s) for s in self._hub.sessions.values() if (d := s.next_deadline()) is not None]
+            due = [(wakes(s), s) for s in self._hub.sessions.values()]
             when, session = min(due, key=lambda one: one[0], default=(end + 1, None))
             if session is None or when > end:
                 break
@@ -395,10 +396,8 @@ class Interleaving:
         kept = self._journal.take(session.id)
         assert kept is not None
         restored(other, kept, spoken)
-        deadline = other.next_deadline()
-        while deadline is not None and deadline <= self.now - session.opened:
-            other.tick(max(deadline, 0.0))
-            deadline = other.next_deadline()
+        while (due := wakes(other)) <= self.now - session.opened:
+            other.tick(max(due, 0.0))
         first = max(session.log.first, other.log.first)
         told, again = session.log.since(first), other.log.since(first)
         for here, there in zip(told, again, strict=False):

@@ -69,7 +69,7 @@ class Session:
         run: the frames of its only client for which nobody need ask it; None where there is more to it.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
-    of them, and `next_deadline` says when `tick` is wanted.
+    of them. `tick` is wanted when something is due (`next_due`), and at once while the session `reads`.
     """
 
     def __init__(
@@ -393,11 +393,6 @@ class Session:
     def reads(self) -> bool:
         """A document can be read or planned at once."""
         return self._calm is None and not self.closed and (self._unsettled or self.intake.ready)
-
-    def next_deadline(self) -> float | None:
-        """When `tick` is wanted, on the caller's clock; in the past: at once; None when nothing waits."""
-        due = float("-inf") if self.reads else self.next_due()
-        return None if due == float("inf") else due
 
     def next_due(self) -> float:
         """When something is due that is no document, on the caller's clock; infinite where nothing is."""

@@ -104,8 +104,8 @@ def played(documents: int, apart: float, journal: Journal | None, record: Log | 
             for effect in session.outgoing():
                 if isinstance(effect, Speak):
                     session.spoken(effect.id, spoken(effect), now)
-            due = session.next_deadline()
-            if due is None or due > apart * (k + 1):
+            due = 0.0 if session.reads else session.next_due()
+            if due > apart * (k + 1):
                 break
             now = max(now, due)
             session.tick(now)

@@ -15,6 +15,7 @@ from realizer.server.session import Session
 from realizer.server.wire import unpack
 from realizer.settings import Settings
 from realizer.speech.utterance import Utterance
+from tests.waking import wakes
 
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 TALK = '<bml id="{}"><speech id="s"><text>Hello there</text></speech></bml>'
@@ -92,7 +93,7 @@ class Driver:
 
     def run(self, until: float) -> Client:
         """Tick at every deadline up to `until` (on the session clock)."""
-        while (deadline := self.session.next_deadline()) is not None and deadline <= self.opened + until:
+        while (deadline := wakes(self.session)) <= self.opened + until:
             self.now = max(self.now, deadline - self.opened)
             self.wake()
         self.now = until

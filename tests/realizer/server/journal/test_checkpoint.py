@@ -17,6 +17,7 @@ from realizer.server.session import Session
 from realizer.server.wire import ClipPiece, pack_clip
 from realizer.settings import Settings
 from tests.interleavings import BODIES, CONTROLS, HEADS, NAMES, Memory, no_error, spoken
+from tests.waking import wakes
 
 SETTINGS = Settings(voice="silent")
 EPOCH = 1.7e9
@@ -62,7 +63,7 @@ class Run:
         self.owed |= {effect.id: effect for effect in self.session.outgoing() if isinstance(effect, Speak)}
 
     def until(self, t: float) -> None:
-        while (due := self.session.next_deadline()) is not None and due <= t:
+        while (due := wakes(self.session)) <= t:
             self.session.tick(max(due, 0.0))
             self.collect()
 

@@ -19,6 +19,7 @@ from realizer.server.wire import ClipPiece, pack_clip
 from realizer.settings import Settings
 from tests.interleavings import Memory, spoken
 from tests.told import numbers
+from tests.waking import wakes
 
 SETTINGS = Settings(voice="silent")
 DOCUMENTS = 2_000
@@ -45,8 +46,7 @@ def play(session: Session, message: str | bytes, begin: float, until: float) -> 
                 session.spoken(effect.id, spoken(effect), now)
                 break
         else:
-            due = session.next_deadline()
-            if due is None or due > until:
+            if (due := wakes(session)) > until:
                 return
             now = max(now, due)
             session.tick(now)

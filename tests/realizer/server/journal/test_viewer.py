@@ -21,6 +21,7 @@ from realizer.server.wire import HEADER
 from realizer.settings import Settings
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
+from tests.waking import wakes
 
 SETTINGS = Settings(voice="silent", seed=3)
 OPENED = 100.0  # s, on the clock of who wakes the session
@@ -58,9 +59,9 @@ def recorded(
     coming = [(OPENED, WATCH), *((OPENED + t, doing) for t, doing in doings)]
     now = OPENED
     while now < OPENED + seconds:
-        due = session.next_deadline()
+        due = wakes(session)
         soonest = [when for when, _ in (*coming[:1], *answers)]
-        now = max(now, min([OPENED + seconds, *soonest, *([] if due is None else [due])]))
+        now = max(now, min([OPENED + seconds, *soonest, due]))
         now += 0.0 if late is None else late.uniform(0, 0.03)
         if coming and coming[0][0] <= now:
             session.receive(1, coming.pop(0)[1], now)
