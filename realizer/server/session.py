@@ -37,6 +37,7 @@ from realizer.server.messages import (
     Unsubscribe,
     parse_control,
 )
+from realizer.server.rhythm import Rhythm
 from realizer.server.run import Run
 from realizer.server.streams import EPSILON
 from realizer.server.telling import Telling
@@ -66,7 +67,6 @@ class Session:
 
     Attributes:
         ending: no more documents are taken.
-        run: the frames of its only client for which nobody need ask it; None where there is more to it.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
     of them. `tick` is wanted when something is due (`next_due`), and at once while the session `reads`.
@@ -113,12 +113,7 @@ class Session:
         self._connections: dict[int, Connection] = {}
         self.telling = Telling(self.player, self.intake, epoch)
         self._effects: list[Effect] = []
-        self._unsettled = False  # who has left may have left speeches, which end now: nothing else says when
-        # Until then nothing is due but frames and what blocks tell as they play, on its own clock; None where
-        # that is not known. And when they tell something.
-        self._calm: float | None = None
-        self._tells = 0.0
-        self.run: Run | None = None
+        self._rhythm = Rhythm(self.player, self.intake, self.broadcast, self._connections)
 
     # connections --------------------------------------------------------------------------------
 
@@ -134,7 +129,7 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
-        self._stir()
+        self._rhythm.stir()
         self._connections[connection] = Connection(connection, self.log.newest + 1)
         if not self._tell(now - self.opened, "join", connection):
             return
@@ -147,8 +142,8 @@ class Session:
         if self._connections.pop(connection, None) is not None:
             self._tell(now - self.opened, "leave", connection)
         self.intake.speeches.leave(connection)
-        self._unsettled = True
-        self._stir()
+        self._rhythm.unsettled = True
+        self._rhythm.stir()
         if not self._connections:
             self.empty_since = now
             if not self.named:
@@ -172,7 +167,7 @@ class Session:
     def close(self) -> None:
         """End: nothing is done and nothing is sent after it."""
         self.closed = True
-        self._stir()
+        self._rhythm.stir()
         self._connections.clear()
         self.intake.inbox.clear()
         self._effects.clear()
@@ -182,7 +177,7 @@ class Session:
         if (known := self._connections.get(connection)) is not None:
             known.backlog = waiting
             if known.slow:
-                self._stir()
+                self._rhythm.stir()
             if waiting > STUCK:
                 reason = f"{waiting} bytes wait to be read; come back with the session's name and seen"
                 self._effects.append(Close(connection, 1013, reason))
@@ -229,7 +224,7 @@ class Session:
         try:
             self.notes.keep(t, kind, connection, message)
         except Lost as error:
-            self._lose(error)
+            self.lose(error)
             return False
         except JournalError as error:
             log.error("session %s: %s", self.id, error)
@@ -256,7 +251,7 @@ class Session:
         try:
             self.notes.tell(t, kind, number, body)
         except Lost as error:
-            self._lose(error)
+            self.lose(error)
             return False
         return True
 
@@ -265,11 +260,11 @@ class Session:
         try:
             checkpoint(self, t)
         except Lost as error:
-            self._lose(error)
+            self.lose(error)
             return False
         return True
 
-    def _lose(self, error: Lost) -> None:
+    def lose(self, error: Lost) -> None:
         """Another process has the session: let everybody go, to come back there."""
         log.warning("%s", error)
         closing: list[Effect] = [Close(connection, 1012, str(error)) for connection in self._connections]
@@ -299,7 +294,7 @@ class Session:
         """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
         if self.closed:
             return
-        self._stir()
+        self._rhythm.stir()
         picture = result if isinstance(result, bytes) else None
         effects, lookers = self.broadcast.pictures.drawn(draw, picture, self._connections.values())
         self._effects += effects
@@ -329,30 +324,26 @@ class Session:
             None where `tick` is wanted, which does the same and more.
         """
         t = now - self.opened
-        if self._calm is None or t + EPSILON >= self._calm:
+        rhythm = self._rhythm
+        if not rhythm.calm(t):
             return None
-        if t + EPSILON >= self._tells:
+        if rhythm.tells(t):
             plans = self.player.revision
             self._publish(t)
-            self._tells = self.player.next_change()
-            if self.player.revision != plans:
-                self._stir()
+            rhythm.told(plans)
         sends, following = self.broadcast.frames_due(t)
         effects, self._effects = [*self._effects, *sends], []
-        if self._calm is None:
-            return effects, self.next_due()
-        other = min(self._calm, self._tells)
-        self.run = self.broadcast.run(self.opened, other + self.opened)
-        return effects, min(other, following) + self.opened
+        return effects, rhythm.go_on(following, self.opened) + self.opened
 
-    def _stir(self) -> None:
-        """Something may change: nobody knows what is due before all of it has been looked at."""
-        self._calm = self.run = None
+    @property
+    def run(self) -> Run | None:
+        """The frames of its only client for which nobody need ask it; None where there is more to it."""
+        return self._rhythm.run
 
     def rest(self, now: float) -> None:
         """Keep the journal short, where it has grown; what is due is told first."""
         if self.notes.grown and not self.closed:
-            self._stir()
+            self._rhythm.stir()
             self._publish(now - self.opened)
             self._compact(now - self.opened)
 
@@ -372,8 +363,8 @@ class Session:
 
     def _work(self, t: float, reads: bool = True) -> bool:
         """What `tick` does; False where nothing came of it but what plays."""
-        self._unsettled = False
-        self._stir()
+        self._rhythm.unsettled = False
+        self._rhythm.stir()
         self._publish(t)
         self.broadcast.gets(self._connections.values())
         self.broadcast.due(t, self._effects)
@@ -392,22 +383,11 @@ class Session:
     @property
     def reads(self) -> bool:
         """A document can be read or planned at once."""
-        return self._calm is None and not self.closed and (self._unsettled or self.intake.ready)
+        return not self.closed and self._rhythm.reads
 
     def next_due(self) -> float:
         """When something is due that is no document, on the caller's clock; infinite where nothing is."""
-        if self.closed:
-            return float("inf")
-        other = self._calm
-        if other is None:
-            self._tells, asked = self.player.next_change(), self.intake.orders.deadline()
-            other = self.broadcast.next_other if asked is None else min(self.broadcast.next_other, asked)
-            # Speeches that last and clients that are slow are looked at with every frame, plans with whatever
-            # is told.
-            slow = any(connection.slow for connection in self._connections.values())
-            if not (self.reads or slow or self.intake.speeches.lasting or self.broadcast.shows_plans):
-                self._calm = other
-        return min(other, self._tells, self.broadcast.next_frame) + self.opened
+        return float("inf") if self.closed else self._rhythm.next() + self.opened
 
     @property
     def busy(self) -> bool:

@@ -611,6 +611,7 @@ def test_hello_with_seen_sends_what_followed(driver) -> None:
 
 def test_what_is_no_longer_there_is_a_gap(driver, monkeypatch) -> None:
     monkeypatch.setattr(feedback_log, "MOST", 5)
+    monkeypatch.setattr(feedback_log, "PACK", 1)  # whole packs go
     driver.send(NOD.format("b"))
     driver.run(10)
     viewer = driver.join(2, seen=2)
