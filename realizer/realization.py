@@ -75,6 +75,11 @@ class Realization:
     mapping: FapMapping = field(default_factory=standard)
 
     @property
+    def plays(self) -> bool:
+        """Some block was accepted: there is something to write."""
+        return not all(schedule.failed for schedule in self.schedules)
+
+    @property
     def frames(self) -> int:
         """Number of frames: floor(duration x fps) + 1."""
         return len(self.aus.times)

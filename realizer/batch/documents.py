@@ -57,15 +57,20 @@ def _files(place: str) -> Iterator[tuple[Path, Path]]:
     """(file, the folder that its name starts from)."""
     path = Path(place)
     if path.is_dir():
-        for file in sorted(p for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file()):
+        for file in sorted(p for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and _is_file(p)):
             yield file, path
     elif path.is_file():
         yield path, Path.cwd()
     elif glob.has_magic(place):
         first = next(k for k, part in enumerate(path.parts) if glob.has_magic(part))
         base = Path(*path.parts[:first])
-        for file in sorted(p for p in base.glob(str(Path(*path.parts[first:]))) if p.is_file()):
+        for file in sorted(p for p in base.glob(str(Path(*path.parts[first:]))) if _is_file(p)):
             yield file, base
+
+
+def _is_file(path: Path) -> bool:
+    """Also a link to one that is gone: it cannot be read, and that is to be told of."""
+    return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def _name(path: Path, base: Path) -> str:

@@ -28,9 +28,9 @@ class Manifest:
     """What is known of the documents of a folder. `with` it open, one process alone may write.
 
     A row is `{"document", "key", "status", "outputs": {suffix: {"file", "bytes", "sha256"}}, ...}`; its
-    status is "done", "refused" (a document or block had nothing to play; outputs show what was left) or
-    "failed" (there are none; "error" says why). Nothing in it depends on when, where or in which order it was
-    made.
+    status is "done", "refused" (a document or block had nothing to play; outputs show what was left, if
+    anything was) or "failed" (there are none; "error" says why). Nothing in it depends on when, where or in
+    which order it was made.
 
     Args:
         folder: where the outputs lie.

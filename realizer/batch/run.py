@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Protocol
 
 from realizer.batch.documents import Document
 from realizer.batch.manifest import Manifest, Row
 from realizer.batch.task import Options, Task, fingerprint, key_of
-from realizer.batch.work import Outcome
+from realizer.batch.work import Outcome, failed
 from realizer.outputs.files import write_bytes
 
 __all__ = ["Crew", "batch"]
@@ -38,18 +39,20 @@ def batch(
     Raises:
         BusyError: another batch writes to that folder.
         FaceError: no such face.
-        OSError: a document cannot be read, or an output not be written.
+        OSError: an output cannot be written.
     """
     mark = fingerprint(options)
     with Manifest(folder).open() as manifest:
         left: list[Document] = []
+        unread: list[Outcome] = []
         for document in documents:
-            row = manifest.has(document.name, key_of(document.path.read_bytes(), mark))
-            if row is None:
-                left.append(document)
-            else:
-                yield row, True
-        for outcome in crew.perform(_task(document, mark) for document in left):
+            for task in _tasks([document], mark, unread):
+                row = manifest.has(task.name, task.key)
+                if row is None:
+                    left.append(document)
+                else:
+                    yield row, True
+        for outcome in chain(crew.perform(_tasks(left, mark, unread)), unread):
             for name, content in outcome.files.items():
                 path = folder / name
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -58,6 +61,13 @@ def batch(
             yield outcome.row, False
 
 
-def _task(document: Document, mark: str) -> Task:
-    text = document.path.read_bytes()
-    return Task(document.name, key_of(text, mark), text, mark)
+def _tasks(documents: Iterable[Document], mark: str, unread: list[Outcome]) -> Iterator[Task]:
+    """The documents as tasks, read as they are wanted; what cannot be read is one more that failed."""
+    for document in documents:
+        try:
+            text = document.path.read_bytes()
+        except OSError as error:
+            words = f"{document.path}: {error.strerror}"
+            unread.append(failed(Task(document.name, "", b"", mark), words))
+        else:
+            yield Task(document.name, key_of(text, mark), text, mark)

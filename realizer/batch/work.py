@@ -96,9 +96,10 @@ class Worker:
         """Never raises for what is wrong with the document, or while it is played: then the row says so."""
         try:
             realization = self._realize(task)
+            suffixes = self.options.formats if realization.plays else ()
             files = {
                 f"{task.name}{suffix}": OUTPUTS[suffix].encode(realization, self._drawing(suffix))
-                for suffix in self.options.formats
+                for suffix in suffixes
             }
         except Exception as error:
             words = str(error) if isinstance(error, RealizerError) else f"{type(error).__name__}: {error}"
@@ -106,14 +107,14 @@ class Worker:
         row = {
             "document": task.name,
             "key": task.key,
-            "status": "refused" if realization.refused else "done",
+            "status": "refused" if realization.refused or not realization.plays else "done",
             "duration": round(realization.duration, 6),
             "frames": realization.frames,
             "dropped": [id for schedule in realization.schedules for id in schedule.dropped],
             "warnings": [warning.to_json() for warning in realization.warnings],
             "outputs": {
                 suffix: {"file": name, "bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
-                for suffix, (name, content) in zip(self.options.formats, files.items(), strict=True)
+                for suffix, (name, content) in zip(suffixes, files.items(), strict=True)
             },
         }
         return Outcome(row, files)

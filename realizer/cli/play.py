@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import sys
 from pathlib import Path
@@ -22,6 +23,8 @@ __all__: list[str] = []
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
 TRANSPARENT = "transparent"
+# What the machine lacks, whatever was asked for: room.
+FULL = (errno.ENOSPC, errno.EFBIG)
 
 
 def performance(command: options.Command) -> options.Command:
@@ -178,12 +181,14 @@ def perform(
         sys.stdout.write("\n")
         sys.stdout.flush()
     elif output is not None:
-        if all(planned.failed for planned in realization.schedules):
+        if not realization.plays:
             click.echo(f"{output}: not written, as there is nothing to play", err=True)
             return 1
         try:
             writer.write(realization, Path(output), drawing)
         except OSError as error:
+            if error.errno in FULL:
+                raise
             raise click.UsageError(f"{output}: {error.strerror or error}") from None
         first, *others = (name or "the unnamed character" for name in realization.characters)
         if others and not writer.everybody:

@@ -31,8 +31,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
         mode = path.stat().st_mode & 0o7777 if path.exists() else 0o666 & ~_umask()
         draft.chmod(mode)
         draft.replace(path)
-    except BaseException:
+    except BaseException as error:
         draft.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename is None:  # a write does not know where it writes
+            error.filename = str(path)
         raise
 
 

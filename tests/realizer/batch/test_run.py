@@ -93,10 +93,18 @@ def test_what_has_changed_is_played_again_and_nothing_else(
     assert not any(known for _, known in play(talks, tmp_path / "out", replace(options, seed=7)))
 
 
-def test_a_document_that_cannot_be_read_ends_the_batch_with_its_name(
+def test_a_document_that_cannot_be_read_is_a_row_and_the_others_are_played(
     talks: Path, options: Options, tmp_path: Path
 ) -> None:
+    (talks / "gone.bml").symlink_to(tmp_path / "nowhere")
     documents = find([str(talks)])
-    (talks / "0.bml").unlink()
-    with pytest.raises(FileNotFoundError, match=r"0\.bml"):
-        list(batch(documents, tmp_path / "out", options, Here(options)))
+    (talks / "2.bml").unlink()
+    rows = [row for row, _ in batch(documents, tmp_path / "out", options, Here(options))]
+    failed = {row["document"]: row["error"] for row in rows if row["status"] == "failed"}
+    assert failed == {name: f"{talks / name}.bml: No such file or directory" for name in ("2", "gone")}
+    assert len(rows) == len(documents) == 7
+    (talks / "2.bml").write_text('<bml id="b"><wait id="w"/></bml>')
+    again = {
+        row["document"]: known for row, known in batch(documents, tmp_path / "out", options, Here(options))
+    }
+    assert [name for name, known in again.items() if not known] == ["2", "gone"]

@@ -45,6 +45,7 @@ def test_the_row_says_how_it_went(worker: Worker, tasks: list[Task]) -> None:
         "broken": "refused",
     }
     assert "not well-formed" in rows["broken"]["warnings"][0]["text"]
+    assert rows["broken"]["outputs"] == {}
     assert rows["0"]["frames"] == int(rows["0"]["duration"] * 25) + 1
     assert set(rows["0"]["outputs"]) == {".fap", ".vtt"}
     assert rows["0"]["dropped"] == []
@@ -54,6 +55,14 @@ def test_the_row_names_what_was_dropped(worker: Worker, tasks: list[Task]) -> No
     text = b'<bml id="b"><head id="n" lexeme="NOD"/><faceLexeme id="f" lexeme="NOPE"/></bml>'
     row = worker.perform(replace(tasks[0], text=text)).row
     assert (row["status"], row["dropped"]) == ("done", ["b:f"])
+
+
+@pytest.mark.parametrize("text", [b"", b"\xef\xbb\xbf", b"<!-- later -->", b"<bml/>"])
+def test_where_nothing_was_accepted_nothing_is_written(
+    text: bytes, worker: Worker, tasks: list[Task]
+) -> None:
+    outcome = worker.perform(replace(tasks[0], text=text))
+    assert (outcome.row["status"], outcome.row["outputs"], outcome.files) == ("refused", {}, {})
 
 
 def test_what_cannot_be_played_is_a_row_with_the_error(tasks: list[Task], options: Options) -> None:

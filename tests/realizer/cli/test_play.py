@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -97,6 +101,22 @@ def test_where_nothing_was_accepted_nothing_is_written(tmp_path: Path, text: str
     assert done.return_value == 1
     assert "not written" in done.stderr
     assert out.read_bytes() == b"of before"
+
+
+@pytest.mark.parametrize("command", ["realize -o out/0.json", "batch -o out --format json"])
+def test_where_there_is_no_room_the_file_is_named_and_no_part_of_it_left(
+    tmp_path: Path, command: str
+) -> None:
+    (tmp_path / "0.bml").write_text(TALK)
+    (tmp_path / "out").mkdir()
+    name, *flags = command.split()
+    line = shlex.join([sys.executable, "-m", "realizer", name, "0.bml", "--voice", "silent", *flags])
+    limited = ["sh", "-c", f"ulimit -f 8; exec {line}"]
+    done = subprocess.run(limited, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert re.search(r"realizer: .*out/0\.json: File too large", done.stderr)
+    assert not list((tmp_path / "out").glob("*.json"))
+    assert not list((tmp_path / "out").glob(".0*"))
 
 
 @pytest.mark.parametrize(("suffix", "told"), [(".fap", True), (".vtt", False)])
