@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ from realizer.units import frame_count
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-__all__ = ["Performance", "Realization", "counted", "seen", "warned"]
+__all__ = ["Performance", "Realization", "Worn", "counted", "seen", "warned"]
 
 # Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
 WINDOW = 10.0  # s
@@ -45,15 +45,25 @@ class Performance:
 
 
 @dataclass(frozen=True, eq=False)
+class Worn:
+    """A face from a frame on, and what its AUs ask of FAPs."""
+
+    frame: int
+    face: str
+    mapping: FapMapping
+
+
+@dataclass(frozen=True, eq=False)
 class Realization:
     """Documents, played from 0 to their end.
 
     Attributes:
         fps: frames a second; frame k is sampled at k / fps.
         duration: seconds, to the end of the last block.
-        face_name: which face folder pictures are drawn with.
+        face_name: which face folder is drawn; the last one where it changes.
         deformer: "mpeg4" or "au", what moves that face; None is what it says itself.
         mapping: what its AUs ask of FAPs.
+        worn: the faces of the first character, in order, where it changes.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
         told: BML feedback, in order.
@@ -73,6 +83,7 @@ class Realization:
     speaking: tuple[Speaking, ...] = field(default=())
     deformer: str | None = None
     mapping: FapMapping = field(default_factory=standard)
+    worn: tuple[Worn, ...] = ()
 
     @property
     def plays(self) -> bool:
@@ -125,6 +136,23 @@ class Realization:
         from realizer.face import takes
 
         return poses(self.aus, takes(self.face_name, deformer=self.deformer), self.mapping)
+
+    @cached_property
+    def faces(self) -> list[tuple[int, Realization]]:
+        """What is to be drawn by one face after the other: (its first frame, those frames and no sound)."""
+        if len(self.worn) < 2:
+            return [(0, self)]
+        name = next(iter(self.characters))
+        ends = [*(one.frame for one in self.worn[1:]), self.frames]
+        found = []
+        for one, end in zip(self.worn, ends, strict=True):
+            aus, faps = self.aus.part(one.frame, end), self.faps.values[one.frame : end]
+            shown = Performance(aus, FAPFrames(aus.times, faps, self.faps.mask))
+            part = replace(
+                self, face_name=one.face, mapping=one.mapping, characters={name: shown}, speaking=(), worn=()
+            )
+            found.append((one.frame, part))
+        return found
 
     def visemes(self, character: int = 0) -> Float64:
         """(n, 15) float64: how much of each MPEG-4 viseme a character says; column 0 is none, rows add to 1.

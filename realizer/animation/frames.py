@@ -57,6 +57,11 @@ class AUFrames:
             columns,
         )
 
+    def part(self, first: int, last: int) -> AUFrames:
+        """Frames `first` .. `last - 1`."""
+        held = None if self.held is None else self.held[first:last]
+        return AUFrames(self.times[first:last], self.values[first:last], self.rules, held, self.columns)
+
     @cached_property
     def live(self) -> tuple[int, ...]:
         """The columns that may be other than 0, rising."""

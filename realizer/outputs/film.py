@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
@@ -190,11 +191,10 @@ def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
     _av()  # before the drawing starts
     form = FORMATS[Path(path).suffix.lower()]
     size, _ = _draws(drawing)
-    rows = realization.poses
-    with replacing(path) as draft, drawing.renderer(realization, size) as renderer:
-        pictures = renderer.frames(rows)
+    count = realization.frames
+    with replacing(path) as draft, closing(drawing.pictures(realization, size, range(count))) as pictures:
         sound, lines = realization.sound(RATE), captions(realization)
-        encode_film(draft, form, pictures, len(rows), realization.fps, sound, lines=lines)
+        encode_film(draft, form, pictures, count, realization.fps, sound, lines=lines)
 
 
 def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:

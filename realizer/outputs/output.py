@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from realizer.arrays import UInt8
 from realizer.outputs.files import write_bytes
 
 if TYPE_CHECKING:
@@ -28,11 +30,44 @@ class Drawing:
     visemes: bool = False  # whether a .fap file has FAP 1 beside the FAPs of the lips
     begun: Renderer | None = None  # what draws, where `Output.begin` started it
 
-    def renderer(self, realization: Realization, size: tuple[int, int], *, alpha: bool = False) -> Renderer:
-        """What draws poses of a realization like that; `alpha` where the picture may be transparent."""
-        if self.begun is not None and self.begun.size == size:
+    def pictures(
+        self, realization: Realization, size: tuple[int, int], frames: Sequence[int]
+    ) -> Generator[UInt8, None, None]:
+        """The first character in these frames, rising, with the face it has in each; drawn a batch ahead.
+
+        Close it where not all of them are taken.
+        """
+        faces = realization.faces
+        ends = [*(first for first, _ in faces[1:]), realization.frames]
+        with ExitStack() as stack:
+            renderers: dict[str, Renderer] = {}
+            for (first, part), end in zip(faces, ends, strict=True):
+                rows = [frame - first for frame in frames if first <= frame < end]
+                if not rows:
+                    continue
+                if part.face_name not in renderers:
+                    renderers[part.face_name] = stack.enter_context(
+                        self.renderer(realization, size, face=part.face_name)
+                    )
+                yield from renderers[part.face_name].frames(part.poses[rows])
+
+    def renderer(
+        self,
+        realization: Realization,
+        size: tuple[int, int],
+        *,
+        alpha: bool = False,
+        face: str | None = None,
+    ) -> Renderer:
+        """What draws poses of a realization like that; `alpha` where the picture may be transparent.
+
+        Args:
+            face: one that it has for a time; None: its own.
+        """
+        own = face in (None, realization.face_name)
+        if own and self.begun is not None and self.begun.size == size:
             return self.begun
-        return self.renderer_of(realization.face_name, realization.deformer, size, alpha=alpha)
+        return self.renderer_of(face or realization.face_name, realization.deformer, size, alpha=alpha)
 
     def renderer_of(
         self, face: str, deformer: str | None, size: tuple[int, int], *, alpha: bool = False

@@ -77,12 +77,13 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
 
     size, alpha = _draws(drawing)
     if drawing.at is not None:
-        with drawing.renderer(realization, size, alpha=alpha) as renderer:
-            (picture,) = renderer.draw(row_at(realization, drawing.at)[None])
+        now = drawing.at * realization.fps
+        first, part = next(pair for pair in reversed(realization.faces) if pair[0] <= max(now, 0))
+        with drawing.renderer(realization, size, alpha=alpha, face=part.face_name) as renderer:
+            (picture,) = renderer.draw(row_at(part, drawing.at - first / realization.fps)[None])
         return encode_png(picture)
     shown = moments(realization)
-    with drawing.renderer(realization, size, alpha=alpha) as renderer:
-        pictures = renderer.draw(realization.poses[[moment.frame for moment in shown]])
+    pictures = drawing.pictures(realization, size, [moment.frame for moment in shown])
     titles = [f"{moment.time:.2f} s" for moment in shown]
     return encode_png(sheet(list(pictures), titles, [moment.points for moment in shown]))
 

@@ -6,6 +6,7 @@ import io
 import math
 import struct
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,11 +57,11 @@ def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) 
 def _encode(realization: Realization, drawing: Drawing) -> bytes:
     """Every frame, or at higher rates every second, third, ...: at most 25 pictures a second."""
     step = math.ceil(realization.fps / PACE)
-    rows = realization.poses[::step]
-    starts = [k * step / realization.fps for k in range(len(rows))]
+    frames = range(0, realization.frames, step)
+    starts = [frame / realization.fps for frame in frames]
     size, _ = _draws(drawing)
-    with drawing.renderer(realization, size) as renderer:
-        return encode_webp(renderer.frames(rows), starts, starts[-1] + step / realization.fps)
+    with closing(drawing.pictures(realization, size, frames)) as pictures:
+        return encode_webp(pictures, starts, starts[-1] + step / realization.fps)
 
 
 def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:

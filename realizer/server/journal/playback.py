@@ -62,6 +62,7 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         fps=settings.fps,
         duration=end,
         face_name=session.faces.name(0),
+        worn=viewer.worn,
         characters=characters,
         schedules=tuple(replace(one, start=one.start - begin) for one in schedules),
         told=tuple(feedback),

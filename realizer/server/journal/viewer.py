@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.composition.playing import Playing
 from realizer.mapping import mapping_of
-from realizer.realization import Performance
+from realizer.realization import Performance, Worn
 from realizer.server.session import Session
 from realizer.server.streams import EPSILON, Window, first_at
 
@@ -58,9 +57,10 @@ class Viewer:
             ends += [shift.end for shift in character.shifts]
         return max(ends, default=0.0)
 
-    def faces(self) -> list[tuple[int, str]]:
-        """(n-th of the frames, face): what the first character looks like from there on."""
-        return [(frame - self.first, name) for frame, name in self._seats[0].faces]
+    @property
+    def worn(self) -> tuple[Worn, ...]:
+        """The faces of the first character."""
+        return self._worn(self._seats[0])
 
     def performances(self, count: int) -> dict[str | None, Performance]:
         """What each character does in the first `count` frames, the time of the first one being 0."""
@@ -78,14 +78,16 @@ class Viewer:
 
     def _performance(self, seat: _Seat) -> Performance:
         aus = seat.frames()
-        starts = [frame - self.first for frame, _ in seat.faces]
-        faps = [
-            to_fap(_rows(aus, first, last), mapping_of(name, self._session.settings.mapping))
-            for (first, last), (_, name) in zip(pairwise([*starts, len(aus.times)]), seat.faces, strict=True)
-        ]
+        worn = self._worn(seat)
+        ends = [*(one.frame for one in worn[1:]), len(aus.times)]
+        faps = [to_fap(aus.part(one.frame, end), one.mapping) for one, end in zip(worn, ends, strict=True)]
         values = np.concatenate([part.values for part in faps])
         mask = np.any([part.mask for part in faps], axis=0)
         return Performance(aus, FAPFrames(aus.times, values, mask))
+
+    def _worn(self, seat: _Seat) -> tuple[Worn, ...]:
+        mapping = self._session.settings.mapping
+        return tuple(Worn(frame - self.first, name, mapping_of(name, mapping)) for frame, name in seat.faces)
 
 
 class _Seat:
@@ -131,13 +133,7 @@ class _Seat:
         """Keep of a window what was looked at: a plan may change long before its end."""
         if self._window is not None:
             first, last = (frame - self._window.first for frame in (self._begin, self._next))
-            part = _rows(self._window.aus, first, last)
+            part = self._window.aus.part(first, last)
             held = None if part.held is None else part.held.copy()
             self._parts.append(AUFrames(part.times, part.values.copy(), part.rules, held, part.columns))
         self._window = None
-
-
-def _rows(frames: AUFrames, first: int, last: int) -> AUFrames:
-    held = None if frames.held is None else frames.held[first:last]
-    times, values = frames.times[first:last], frames.values[first:last]
-    return AUFrames(times, values, frames.rules, held, frames.columns)

@@ -11,7 +11,8 @@ import pytest
 
 from realizer.animation.targets import AU_NAMES
 from realizer.arrays import Int32
-from realizer.mapping import mapping_of
+from realizer.outputs.output import Drawing
+from realizer.render import Renderer
 from realizer.server.effects import Send, Speak
 from realizer.server.journal.folder import FolderJournal, Record, head, read_record
 from realizer.server.journal.notes import Notes
@@ -137,15 +138,22 @@ def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
     assert [int(jaw[round(25 * at)]) for at in (0.4, 1.2, 2.3, 3.2)] == [0, 100, 0, 60]
 
 
-def test_a_face_asks_faps_as_it_does_from_when_it_was_chosen(tmp_path: Path) -> None:
-    faces = ["ada", "ben"]
+def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> None:
     doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
     record, live = recorded(tmp_path, doings, 2.0)
     realization, _ = played(record)
     again = realization.faps.integers()
     assert all(np.array_equal(again[number], row) for number, row in live.items())
-    alike = mapping_of(faces[0], None) == mapping_of(faces[1], None)
-    assert alike or not np.array_equal(again[24], again[28])
+    (_, before), (changed, after) = realization.faces
+    assert (before.face_name, changed, after.face_name) == ("ada", 26, "ben")
+    assert (before.frames, after.frames) == (26, realization.frames - 26)
+    size = (48, 48)
+    pictures = list(Drawing(size=size).pictures(realization, size, [25, 26]))
+    assert len(pictures) == 2
+    with Renderer("ben", size) as renderer:
+        shown = renderer.draw(realization.poses[[25, 26]])
+    assert np.array_equal(pictures[1], shown[1])
+    assert np.abs(pictures[0].astype(int) - shown[0]).mean() > 5
 
 
 def test_a_character_that_comes_later_is_there_from_the_first_frame(tmp_path: Path) -> None:
