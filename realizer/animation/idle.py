@@ -25,10 +25,10 @@ __all__ = ["Idle", "Motion", "idle_face"]
 # Small head motion, ours: a new pose every 1.9 s, up to so many degrees each way. AUs: (negative, positive).
 SWAY_PERIOD = 1.9  # s
 SWAY = {(52, 51): 1.6, (53, 54): 1.1, (55, 56): 1.0}
-# Small saccades, ours: a new point of fixation every 1.1 s, up to so many degrees. One of a degree takes
-# 0.02 s, less than a frame: it is there at once.
+# Small saccades, ours: a new point of fixation every 1.1 s, up to so many degrees.
 SACCADE_PERIOD = 1.1  # s
 SACCADE = {(62, 61): 1.4, (63, 64): 0.9}
+SACCADE_LEAST, SACCADE_DEGREE = 0.021, 0.0022  # s, and s for each degree (Carpenter 1988, the main sequence)
 # Eyes stay where they look while the head sways: they turn back by as much as it turns (degrees).
 COUNTER = {(52, 51): (61, 62), (53, 54): (64, 63)}
 # Poses are worked out from one multiple of so many to another, and the latest are kept, 5 kB each: sessions
@@ -45,8 +45,9 @@ class Motion:
         keys: (s, k) seconds: when each way of the head to turn reaches each of its poses.
         poses: (m, k) 0..1: the columns in these poses.
         way: (m,) the way of the head to turn that moves each column.
-        jumps: (j,) seconds: when the eyes jump to a new point.
-        points: (e, j) 0..1: what is added from then on to the last e columns.
+        jumps: (j,) seconds: when the eyes leave for a new point.
+        lasts: (j,) seconds: how long they are on their way.
+        points: (e, j) 0..1: what is added to the last e columns when they are there.
     """
 
     columns: tuple[int, ...]
@@ -54,6 +55,7 @@ class Motion:
     poses: Float64
     way: Index
     jumps: Float64
+    lasts: Float64
     points: Float64
 
     def at(self, times: Float64) -> Float64:
@@ -70,7 +72,14 @@ class Motion:
         sways = sways.reshape(self.keys.shape).take(self.way, axis=0).ravel()
         moved *= self._steps.repeat(sways).reshape(moved.shape)
         moved += self.poses.repeat(sways).reshape(moved.shape)
-        moved[-len(self.points) :] += self.points.repeat(at_points, axis=1)
+        # A minimum-jerk course is the same both ways: what is left to go is 1 at first and falls to 0.
+        to_go = self._arrivals.repeat(at_points)
+        to_go -= times
+        to_go /= self.lasts.repeat(at_points)
+        np.maximum(to_go, 0.0, out=to_go)
+        eyes = moved[-len(self.points) :]
+        eyes += self.points.repeat(at_points, axis=1)
+        eyes -= smooth(to_go) * self._leaps.repeat(at_points, axis=1)
         return moved
 
     @cached_property
@@ -78,6 +87,17 @@ class Motion:
         """All keys, those of the jumps last, and which of them are the last of their kind."""
         keys = np.concatenate([self.keys.ravel(), self.jumps])
         return keys, np.append(np.arange(1, len(self.keys) + 1) * self.keys.shape[1], len(keys)) - 1
+
+    @cached_property
+    def _arrivals(self) -> Float64:
+        """(j,) seconds: when the eyes are at each point."""
+        arrivals: Float64 = self.jumps + self.lasts
+        return arrivals
+
+    @cached_property
+    def _leaps(self) -> Float64:
+        """(e, j) how far each point is from the one before."""
+        return np.diff(self.points, prepend=self.points[:, :1])
 
     @cached_property
     def _lengths(self) -> Float64:
@@ -137,9 +157,10 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
         for moved in (sides, COUNTER.get(sides, ()))
         for column, values in _turn(moved, degrees[way])
     }
-    # Both directions jump at the same instants: a saccade is one movement.
+    # Both directions leave at the same instants: a saccade is one movement.
     looks = [(10, 11 + kind, most) for kind, most in enumerate(SACCADE.values())]
     times, aims = _poses(seed, looks, jumps, SACCADE_PERIOD)
+    leaps = np.hypot(*np.diff(aims, prepend=aims[:, :1]))
     points = dict(pair for sides, row in zip(SACCADE, aims, strict=True) for pair in _turn(sides, row))
     columns = (*(column for column in poses if column not in points), *points)
     return Motion(
@@ -148,6 +169,7 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
         np.array([poses[column][1] for column in columns]),
         np.array([poses[column][0] for column in columns]),
         times[0],
+        SACCADE_LEAST + SACCADE_DEGREE * leaps,
         np.array(list(points.values())),
     )
 

@@ -130,7 +130,9 @@ def test_what_takes_idle_motion_leaves_what_is_asked_for() -> None:
 
 def lid_of(taking: Channel, draw: float, time: float) -> float:
     """How far a lid is shut, where a blink with this draw would come from 1 to 1.3 s."""
-    still = Motion((NOD.column,), ONE[None], np.zeros((1, 1)), np.zeros(1, int), ONE, np.zeros((1, 1)))
+    still = Motion(
+        (NOD.column,), ONE[None], np.zeros((1, 1)), np.zeros(1, int), ONE, np.ones(1), np.zeros((1, 1))
+    )
     idle = Idle(Blinks(np.array([1.0]), np.array([draw])), still)
     return float(blend([taking], np.array([time]), idle=idle).values[0, au(45)[0].column])
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from realizer import tables
 from realizer.animation.blend import blend
 from realizer.animation.fap import to_fap
 from realizer.animation.idle import idle_face
@@ -49,6 +53,23 @@ def test_eyes_stay_on_their_point_while_the_head_sways() -> None:
     gaze = np.degrees((faps[:, 22] + faps[:, 48]) * 1e-5)
     still = np.abs(np.diff(gaze)) < 1e-3
     assert still.mean() > 0.9
+
+
+def test_eyes_take_the_time_of_a_saccade_from_point_to_point() -> None:
+    motion = idle_face(0, 60, 1).motion
+    eyes = replace(motion, poses=np.zeros_like(motion.poses))  # a head that keeps still
+    most = np.array([tables.by_number()[int(AU_NAMES()[column])].degrees for column in motion.columns[-4:]])
+    for start, lasts in zip(motion.jumps[3:50], motion.lasts[3:50], strict=True):
+        times = start + lasts * np.arange(-0.25, 1.26, 0.05)
+        degrees = (eyes.at(times)[-4:] * most[:, None]).reshape(2, 2, -1)
+        gaze = degrees[:, 1] - degrees[:, 0]
+        gone = np.hypot(*(gaze - gaze[:, :1]))
+        way = float(gone[-1])
+        assert lasts == pytest.approx(0.021 + 0.0022 * way)  # Carpenter 1988
+        assert (gone[:6] < 1e-9).all()
+        np.testing.assert_allclose(gone[25:], way, atol=1e-9)
+        assert gone[15] == pytest.approx(way / 2)  # half-way at half of the time, on a straight line
+        assert (np.diff(gone) > -1e-9).all()
 
 
 def test_both_lids_blink_and_each_column_moves_once() -> None:
