@@ -14,12 +14,14 @@ from realizer.server.cycles import Cycles
 from realizer.server.doors.door import Client
 from realizer.server.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.hub import ANYBODY, Hub, Visitor
+from realizer.server.journal import Journal, Lost
 from realizer.server.journal.replay import caught_up
 from realizer.server.limits import memory
 from realizer.server.metrics import Metrics
 from realizer.server.origin import Origin
 from realizer.server.session import Session
 from realizer.server.studio import Studio
+from realizer.server.watch import taken_over
 from realizer.server.workers import worker_of
 from realizer.settings import Settings
 
@@ -45,7 +47,7 @@ class Shell:
         self.settings = settings
 
         def ours(session: str) -> bool:
-            if self._origin.journal is not None and session not in self._hub.sessions:
+            if self._origin.journal is not None and not self._lives(session):
                 return False  # another process may have it: only `restore` asks, before somebody joins
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
@@ -59,6 +61,7 @@ class Shell:
         self._sweeper: asyncio.TimerHandle | None = None
         self._cycles = Cycles()
         self._closed = False
+        self._looking: asyncio.Task[None] | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
         self._taken_over: dict[str, float] = {}  # session -> until when clients come back to it; loop time
 
@@ -92,8 +95,9 @@ class Shell:
         self._closed = True
         self._alarms.close()
         self._reading.clear()
-        if self._sweeper is not None:
-            self._sweeper.cancel()
+        for waiting in (self._sweeper, self._looking):
+            if waiting is not None:
+                waiting.cancel()
         for session in self._hub.sessions.values():
             session.close()
         self._origin.close()
@@ -140,7 +144,7 @@ class Shell:
         """
         if self._origin.journal is None or name is None:
             return
-        if name not in self._hub.sessions:
+        if not self._lives(name):
             if name not in self._restoring:
                 self._restoring[name] = self._loop.create_task(self._restore(name, seen or 0))
             await asyncio.shield(self._restoring[name])
@@ -149,6 +153,11 @@ class Shell:
             now = self._loop.time()
             session.opened -= caught_up(session, now, seen or 0) - now
             self._pump(session)
+
+    def _lives(self, name: str) -> bool:
+        """A session of that name is here; one that another process has may only still be known."""
+        known = self._hub.sessions.get(name)
+        return known is not None and not known.closed
 
     async def _restore(self, name: str, seen: int) -> None:
         try:
@@ -315,6 +324,12 @@ class Shell:
             self._fail(session)
         self._pump(session)
 
+    async def _look(self, journal: Journal) -> None:
+        """Let go of who watches a session that plays elsewhere now."""
+        for session in await taken_over(journal, self._hub.sessions.values()):
+            session.lose(Lost(f"session {session.id} is another process's now"))
+            self._pump(session)
+
     def _sweep(self) -> None:
         self._cycles.look(len(self._clients))
         now = self._loop.time()
@@ -324,4 +339,6 @@ class Shell:
         grown = [session for session in self._hub.sessions.values() if session.notes.grown]
         for place, session in enumerate(grown):
             self._loop.call_later(SWEEP * place / len(grown), self._rest, session)
+        if self._origin.journal is not None and (self._looking is None or self._looking.done()):
+            self._looking = self._loop.create_task(self._look(self._origin.journal))
         self._sweeper = self._loop.call_later(SWEEP, self._sweep)

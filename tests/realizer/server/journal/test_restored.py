@@ -20,6 +20,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
+from realizer.server import shell
+from realizer.server.doors import websocket_client
 from realizer.server.intake import Intake
 from realizer.server.journal.notes import ENTRIES
 from realizer.server.serve import Server
@@ -254,6 +256,73 @@ def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
 
     with serving(where) as (one, _), serving(where) as (other, _):
         asyncio.run(test(one, other))
+
+
+async def held(client: ClientConnection) -> float:
+    """How far AU 12L is held."""
+    await client.send('{"type": "state"}')
+    layers = json.loads(await client.recv())["characters"][0]["layers"]
+    return float(layers.get("direct", {"aus": {}})["aus"].get("12L", 0.0))
+
+
+def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_it_was(
+    where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shell, "SWEEP", 0.05)
+    monkeypatch.setattr(websocket_client, "GOODBYE", LIMIT)
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=where)
+        async with (
+            asyncio.timeout(LIMIT),
+            Server(settings) as one,
+            Server(settings) as other,
+            connect(f"{one.url}?session=deaf") as deaf,
+        ):
+            deaf.transport.pause_reading()  # it does not hear that it is let go of
+            async with connect(f"{other.url}?session=deaf") as second:
+                await second.send('{"type": "set", "aus": {"12L": 0.5}}')
+                while not one._shell._hub.sessions["deaf"].closed:
+                    await asyncio.sleep(0)
+                while await held(second) < 0.5:
+                    pass
+            async with connect(f"{one.url}?session=deaf") as back:
+                assert await held(back) == 0.5
+            deaf.transport.resume_reading()
+
+    asyncio.run(run())
+
+
+def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_and_may_come_back(
+    where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shell, "SWEEP", 0.05)
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", journal=where)
+        async with (
+            asyncio.timeout(LIMIT),
+            Server(settings) as one,
+            Server(settings) as other,
+            connect(f"{one.url}?session=seen") as watching,
+            connect(f"{one.url}?session=stays") as stays,
+        ):
+            await watching.send(NEXT)
+            await feedback(watching, "b:end")
+            async with connect(f"{other.url}?session=seen") as second:
+                await second.send('{"type": "set", "aus": {"12L": 0.5}}')
+                with pytest.raises(ConnectionClosed) as closed:
+                    await drained(watching)  # nobody says anything to the first process
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1012
+            assert "seen" in closed.value.rcvd.reason
+            async with connect(f"{one.url}?session=seen") as back:  # to the process that had lost it
+                while await held(back) < 0.5:
+                    pass
+            await stays.send(NEXT)
+            await feedback(stays, "b:end")
+
+    asyncio.run(run())
 
 
 def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_more_and_clocks_differ(
