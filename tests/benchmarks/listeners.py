@@ -21,7 +21,6 @@ __all__ = ["FPS", "POSIX", "Crowd", "joined"]
 FPS = 25
 CALM = 0.5  # s
 PING, PONG = 9, 10
-EVERY = 10.0  # s between two documents of a session
 SCENE = {"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}
 BODY = (
     '<head id="n" lexeme="NOD" start="0.5"/><head id="m" lexeme="SHAKE" start="n:end+2"/>'
@@ -68,14 +67,16 @@ class Crowd:
         url: where BML goes.
         sessions: how many.
         plays: or only listens, to a server whose frames tell POSIX time.
+        every: seconds between two documents of a session; what one asks for takes six.
     """
 
-    def __init__(self, url: str, sessions: int, plays: bool) -> None:
+    def __init__(self, url: str, sessions: int, plays: bool, every: float = 10.0) -> None:
         chance = random.Random(0)
         self._poll = select.epoll()
         self._peers: dict[int, Peer] = {}
         self._due: list[tuple[float, int]] = []  # when who sends its next document
         self._plays = plays
+        self._every = every
         self._late: list[float] = []
         self._answers: list[float] = []
         self._frames = self._missing = 0
@@ -86,7 +87,7 @@ class Crowd:
             self._peers[peer.socket.fileno()] = peer
             self._poll.register(peer.socket, select.EPOLLIN)
             if plays:
-                heappush(self._due, (time.time() + EVERY * chance.random(), peer.socket.fileno()))
+                heappush(self._due, (time.time() + every * chance.random(), peer.socket.fileno()))
 
     def listen(self, seconds: float) -> dict[str, float]:
         """Play and listen for some time: what came in it, lateness and answers in ms."""
@@ -147,7 +148,7 @@ class Crowd:
 
     def _send(self) -> None:
         when, number = heappop(self._due)
-        heappush(self._due, (when + EVERY, number))
+        heappush(self._due, (when + self._every, number))
         peer = self._peers[number]
         name = f"b{peer.documents}"
         peer.documents += 1

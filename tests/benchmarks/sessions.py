@@ -1,13 +1,13 @@
 """Prints how many sessions one service plays at once: lateness, processor time, memory.
 
-Run: python tests/benchmarks/sessions.py [--sessions 1000] [--seconds 20] [--floor] [serve's own options]
+Run: python tests/benchmarks/sessions.py [--sessions 1000] [--every 10] [--floor] [serve's own options]
      python tests/benchmarks/sessions.py --sessions 125,250,500,1000     how it grows
      python tests/benchmarks/sessions.py --sessions 200 --minutes 30     whether it stays as it is
 
 Each session is a WebSocket of its own that gets 25 FAP frames a second and plays documents of head, face,
-gaze and idle motion, one every 10 s. The client is a process of its own on plain sockets, so that it costs
-little. `--floor` runs a server beside it that does nothing but send as many bytes as often (with the package
-websockets). Noise is how late this machine wakes a process that does nothing else.
+gaze and idle motion, which last six seconds, one `--every` ten. The client is a process of its own on plain
+sockets, so that it costs little. `--floor` runs a server beside it that does nothing but send as many bytes
+as often (with the package websockets). Noise is how late this machine wakes a process that does nothing else.
 """
 
 from __future__ import annotations
@@ -98,12 +98,19 @@ def floor() -> None:
 
 
 def measured(
-    command: list[str], sessions: int, seconds: float, warm: float, times: int, plays: bool
+    command: list[str],
+    sessions: int,
+    seconds: float,
+    warm: float,
+    times: int,
+    plays: bool,
+    every: float = 10.0,
 ) -> Iterator[dict[str, float]]:
     """What a service does and costs in each of some stretches of so many seconds."""
     with served(command) as (url, service):
         me = [sys.executable, __file__, "--load", url, "--sessions", str(sessions), "--seconds", str(seconds)]
-        me += ["--warm", str(warm), "--times", str(times), *([] if plays else ["--floor"])]
+        me += ["--warm", str(warm), "--times", str(times), "--every", str(every)]
+        me += [] if plays else ["--floor"]
         idle = resident(service)
         client = subprocess.Popen(me, stdout=subprocess.PIPE, text=True)
         assert client.stdout is not None
@@ -135,11 +142,11 @@ def tell(name: str, sessions: int, told: dict[str, float], plays: bool) -> None:
     sys.stdout.flush()
 
 
-def soak(command: list[str], sessions: int, minutes: int, warm: float) -> None:
+def soak(command: list[str], sessions: int, minutes: int, warm: float, every: float) -> None:
     """Minute by minute, and what the second half has more than the first."""
     print("minute  memory MB  lateness p50    p99 ms  first feedback p50    p99 ms  us a frame")
     rows = []
-    for minute, told in enumerate(measured(command, sessions, 60.0, warm, minutes, plays=True), 1):
+    for minute, told in enumerate(measured(command, sessions, 60.0, warm, minutes, True, every), 1):
         rows.append(told)
         print(
             f"{minute:6}  {told['memory']:9.1f}  {told['p50']:12.2f}  {told['p99']:8.2f}"
@@ -156,6 +163,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--sessions", default="1000", help="how many, or several numbers with commas")
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument(
+        "--every", type=float, default=10.0, help="seconds between two documents of a session"
+    )
     parser.add_argument("--minutes", type=int, help="for so long, minute by minute")
     parser.add_argument("--warm", type=float, default=12.0, help="seconds before it is measured")
     parser.add_argument("--floor", action="store_true", help="a plain server of package websockets beside it")
@@ -170,7 +180,7 @@ def main() -> None:
         return
     counts = [int(part) for part in given.sessions.split(",")]
     if given.load:
-        crowd = Crowd(given.load, counts[0], not given.floor)
+        crowd = Crowd(given.load, counts[0], not given.floor, given.every)
         crowd.listen(given.warm)
         print("measuring", flush=True)
         for _ in range(given.times):
@@ -180,11 +190,11 @@ def main() -> None:
     print(f"noise of this machine: p50 {median:.2f}, p99 {worst:.2f} ms", flush=True)
     serve = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *rest]
     if given.minutes:
-        soak(serve, counts[0], given.minutes, given.warm)
+        soak(serve, counts[0], given.minutes, given.warm, given.every)
         return
     rows: list[dict[str, float]] = []
     for count in counts:
-        rows += measured(serve, count, given.seconds, given.warm, 1, plays=True)
+        rows += measured(serve, count, given.seconds, given.warm, 1, True, given.every)
         tell("realizer", count, rows[-1], plays=True)
     if len(counts) > 1:
         for name, unit in (("cpu", "of a core"), ("memory", "MB"), ("p99", "ms late")):
