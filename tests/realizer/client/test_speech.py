@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
 import pytest
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from realizer.client import ClientError, connect
 from realizer.client.speech import Heard, Speech
+from realizer.server.serve import Server
+from realizer.settings import Settings
 
-from .test_live import serving
+from .test_live import LIMIT, serving
 
 
 def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:
@@ -108,6 +111,32 @@ def test_a_speech_that_was_closed_when_its_connection_ended_takes_no_more_from_w
             assert (await other.ended()).status == "DONE"
 
     serving(test)
+
+
+def test_so_it_is_where_its_process_has_died_and_another_one_goes_on(tmp_path: Path) -> None:
+    settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
+
+    async def run() -> None:
+        async with (
+            asyncio.timeout(LIMIT),
+            Server(settings) as one,
+            Server(settings) as other,
+            connect(f"{one.url}?session=show") as client,
+        ):
+            lost = client.speech("s1")
+            speech = await lost.__aenter__()
+            await speech.append("One two three four five six seven eight nine ten. ")
+            await client.ask("ping")
+            async with connect(f"{other.url}?session=show&seen=0") as survivor:
+                async with survivor.speech("s1") as again:
+                    await again.append("Eleven. ")
+                    with pytest.raises(ClientError, match="'s1' was closed and is being said"):
+                        await again.ended()
+                end = [f async for f in survivor.until_end("s1")][-1]
+                assert isinstance(end, BlockProgress)
+                assert end.status == "DONE", "what had come is said to its end"
+
+    asyncio.run(run())
 
 
 def test_an_exception_stops_the_speech_and_its_id_is_free_again() -> None:
