@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
+import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
@@ -44,7 +46,7 @@ class FolderJournal:
 
     def begin(self, session: str, epoch: float) -> None:
         self.end(session)
-        self._begin(self._path(session, epoch), session, epoch)
+        self._begin(session, epoch)
 
     def resume(self, session: str, kept: Kept) -> None:
         """Go on with the record of a session that was taken over; what it lacks is written first.
@@ -56,30 +58,33 @@ class FolderJournal:
             JournalError: it cannot be written.
         """
         self.end(session)
-        number, lacks = 1, None
-        while (path := self._path(session, kept.epoch, number)).exists():
-            if (lacks := self._join(session, path, kept)) is not None:
-                break
-            number += 1
-        if lacks is None:
-            self._begin(path, session, kept.epoch, kept.parts)
+        there = itertools.takewhile(os.path.exists, self._paths(session, kept.epoch))
+        joined = (self._join(session, path, kept) for path in there)
+        if (lacks := next((one for one in joined if one is not None), None)) is None:
+            self._begin(session, kept.epoch, kept.parts)
             lacks = kept.entries
         for entry in lacks:
             self.add(session, entry)
 
-    def _path(self, session: str, epoch: float, number: int = 1) -> Path:
-        """Of a record; of those with higher numbers where one could not be gone on with."""
+    def _paths(self, session: str, epoch: float) -> Iterator[Path]:
+        """Of a record, and of those that begin where one could not be gone on with."""
         began = time.strftime("%Y%m%dT%H%M%S", time.gmtime(epoch)) + f"{epoch % 1:.3f}"[1:]
-        more = "" if number == 1 else f"-{number}"
-        return self._folder / f"{session}-{began}{more}{SUFFIX}"
+        for more in itertools.chain([""], (f"-{number}" for number in itertools.count(2))):
+            yield self._folder / f"{session}-{began}{more}{SUFFIX}"
 
-    def _begin(self, path: Path, session: str, epoch: float, parts: Mapping[str, str] = {}) -> None:
+    def _begin(self, session: str, epoch: float, parts: Mapping[str, str] = {}) -> None:
         told = {"session": session, "epoch": epoch, **self._head}
+        path = self._folder
         try:
-            file = self._files[session] = path.open("wb", buffering=0)
+            path = next(path for path in self._paths(session, epoch) if not path.exists())
+            file = self._files[session] = path.open("xb", buffering=0)
             _taken(file)
             _write(file, json.dumps(told | {"parts": dict(parts)} if parts else told))
         except OSError as error:
+            if session in self._files:
+                self.end(session)
+                with contextlib.suppress(OSError):
+                    path.unlink()  # an empty file is no record
             raise JournalError(f"the record {path}: {error.strerror}") from None
 
     def _join(self, session: str, path: Path, kept: Kept) -> list[Entry] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -110,6 +111,19 @@ def test_one_that_another_process_still_writes_is_not_touched(tmp_path: Path) ->
         other.kill()
     assert read_record(first).entries == ()
     assert read_record(second).entries == (*ENTRIES, Entry(9.0, "tick"))
+
+
+def test_a_record_that_cannot_begin_leaves_no_file(tmp_path: Path) -> None:
+    record = FolderJournal(tmp_path, HEAD)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
+    try:
+        with pytest.raises(JournalError, match=r"the record .*File too large"):
+            record.begin("s", 1e9)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    record.add("s", ENTRIES[0])
+    assert list(tmp_path.iterdir()) == []
 
 
 BEGIN = b'{"session": "s", "epoch": 0}\n'

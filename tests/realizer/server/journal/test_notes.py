@@ -48,6 +48,19 @@ def test_a_record_that_cannot_begin_refuses_nobody(tmp_path: Path) -> None:
     assert stopped == [1]
 
 
+def test_a_record_that_cannot_go_on_refuses_nobody(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    folder = tmp_path / "records"
+    record = FolderJournal(folder, {})
+    folder.rmdir()
+    stopped: list[int] = []
+    kept = Kept(0.0, [Entry(1.0, "join", 1)])
+    notes = Notes("s", Memory(), record, stopped=lambda: stopped.append(1), kept=kept)
+    with caplog.at_level(logging.WARNING):
+        notes.resume(kept)
+    assert stopped == [1]
+    assert "s is recorded no further" in caplog.text
+
+
 def test_a_record_has_all_that_was_done_though_the_journal_has_no_room(tmp_path: Path) -> None:
     full = False
     notes = Notes("s", Memory(lambda: full), FolderJournal(tmp_path, {}))
