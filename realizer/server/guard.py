@@ -15,7 +15,7 @@ from realizer.server.hub import HubError
 from realizer.server.limits import used_up
 from realizer.server.messages import MAX_CONTROL
 from realizer.server.passes import Pass, PassError, Passes
-from realizer.settings import Settings, raises
+from realizer.settings import Settings, SettingsError, raises
 
 __all__ = ["Guard", "Pace"]
 
@@ -117,13 +117,24 @@ class Guard:
         """What speaks TLS with the service's certificate; None where it has none.
 
         Raises:
-            OSError: the files do not fit each other, or are none.
+            SettingsError: the files do not fit each other, are none, or want a pass phrase.
         """
-        if self._settings.tls_cert is None:
+        cert, key = self._settings.tls_cert, self._settings.tls_key
+        if cert is None:
             return None
+
+        def asked() -> str:
+            raise ValueError("the key has one")  # or a service would wait for somebody at a keyboard
+
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.minimum_version = ssl.TLSVersion.TLSv1_2
-        context.load_cert_chain(self._settings.tls_cert, self._settings.tls_key)
+        try:
+            context.load_cert_chain(cert, key, asked)
+        except (OSError, ValueError) as error:
+            raise SettingsError(
+                "setting tls_cert: wanted certificates in PEM, and in tls_key the key of the first without a "
+                f"pass phrase, got {cert} and {key or 'none'}: {getattr(error, 'reason', None) or error}"
+            ) from None
         return context
 
     def _from_where(self, headers: Mapping[str, str]) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import signal
 import socket
-from collections.abc import Awaitable, Coroutine
+from collections.abc import Awaitable, Coroutine, Iterator
 from types import TracebackType
 
 from realizer.errors import RealizerError
@@ -21,7 +21,7 @@ from realizer.server.doors.xface import XfaceDoor
 from realizer.server.doors.xface_player import XfacePlayerDoor
 from realizer.server.shell import Shell
 from realizer.server.workers import FAULT, READY, Workers, handed
-from realizer.settings import Settings
+from realizer.settings import Settings, SettingsError
 
 __all__ = ["Server", "run", "serve", "work"]
 
@@ -42,15 +42,27 @@ async def serve(settings: Settings | None = None) -> None:
     if settings.log == "json":
         write_json()
     if settings.workers > 1:
-        workers = await Workers(settings).start()
+        with _told(settings):
+            workers = await Workers(settings).start()
         print(*lines(settings, workers.port), sep="\n", flush=True)
         try:
             await _asked(signal.SIGINT, signal.SIGTERM)
         finally:
             await workers.close()
         return
-    server = await Server(settings).start()
+    with _told(settings):
+        server = await Server(settings).start()
     await _serve(server, _asked(signal.SIGINT, signal.SIGTERM))
+
+
+@contextlib.contextmanager
+def _told(settings: Settings) -> Iterator[None]:
+    """A name that no machine has, as what it is."""
+    try:
+        yield
+    except socket.gaierror as error:
+        words = f"setting host: wanted an address of this machine, got {settings.host!r}: {error.strerror}"
+        raise SettingsError(words) from None
 
 
 async def work(settings: Settings, number: int, control: socket.socket) -> None:

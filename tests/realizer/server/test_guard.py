@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import json
 import logging
+from datetime import datetime, timedelta
+from pathlib import Path
 
 import jwt
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.hashes import SHA256
 
 from realizer.server.guard import Guard, Pace
 from realizer.server.hub import HubError
@@ -172,6 +178,27 @@ def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
         Settings(jwt_key=SECRET[:31])
     with pytest.raises(SettingsError, match="setting token: wanted a word, got something else"):
         Settings(token=[TOKEN])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("flaw", ["another key", "no key", "a pass phrase", "no certificate"])
+def test_a_certificate_that_cannot_be_used_is_told_with_its_files_and_nobody_is_asked(
+    flaw: str, tmp_path: Path
+) -> None:
+    cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "localhost")])
+    private, other = ec.generate_private_key(ec.SECP256R1()), ec.generate_private_key(ec.SECP256R1())
+    start = datetime(2020, 1, 1)
+    made = x509.CertificateBuilder(name, name, private.public_key(), 1, start, start + timedelta(days=1))
+    pem, lock = serialization.Encoding.PEM, serialization.BestAvailableEncryption(b"opensesame")
+    kept = lock if flaw == "a pass phrase" else serialization.NoEncryption()
+    written = (other if flaw == "another key" else private).private_bytes(
+        pem, serialization.PrivateFormat.PKCS8, kept
+    )
+    cert.write_bytes(b"none" if flaw == "no certificate" else made.sign(private, SHA256()).public_bytes(pem))
+    key.write_bytes(written)
+    chosen = guard(tls_cert=cert, tls_key=None if flaw == "no key" else key)
+    with pytest.raises(SettingsError, match=r"setting tls_cert: wanted .*cert\.pem and "):
+        chosen.tls()
 
 
 def test_the_library_below_does_not_log_requests_where_there_is_a_token() -> None:

@@ -19,10 +19,10 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
-from realizer.server.serve import Server
+from realizer.server.serve import Server, serve
 from realizer.server.session import Session
 from realizer.server.wire import FrameKind, unpack
-from realizer.settings import Settings
+from realizer.settings import Settings, SettingsError
 
 DOCUMENT = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
   <speech id="s"><text>One <sync id="m"/>two</text></speech>
@@ -232,6 +232,13 @@ def command(*arguments: str, **variables: str) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
     )
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_host_that_is_no_machine_is_named(workers: int) -> None:
+    settings = Settings(host="nowhere.invalid", port=0, workers=workers)
+    with pytest.raises(SettingsError, match=r"setting host: wanted .*, got 'nowhere\.invalid'"):
+        asyncio.run(serve(settings))
 
 
 def test_each_open_door_prints_a_line_and_one_that_waits_for_somebody_stops_none() -> None:

@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatu
 from realizer.server import guard, limits
 from realizer.server.passes import Pass
 from realizer.server.serve import Server
-from realizer.settings import Settings
+from realizer.settings import Settings, SettingsError
 
 LIMIT = 60  # s; a hung test ends
 TOKEN = "Xk-secret-7"
@@ -339,5 +339,5 @@ def test_a_certificate_without_its_key_is_told_before_a_door_opens(certificate: 
     async def test(server: Server) -> None:
         raise AssertionError("it opened")
 
-    with pytest.raises(ssl.SSLError):
+    with pytest.raises(SettingsError, match=r"wanted certificates in PEM, .* got .*cert\.pem and none"):
         serving(test, tls_cert=certificate[0])
