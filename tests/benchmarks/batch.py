@@ -20,7 +20,6 @@ Measures only; nothing asserts a time.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
 import statistics
@@ -33,6 +32,8 @@ from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+
+from stopwatch import Noise
 
 from realizer.batch.processes import Processes
 from realizer.batch.task import Options, Task
@@ -53,7 +54,6 @@ SENTENCES = (
 )
 SIZES = ("old", "new", "big", "small", "long", "short", "light", "heavy", "torn")
 COLOURS = ("red", "blue", "green", "yellow", "white", "black", "brown", "grey", "pink", "golden", "silver")
-WORK = bytes(1 << 19)  # whose digest takes half a millisecond: what noise is measured by
 
 
 def sentences(k: int, seconds: int) -> list[str]:
@@ -107,33 +107,6 @@ def spent() -> float:
     """Seconds of processor time of this process, and of its children that ended and theirs."""
     own = os.times()
     return own.user + own.system + own.children_user + own.children_system
-
-
-class Noise:
-    """What else the machine does: how long a fixed piece of work takes, beside the least that it took."""
-
-    least = float("inf")
-
-    def __init__(self) -> None:
-        self._took: list[float] = []
-
-    def look(self) -> float:
-        """Do the work once; s, by clock."""
-        began, used = time.perf_counter(), time.process_time()
-        hashlib.sha256(WORK).digest()
-        self._took.append(time.process_time() - used)
-        Noise.least = min(Noise.least, self._took[-1])
-        return time.perf_counter() - began
-
-    @property
-    def factor(self) -> float:
-        """How much slower than at its best the machine was, on average."""
-        return statistics.mean(self._took) / Noise.least
-
-    def __str__(self) -> str:
-        """Median and nine in ten, per cent."""
-        tenths = statistics.quantiles(self._took, n=10)
-        return "".join(f"{100 * (took / Noise.least - 1):7.0f} %" for took in (tenths[4], tenths[8]))
 
 
 def row(name: str, works: Iterator[Callable[[], float]], engine: Callable[[], float] = float) -> float:

@@ -16,9 +16,8 @@ session pays where somebody follows the stream `schedule` and nothing has change
 from __future__ import annotations
 
 import json
-import statistics
-import time
-from collections.abc import Callable
+
+from stopwatch import helped, median, noise
 
 from realizer.charts.picture import timeline
 from realizer.charts.raster import png
@@ -27,16 +26,6 @@ from realizer.charts.svg import svg
 from realizer.pipeline import play
 from realizer.player import Player
 from realizer.server.plans import Plans
-
-
-def median(work: Callable[[], object], times: int) -> float:
-    """Milliseconds."""
-    taken = []
-    for _ in range(times):
-        begin = time.perf_counter()
-        work()
-        taken.append(time.perf_counter() - begin)
-    return statistics.median(taken) * 1e3
 
 
 def faces(count: int) -> str:
@@ -73,8 +62,14 @@ def picture(count: int) -> None:
     )
 
 
-if __name__ == "__main__":
+def main() -> None:
+    helped(__doc__)
+    print(noise())
     for blocks_alive in (5, 100):
         stream(blocks_alive)
     for behaviours in (5, 40, 400):
         picture(behaviours)
+
+
+if __name__ == "__main__":
+    main()

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +22,7 @@ os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
 
 import numpy as np
 from plot import bars, exponent
+from stopwatch import noise
 
 from realizer.animation.blend import blend
 from realizer.animation.fap import to_fap
@@ -104,17 +104,6 @@ def measured(one: Player, seconds: float = SECONDS, repeats: int = REPEATS) -> S
     return Spent(np.array(runs[10:]))
 
 
-def noise(work: Callable[[], object], repeats: int = 2000) -> tuple[float, float]:
-    """How many times as long as at its best the same work takes: median, and nine in ten."""
-    spent = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        work()
-        spent.append(time.perf_counter() - begin)
-    low, middle, high = np.percentile(spent, (0, 50, 90))
-    return float(middle / low), float(high / low)
-
-
 def chart(rows: dict[int, Spent]) -> Picture:
     """A bar for each number of behaviours, its parts the steps."""
     left, scale, high = 120.0, 480.0 / max(spent.whole for spent in rows.values()), 34.0
@@ -140,11 +129,7 @@ def main() -> None:
     path = parser.parse_args().chart
     writer = writer_for(path) if path else None
 
-    keys = np.random.default_rng(0).random(20_000)
-    middle, nine = noise(lambda: np.sort(keys))
-    print(
-        f"noise: the same work takes {middle:.2f} times as long as at its best, {nine:.2f} in nine of ten\n"
-    )
+    print(f"{noise()}\n")
     print(f"{'':24}" + "".join(f"{step:>10}" for step in STEPS) + f"{'all':>10}{'least':>10}{'wanted':>10}")
 
     def row(name: str, spent: Spent, wanted: float | None = None) -> Spent:

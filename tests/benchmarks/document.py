@@ -25,6 +25,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from stopwatch import helped
+
 from bml_schema import Block, read
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.planning import plan
@@ -126,6 +128,7 @@ def play(count: int) -> tuple[Costs, int]:
 
 
 def main() -> None:
+    helped(__doc__)
     print("".join((f"{'behaviours':>10}", *(f"{part:>10}" for part in PARTS), "     least  messages  noise")))
     medians: dict[int, dict[str, float]] = {}
     for count in COUNTS:

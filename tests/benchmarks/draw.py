@@ -17,7 +17,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
 
 import numpy as np
-from stopwatch import median
+from stopwatch import median, noise
 
 from realizer.face import deform, load_face, normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
@@ -63,6 +63,7 @@ def main() -> None:
     rows = np.zeros((chosen.frames, 68), np.float32)
     rows[:, 2] = 300 + 300 * np.sin(np.arange(len(rows)) / 3)
     rows[:, 48] = 8000 * np.sin(np.arange(len(rows)) / 7)
+    print(noise())
     print(f"{face.name}: {len(face.vertices)} vertices, {len(face.triangles)} triangles, {width}x{height}")
 
     def line(name: str, ms: float) -> None:

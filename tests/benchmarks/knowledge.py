@@ -1,6 +1,6 @@
-"""What the knowledge of faces costs: medians in ms.
+"""What the knowledge of faces costs: `python tests/benchmarks/knowledge.py` prints medians in ms.
 
-python tests/benchmarks/knowledge.py
+Rules of co-occurrence on 250 frames, and a text of 1,000 words, beside the noise of the machine.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import random
 
 import numpy as np
-from stopwatch import median
+from stopwatch import helped, median, noise
 
 from realizer.animation.cooccurrence import cooccur
 from realizer.animation.targets import AU_NAMES
@@ -23,7 +23,8 @@ SENTENCES = (
 
 
 def main() -> None:
-    """Rules of co-occurrence on 250 frames, and a text of 1,000 words."""
+    helped(__doc__)
+    print(noise())
     dice = np.random.default_rng(1)
     every = dice.random((len(AU_NAMES()), 250), np.float32)
     few = np.where(dice.random((len(AU_NAMES()), 1)) < 0.2, every, 0).astype(np.float32)

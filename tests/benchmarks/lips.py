@@ -205,7 +205,7 @@ def lines(languages: str | None, every: int) -> list[tuple[str, str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--voice", default=None)
     parser.add_argument("--faces", default="ada,ben,ida")
     parser.add_argument("--languages", default=None)

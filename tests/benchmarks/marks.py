@@ -12,6 +12,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from stopwatch import helped
 
 from realizer.arrays import Float64
 from realizer.speech import EspeakVoice, Say
@@ -104,6 +105,7 @@ def _reported(voice: EspeakVoice, text: str, language: str) -> tuple[dict[int, f
 
 
 def main() -> None:
+    helped(__doc__)
     voice = EspeakVoice()
     try:
         found = list(errors(voice, PLACEMENTS))

@@ -11,11 +11,9 @@ Measures only; nothing asserts a time.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
-from statistics import median
 
 from lxml import etree
+from stopwatch import helped, measure, noise
 
 from bml_schema import CORE, EXTENSIONS, parse, write
 
@@ -41,19 +39,9 @@ def document(count: int) -> str:
     return "\n".join((start, *lines, "</bml>"))
 
 
-def measure(work: Callable[[], object], least: float = 1.0) -> tuple[float, float, float]:
-    """(median, minimum, maximum) milliseconds of one call, over about `least` seconds."""
-    work()
-    spans: list[float] = []
-    until = time.perf_counter() + least
-    while time.perf_counter() < until or len(spans) < 5:
-        start = time.perf_counter()
-        work()
-        spans.append((time.perf_counter() - start) * 1e3)
-    return median(spans), min(spans), max(spans)
-
-
 def main() -> None:
+    helped(__doc__)
+    print(noise())
     print(
         f"{'behaviours':>10}{'parse ms':>10}{'min':>9}{'max':>9}{'bare ms':>10}{'ratio':>7}{'write ms':>10}"
     )

@@ -9,10 +9,10 @@ Measures only; nothing asserts a time.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
+from stopwatch import helped, measure, noise
 
 from bml_schema import parse
 from realizer.animation.fap import to_fap
@@ -37,19 +37,9 @@ def block_of(count: int) -> str:
     return f'<bml id="b">{"".join(parts)}</bml>'
 
 
-def measure(work: Callable[[], object], least: float = 1.0) -> tuple[float, float, float]:
-    """(median, minimum, maximum) milliseconds of one call, over about `least` seconds."""
-    work()
-    spans: list[float] = []
-    until = time.perf_counter() + least
-    while time.perf_counter() < until or len(spans) < 5:
-        start = time.perf_counter()
-        work()
-        spans.append((time.perf_counter() - start) * 1e3)
-    return float(np.median(spans)), min(spans), max(spans)
-
-
 def main() -> None:
+    helped(__doc__)
+    print(noise())
     text = block_of(20)
     block = parse(text, VOCABULARY)
     print(f"{'work':<44}{'median ms':>10}{'min':>9}{'max':>9}")

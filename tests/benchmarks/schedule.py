@@ -30,6 +30,7 @@ from collections.abc import Callable
 
 import numpy as np
 from plot import exponent
+from stopwatch import helped, noise
 
 from bml_schema import MOST_BEHAVIOURS, Block, parse
 from realizer.player import Player
@@ -233,6 +234,8 @@ TABLE: list[tuple[str, Callable[[], Work], float | None]] = [
 
 
 def main() -> None:
+    helped(__doc__)
+    print(noise())
     print(f"{'work':40} {'median ms':>10} {'processor':>10} {'wanted ms':>10} {'dropped':>8}")
 
     def row(name: str, found: Spent, wanted: float | None, dropped: int = 0) -> None:

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 
+from stopwatch import helped, noise
 from websockets.asyncio.client import connect
 
 from realizer.server.wire import unpack
@@ -55,6 +56,8 @@ async def measure(url: str, body: str) -> tuple[list[float], list[float], list[f
 
 
 async def main() -> None:
+    helped(__doc__)
+    print(noise())
     # In a process of its own: here it would be measured together with its client.
     command = [sys.executable, "-m", "realizer", "serve", "--port", "0"]
     service = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

@@ -14,14 +14,15 @@ a real-time factor below 0.01 with espeak; below 0.05 with hibari.
 
 from __future__ import annotations
 
+import argparse
 import json
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from stopwatch import noise
 
 from realizer.animation.lips import lip_channels
 from realizer.server.effects import Send, Speak
@@ -130,6 +131,15 @@ def measure(voice: Voice) -> None:
     voice.close()
 
 
-if __name__ == "__main__":
-    for name in sys.argv[1:] or [voice.name for voice in voices() if voice.available]:
+def main() -> None:
+    form = argparse.RawDescriptionHelpFormatter
+    reader = argparse.ArgumentParser(description=__doc__, formatter_class=form)
+    reader.add_argument("voice", nargs="*", help="all that there are, where none is named")
+    names = reader.parse_args().voice or [voice.name for voice in voices() if voice.available]
+    print(noise())
+    for name in names:
         measure(find_voice(name))
+
+
+if __name__ == "__main__":
+    main()
