@@ -97,6 +97,8 @@ def some(random: Random, seconds: float) -> list[tuple[float, str]]:
                         setting(faps={"open_jaw": random.choice([None, 100, 50])}),
                         setting(emotion=random.choice([None, {"type": "anger", "intensity": 0.7}])),
                         '{"type": "stop"}',
+                        '{"type": "speech", "id": "turn", "append": "One two three. And so on. "}',
+                        '{"type": "speech", "id": "turn", "close": true}',
                         *(
                             f'<bml id="b{len(doings)}" composition="{composition}">'
                             f"{random.choice(PLAYED)}</bml>"
