@@ -97,7 +97,8 @@ def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[
     deep = person.ground.point("2.2")[2] - skin.vertices[:, 2]
     # Right behind the corners it stays dark: seen from the side, closed lips show a hair of it.
     corners = smooth(np.abs(lips.u), 0.70, 0.92) * smooth(lips.fade, 0.45, 0.75)
-    paint.paint_mouth(skin.colours, skin.occlusion, patch.mix @ (lips.inside * (1 - corners)), deep, colours)
+    share = patch.mix @ (lips.inside * (1 - corners))
+    paint.paint_mouth(skin.colours, skin.gloss, skin.occlusion, share, deep, colours)
 
 
 def _spared(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:

@@ -126,13 +126,15 @@ def paint_lips(
 DEEP, LIT = 0.055, (0.10, 0.62)
 
 
-def paint_mouth(out: Float64, light: Float64, share: Float64, deep: Float64, colours: Any) -> None:
-    """Paint the lining of the mouth, in place: red and lit behind the lips, darker to the back.
+def paint_mouth(
+    out: Float64, gloss: Float64, light: Float64, share: Float64, deep: Float64, colours: Any
+) -> None:
+    """Paint the lining of the mouth, in place: wet, red and lit behind the lips, darker to the back.
 
     What is baked there at rest, when the lips are closed, is no light at all; an open mouth lets it in.
 
     Args:
-        out: (n, 3) sRGB; light: (n,) 0..1.
+        out: (n, 3) sRGB; gloss, light: (n,) 0..1.
         share: (n,) 1 where there is only lining, 0 where there is none.
         deep: (n,) metres behind the lips.
         colours: sRGB colours mouth, tongue.
@@ -141,6 +143,8 @@ def paint_mouth(out: Float64, light: Float64, share: Float64, deep: Float64, col
     back, front = np.array(colours["mouth"], float) * 0.75, np.array(colours["tongue"], float) * 0.9
     out += share[:, None] * (back + (front - back) * near[:, None] - out)
     light += share * (np.interp(near, (0, 1), LIT) - light)
+    # A shine deep in the mouth looks like metal.
+    gloss += share * (0.4 * near**2 - gloss)
 
 
 DIRECTIONS, CELL, BIAS = 192, 0.0013, 0.0026  # rays a vertex; metres of a depth cell; metres a ray starts off

@@ -135,6 +135,10 @@ UPPER = (8.4, 6.8, 7.6, 7.0, 6.6, 9.5)  # mm: widths of the teeth of one side, f
 LOWER = (5.4, 5.9, 6.7, 7.0, 7.0, 10.0)
 # Of the light, how much reaches a tooth from the gum at the tongue to the gum at the lips.
 SHADES = (0.55, 0.78, 0.75, 1, 1, 0.8, 0.55, 0.4)
+SHINES = (0.1, 0.15, 0.35, 1, 1, 1, 1, 1)  # likewise of what shines
+IN_LIP = (
+    0.62  # of the light, how much is left for the lower teeth: the upper ones and the lips stand before it
+)
 WARM = np.array([1.0, 0.78, 0.64])  # what light is left behind the teeth has been on tongue and cheeks
 
 
@@ -204,9 +208,10 @@ def teeth(name: str, front: Float64, width: float, depth: float, colours: dict[s
     triangles = grid(len(side), len(SHADES))
     if up < 0:
         triangles = triangles[:, [0, 2, 1]]
-    gloss = np.full(len(vertices), 0.75)
     # Light reaches the front teeth between open lips and not the back of the mouth.
     depth_in = (front[2] - vertices[:, 2]) / depth
-    occlusion = 0.86 * smooth(depth_in, 0.75, 0.02) + 0.12
-    occlusion *= np.tile(SHADES, len(side))
+    near = smooth(depth_in, 0.75, 0.02)
+    occlusion = 0.86 * near + 0.12
+    occlusion *= np.tile(SHADES, len(side)) * (1 if up > 0 else IN_LIP)
+    gloss = 0.75 * near * np.tile(SHINES, len(side))
     return Part(name, None, vertices, triangles, np.array(tints), gloss, occlusion)
