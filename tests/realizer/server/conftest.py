@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import time
 from collections import defaultdict
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +22,26 @@ from tests.waking import wakes
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 TALK = '<bml id="{}"><speech id="s"><text>Hello there</text></speech></bml>'
 RATE = 22050
+
+
+class Clock:
+    """The machine's clock, which somebody sets: `time.time` with steps."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        real = time.time
+        self.step = 0.0
+        monkeypatch.setattr(time, "time", lambda: real() + self.step)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    return Clock(monkeypatch)
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Settings:
+    """Of a service whose named sessions another one with the same settings can go on with."""
+    return Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
 
 
 def spoken(seconds: float = 1.0) -> Utterance:

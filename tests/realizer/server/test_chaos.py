@@ -15,7 +15,6 @@ import socket
 import struct
 import subprocess
 import termios
-import time
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +33,8 @@ from realizer.speech.espeak import EspeakVoice
 from tests.benchmarks.packets import masked
 from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, well_told
 from tests.told import numbers
+
+from .conftest import Clock
 
 LIMIT = 60  # s; a hung test ends
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
@@ -256,20 +257,6 @@ def test_a_session_that_cannot_be_kept_is_refused_and_the_others_play_on(disk: D
 # the clock --------------------------------------------------------------------------------------
 
 
-class Clock:
-    """The machine's clock, which somebody sets: `time.time` with steps."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        real = time.time
-        self.step = 0.0
-        monkeypatch.setattr(time, "time", lambda: real() + self.step)
-
-
-@pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    return Clock(monkeypatch)
-
-
 def test_a_clock_that_is_set_back_and_forth_changes_nothing_of_what_plays(clock: Clock) -> None:
     async def test(server: Server) -> None:
         async with connect(server.url, max_queue=None) as client:
@@ -290,19 +277,18 @@ def test_a_clock_that_is_set_back_and_forth_changes_nothing_of_what_plays(clock:
 
 @pytest.mark.parametrize("step", [-3600.0, -0.3, 3600.0])
 def test_a_client_that_comes_back_where_clocks_are_other_ones_has_all_feedback_once(
-    clock: Clock, tmp_path: Path, step: float
+    clock: Clock, kept: Settings, step: float
 ) -> None:
     block = '<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="1.5"/></bml>'
 
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
         async with asyncio.timeout(LIMIT):
-            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+            async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(block)
                 told = await until(client, 'id="b:n:end"')  # long after its last message
             clock.step = step
             seen = numbers(told)[-1]
-            async with Server(settings) as server, connect(f"{server.url}?session=s&seen={seen}") as client:
+            async with Server(kept) as server, connect(f"{server.url}?session=s&seen={seen}") as client:
                 told += await until(client, 'id="b:end"')
                 await plays(client, "c")
         assert numbers(told) == list(range(1, len(told) + 1))

@@ -9,7 +9,6 @@ import json
 import sqlite3
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +26,7 @@ from realizer.server.journal.notes import ENTRIES
 from realizer.server.serve import Server
 from realizer.server.session import Session
 from realizer.settings import Settings
+from tests.realizer.server.conftest import Clock
 from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends
@@ -326,20 +326,17 @@ def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_
 
 
 def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_more_and_clocks_differ(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    clock: Clock, kept: Settings
 ) -> None:
-    real, step = time.time, [0.0]
-    monkeypatch.setattr(time, "time", lambda: real() + step[0])
     block = '<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" duration="3"/></bml>'
 
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
         async with asyncio.timeout(LIMIT):
-            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+            async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(block)
                 told = await feedback(client, "b:n:end")
-            step[0] = -3600.0  # what has passed since is not known
-            async with Server(settings) as server, connect(f"{server.url}?session=s&seen=1") as first:
+            clock.step = -3600.0  # what has passed since is not known
+            async with Server(kept) as server, connect(f"{server.url}?session=s&seen=1") as first:
                 seen = numbers(told)[-1]
                 async with connect(f"{server.url}?session=s&seen={seen}") as second:
                     rest = await feedback(second, "b:end")
@@ -351,7 +348,7 @@ def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_mor
 
 
 def test_a_session_that_a_fault_of_ours_ended_can_be_begun_anew(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, kept: Settings
 ) -> None:
     put = Intake.put
 
@@ -363,8 +360,7 @@ def test_a_session_that_a_fault_of_ours_ended_can_be_begun_anew(
     monkeypatch.setattr(Intake, "put", faulty)
 
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
-        async with asyncio.timeout(LIMIT), Server(settings) as server:
+        async with asyncio.timeout(LIMIT), Server(kept) as server:
             async with connect(f"{server.url}?session=s") as client:
                 await client.send('<bml id="fault"/>')
                 with pytest.raises(ConnectionClosed) as closed:
@@ -379,15 +375,14 @@ def test_a_session_that_a_fault_of_ours_ended_can_be_begun_anew(
 
 
 def test_what_cannot_be_done_again_is_told_and_is_still_there_for_who_can(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, kept: Settings
 ) -> None:
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", journal=str(tmp_path / "journal.db"))
         async with asyncio.timeout(LIMIT):
-            async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
+            async with Server(kept) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
                 told = await feedback(client, "b:end")
-            async with Server(settings) as server:
+            async with Server(kept) as server:
                 with monkeypatch.context() as here:
                     here.setattr(Session, "receive", None)
                     async with connect(f"{server.url}?session=s&seen=0") as client:
