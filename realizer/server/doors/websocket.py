@@ -12,26 +12,30 @@ import tempfile
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 from weakref import WeakSet
 
 from websockets.asyncio.server import Server as SocketServer
 from websockets.asyncio.server import ServerConnection
 from websockets.asyncio.server import serve as listen
-from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
-from realizer.server import guard
-from realizer.server.doors.websocket_client import GOODBYE, WebSocketClient
-from realizer.server.guard import Guard, Pace
-from realizer.server.hub import HubError, Visitor
-from realizer.server.journal import JournalError
-from realizer.server.messages import ErrorMessage
+from realizer.server.doors.websocket_client import GOODBYE
+from realizer.server.doors.websocket_request import (
+    address_of,
+    headers_of,
+    query_of,
+    response_to,
+    session_of,
+    visitor_of,
+)
+from realizer.server.doors.websocket_visit import Visits
+from realizer.server.guard import Guard
+from realizer.server.hub import HubError
 from realizer.server.metrics import MEDIA_TYPE
-from realizer.server.passes import Pass
 from realizer.server.shell import Shell
 from realizer.server.site import TEXT, Answer, Site
 from realizer.settings import Settings, raises
@@ -61,6 +65,7 @@ class WebSocketDoor:
         self._shell = shell
         self._settings = settings
         self._guard = Guard(settings)
+        self._visits = Visits(shell, settings, self._guard)
         self._site = Site(shell.health, settings)
         self._socket: SocketServer | None = None
         self._opened = WeakSet[ServerConnection]()
@@ -147,44 +152,44 @@ class WebSocketDoor:
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
             try:
-                allowed = self._guard.request(request.path, _headers(request), later=path == "/ws")
+                allowed = self._guard.request(request.path, headers_of(request), later=path == "/ws")
                 self._room(connection)
                 if path == "/check":
                     self._guard.room()
                 else:
-                    self._shell.check(_query(request)[0], _visitor(connection, allowed))
+                    self._shell.check(session_of(request)[0], visitor_of(connection, allowed))
             except HubError as error:
                 return self._refused(connection, error)
             return None
         if path in ("/ws", "/check") or upgrade:
             got = "a WebSocket" if upgrade else "plain HTTP"
             words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
-            return _response(Answer(426 if not upgrade else 404, TEXT, words.encode()))
-        if path in ("/metrics", "/healthz") and (wrong := self._other(request)) is not None:
-            return _response(Answer(404, TEXT, f"{wrong}\n".encode()))
+            return response_to(Answer(426 if not upgrade else 404, TEXT, words.encode()))
+        if path in ("/metrics", "/healthz") and (wrong := self._another(request)) is not None:
+            return response_to(Answer(404, TEXT, f"{wrong}\n".encode()))
         if path == "/metrics":
             try:
-                allowed = self._guard.request(request.path, _headers(request))
+                allowed = self._guard.request(request.path, headers_of(request))
                 if allowed is None or allowed.sessions is not None:
                     raise HubError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
             except HubError as error:
                 return self._refused(connection, error)
-            return _response(Answer(200, MEDIA_TYPE, self._shell.measured().encode()))
+            return response_to(Answer(200, MEDIA_TYPE, self._shell.measured().encode()))
         loop = asyncio.get_running_loop()
-        return _response(await loop.run_in_executor(None, self._site.answer, request.path))
+        return response_to(await loop.run_in_executor(None, self._site.answer, request.path))
 
-    def _other(self, request: Request) -> str | None:
+    def _another(self, request: Request) -> str | None:
         """Why the worker that a request names is not this one; None where it is, or none is named."""
-        named = parse_qs(urlsplit(request.path).query, keep_blank_values=True).get("worker", [])
-        if named[-1:] in ([], [str(self._worker)]):
+        named = query_of(request).get("worker")
+        if named in (None, str(self._worker)):
             return None
-        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {named[-1][:80]!r}"
+        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {named[:80]!r}"
 
     def _refused(self, connection: ServerConnection, error: HubError) -> Response:
         self._shell.metrics.counts["refused"] += 1
-        log.info("refused: %s", error, extra={"address": _address(connection), "status": error.status})
+        log.info("refused: %s", error, extra={"address": address_of(connection), "status": error.status})
         headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
-        return _response(Answer(error.status, TEXT, f"{error}\n".encode(), headers))
+        return response_to(Answer(error.status, TEXT, f"{error}\n".encode(), headers))
 
     def _room(self, socket: ServerConnection) -> None:
         """Whether one more may come from its address: nobody can take the room of all others.
@@ -193,9 +198,9 @@ class WebSocketDoor:
             HubError: there are too many.
         """
         most = self._settings.max_connections
-        if self._from[_address(socket)] >= most:
+        if self._from[address_of(socket)] >= most:
             words = (
-                f"{most} connections from {_address(socket)} are open: wanted fewer "
+                f"{most} connections from {address_of(socket)} are open: wanted fewer "
                 f"{raises('max_connections')}"
             )
             raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
@@ -203,7 +208,7 @@ class WebSocketDoor:
     async def _handle(self, socket: ServerConnection) -> None:
         """One WebSocket, from its opening to its end."""
         assert socket.request is not None
-        address = _address(socket)
+        address = address_of(socket)
         try:
             self._room(socket)  # again: many may have been let in at the same moment
         except HubError as error:
@@ -214,81 +219,11 @@ class WebSocketDoor:
             if urlsplit(socket.request.path).path == "/check":
                 await self._check(socket)
             else:
-                await self._join(socket, socket.request)
+                await self._visits.begin(socket, socket.request)
         finally:
             self._from[address] -= 1
             if not self._from[address]:
                 del self._from[address]
-
-    async def _join(self, socket: ServerConnection, request: Request) -> None:
-        client = WebSocketClient(socket)
-        greeting = None
-        try:
-            allowed = self._guard.request(request.path, _headers(request), later=True)
-            if allowed is None:
-                greeting, allowed = await self._greeting(socket)
-            visitor = _visitor(socket, allowed)
-            name, seen = _query(request)
-            self._shell.check(name, visitor)  # who greets is known only now
-            await self._shell.restore(name, seen)
-            number = self._shell.join(client, name, seen, visitor)
-        except HubError as error:
-            await self._turn_away(socket, error)
-            return
-        except JournalError as error:
-            await socket.close(1013, str(error)[:120])
-            return
-        told = {"connection": number, "session": _query(request)[0], "address": _address(socket)}
-        log.info("joined", extra=told)
-        try:
-            if greeting is not None:
-                self._shell.receive(number, greeting)
-            async with asyncio.timeout(allowed.left):
-                await self._read(socket, number, client)
-        except ConnectionClosed:
-            pass
-        except TimeoutError:
-            await client.close(1008, "token: it has expired")
-        finally:
-            self._shell.leave(number)
-            log.info("left", extra={**told, "code": socket.close_code})
-
-    async def _read(self, socket: ServerConnection, number: int, client: WebSocketClient) -> None:
-        """Hand messages on, no faster than a client may send them: the rest waits in its own buffers."""
-        loop = asyncio.get_running_loop()
-        pace = Pace(self._settings.max_rate)
-        async for message in socket:
-            if not self._shell.receive(number, message):
-                return
-            # 0 too: messages that are there already must not hold up everybody else.
-            pause = pace.wait(loop.time())
-            if pace.news is not None:
-                client.send(ErrorMessage(code="rate", message=pace.news).text())
-            await asyncio.sleep(pause)
-
-    async def _greeting(self, socket: ServerConnection) -> tuple[str | bytes, Pass]:
-        """The first message of a client that has not brought a token yet, and what its token lets it do.
-
-        Raises:
-            HubError: 401, it has said nothing, or something else.
-        """
-        message: str | bytes = ""
-        with contextlib.suppress(ConnectionClosed, TimeoutError):
-            async with asyncio.timeout(guard.PATIENCE):
-                message = await socket.recv()
-        return message, self._guard.greets(message)
-
-    async def _turn_away(self, socket: ServerConnection, error: HubError) -> None:
-        """Say why one who is here already may not stay."""
-        self._shell.metrics.counts["refused"] += 1
-        log.info("refused: %s", error, extra={"address": _address(socket), "status": error.status})
-        unknown = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
-        if unknown:
-            where = "hello.token" if error.status == http.HTTPStatus.UNAUTHORIZED else "hello.session"
-            told = ErrorMessage(code="token", message=str(error), where=where)
-            with contextlib.suppress(ConnectionClosed):
-                await socket.send(told.text())
-        await socket.close(1008 if unknown else 1013, str(error)[:120])
 
     async def _check(self, socket: ServerConnection) -> None:
         """An editor's own WebSocket: a text in, its faults out, one after the other."""
@@ -304,12 +239,6 @@ class WebSocketDoor:
                 async with self._checking:
                     told = await loop.run_in_executor(None, faults, text, self._settings)
                 await socket.send(told)
-
-
-def _address(socket: ServerConnection) -> str:
-    """Without the port; "" where the socket has none."""
-    remote = socket.remote_address
-    return str(remote[0]) if isinstance(remote, tuple) else ""
 
 
 def _nowhere() -> socket.socket:
@@ -336,44 +265,3 @@ def _addresses(settings: Settings, port: int) -> tuple[str, str]:
         host = "127.0.0.1"
     where, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
     return f"ws{s}://{where}/ws", f"http{s}://{where}/"
-
-
-def _headers(request: Request) -> dict[str, str]:
-    """By their names in small letters; of several of one name the last."""
-    return {name.lower(): value for name, value in request.headers.raw_items()}
-
-
-def _visitor(socket: ServerConnection, allowed: Pass | None) -> Visitor:
-    """Who comes; as far as is known where no token has come yet."""
-    return Visitor(_address(socket), None if allowed is None else allowed.sessions)
-
-
-def _query(request: Request) -> tuple[str | None, int | None]:
-    """`?session=ID&seen=N`.
-
-    Raises:
-        HubError: 400, `seen` is no number.
-    """
-    query = parse_qs(urlsplit(request.path).query, keep_blank_values=True)
-    session = query.get("session", [None])[-1] or None
-    seen = query.get("seen", [None])[-1]
-    if seen is None:
-        return session, None
-    if not (seen.isascii() and seen.isdigit() and len(seen) < 16):
-        raise HubError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
-    return session, int(seen)
-
-
-def _response(answer: Answer) -> Response:
-    headers = Headers(
-        {
-            "Content-Type": answer.media_type,
-            "Content-Length": str(len(answer.body)),
-            "X-Content-Type-Options": "nosniff",
-            # Other pages may import realizer.js and draw our faces, as they may open the WebSocket.
-            "Access-Control-Allow-Origin": "*",
-            "Connection": "close",
-            **dict(answer.headers),
-        }
-    )
-    return Response(answer.status, http.HTTPStatus(answer.status).phrase, headers, answer.body)
