@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 
@@ -18,7 +19,7 @@ from realizer.server.journal.folder import FolderJournal, Record, head, read_rec
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.playback import played
 from realizer.server.session import Session
-from realizer.server.wire import HEADER
+from realizer.server.wire import ClipPiece, pack_clip, unpack
 from realizer.settings import Settings
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
@@ -43,9 +44,13 @@ def setting(**what: object) -> str:
 
 
 def recorded(
-    folder: Path, doings: list[tuple[float, str]], seconds: float, late: Random | None = None
-) -> tuple[Record, dict[int, Int32]]:
-    """A session to which that is done: its record, and the FAP frames of who watched it.
+    folder: Path,
+    doings: Sequence[tuple[float, str | bytes]],
+    seconds: float,
+    late: Random | None = None,
+    watch: str = WATCH,
+) -> tuple[Record, list[bytes]]:
+    """A session to which that is done: its record, and what its client got of the stream it asked for.
 
     Args:
         doings: seconds on its clock, what is sent.
@@ -55,9 +60,9 @@ def recorded(
     session.notes = Notes("s", record=FolderJournal(folder, head(SETTINGS, None)))
     session.notes.begin(1e9)
     session.connect(1, OPENED)
-    frames: dict[int, Int32] = {}
+    got: list[bytes] = []
     answers: list[tuple[float, Speak]] = []
-    coming = [(OPENED, WATCH), *((OPENED + t, doing) for t, doing in doings)]
+    coming: list[tuple[float, str | bytes]] = [(OPENED, watch), *((OPENED + t, doing) for t, doing in doings)]
     now = OPENED
     while now < OPENED + seconds:
         due = wakes(session)
@@ -75,11 +80,15 @@ def recorded(
             if isinstance(effect, Speak):
                 answers.append((now + 0.2, effect))
             elif isinstance(effect, Send) and isinstance(effect.data, bytes):
-                number = HEADER.unpack_from(effect.data)[3]
-                frames[number] = np.frombuffer(effect.data, "<i4", offset=HEADER.size)
+                got.append(effect.data)
     session.disconnect(1, now)
     session.notes.end()
-    return read_record(folder), frames
+    return read_record(folder), got
+
+
+def faps(got: list[bytes]) -> dict[int, Int32]:
+    """Frame -> (68,) its FAPs."""
+    return {unpack(one).frame: np.frombuffer(unpack(one).payload, "<i4") for one in got}
 
 
 def some(random: Random, seconds: float) -> list[tuple[float, str]]:
@@ -114,7 +123,8 @@ def some(random: Random, seconds: float) -> list[tuple[float, str]]:
 @pytest.mark.parametrize("seed", range(8))
 def test_every_frame_is_as_it_was_got_though_the_session_was_woken_late(seed: int, tmp_path: Path) -> None:
     random = Random(seed)
-    record, live = recorded(tmp_path, some(random, 6.0), 8.0, random if seed % 2 else None)
+    record, got = recorded(tmp_path, some(random, 6.0), 8.0, random if seed % 2 else None)
+    live = faps(got)
     again = played(record)[0].faps.integers()
     assert len(live) > 190
     for number, row in live.items():
@@ -133,6 +143,31 @@ def test_an_output_lasts_until_the_record_ends_and_what_is_held_has_come_to_stan
     assert brow[-1] < 0.05
 
 
+def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> None:
+    rate = 8000
+    pcm = np.random.default_rng(1).integers(-9000, 9000, 3 * rate).astype("<i2")
+    clip = pack_clip(ClipPiece("c", 0, rate, pcm.tobytes(), final=True))
+    says = (
+        '<bml xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt" id="b{}" composition="REPLACE"><speech id="s">'
+        '<text>Hello</text><description priority="1" type="audio/x-clip"><bmlt:audiofile fileName="clip:c"/>'
+        "</description></speech></bml>"
+    )
+    doings = [(0.1, clip), (0.2, says.format(1)), (1.31, says.format(2)), (2.77, '{"type": "stop"}')]
+    hear = json.dumps({"type": "subscribe", "stream": "audio", "rate": rate})
+    record, got = recorded(tmp_path, doings, 4.0, watch=hear)
+    again = played(record)[0].sound(rate)
+    live = np.zeros_like(again)
+    for packet in map(unpack, got):
+        first = packet.frame * rate // 50
+        if packet.forget:
+            live[first:] = 0
+        else:
+            live[first : first + rate // 50] = np.frombuffer(packet.payload, "<i2")
+    assert len(again) == 4 * rate
+    assert 2.4 < np.count_nonzero(again) / rate < 2.7
+    assert np.array_equal(again, live)
+
+
 def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
     doings = [(at, setting(faps={"open_jaw": value})) for at, value in ((0.5, 100), (1.5, None), (2.5, 60))]
     record, _ = recorded(tmp_path, doings, 3.5)
@@ -142,10 +177,10 @@ def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
 
 def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> None:
     doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
-    record, live = recorded(tmp_path, doings, 2.0)
+    record, got = recorded(tmp_path, doings, 2.0)
     realization, _ = played(record)
     again = realization.faps.integers()
-    assert all(np.array_equal(again[number], row) for number, row in live.items())
+    assert all(np.array_equal(again[number], row) for number, row in faps(got).items())
     (_, before), (changed, after) = realization.faces
     assert (before.face_name, changed, after.face_name) == ("ada", 26, "ben")
     assert (before.frames, after.frames) == (26, realization.frames - 26)
