@@ -37,6 +37,7 @@ class Cluster:
                 "--dask needs Dask distributed: pip install 'bml-realizer[cluster]'"
             ) from None
         self.options = options
+        self._address = address
         try:
             # Its functions have no types.
             self._dask: Any = distributed
@@ -45,7 +46,11 @@ class Cluster:
             raise RealizerError(f"--dask {address}: wanted a Dask scheduler there: {error}") from None
 
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """The outcome of each task, as they come."""
+        """The outcome of each task, as they come.
+
+        Raises:
+            RealizerError: the scheduler is gone.
+        """
         source = iter(tasks)
         waiting: dict[Any, Task] = {}
 
@@ -61,6 +66,11 @@ class Cluster:
         )
         for future in completed:
             task = waiting.pop(future)
+            if future.cancelled():  # nobody else does that
+                raise RealizerError(
+                    f"--dask {self._address}: the scheduler went away; the same command plays what is left, "
+                    "where one is there again"
+                )
             error = future.exception()
             outcome = future.result() if error is None else failed(task, f"{type(error).__name__}: {error}")
             future.release()

@@ -81,6 +81,23 @@ def test_a_cluster_gives_what_one_worker_gives_here_though_one_of_its_workers_is
     assert by_name(got) == expected
 
 
+def test_a_scheduler_that_is_killed_is_told_in_words(tasks: list[Task], options: Options) -> None:
+    scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0")
+
+    def given() -> Iterator[Task]:
+        yield tasks[0]
+        scheduler.kill()
+        scheduler.communicate()
+        yield from tasks[1:]
+
+    crew = Cluster(options, said(scheduler, "Scheduler at:").split()[-1])
+    try:
+        with pytest.raises(RealizerError, match="the scheduler went away"):
+            list(crew.perform(given()))
+    finally:
+        crew.close()
+
+
 def test_an_address_without_a_scheduler_is_told(options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.batch.cluster.PATIENCE", 0.2)
     with pytest.raises(RealizerError, match="wanted a Dask scheduler there"):
