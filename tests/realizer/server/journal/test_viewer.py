@@ -152,7 +152,12 @@ def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> Non
         '<text>Hello</text><description priority="1" type="audio/x-clip"><bmlt:audiofile fileName="clip:c"/>'
         "</description></speech></bml>"
     )
-    doings = [(0.1, clip), (0.2, says.format(1)), (1.31, says.format(2)), (2.77, '{"type": "stop"}')]
+    doings: list[tuple[float, str | bytes]] = [
+        (0.1, clip),
+        (0.2, says.format(1)),
+        (1.31, says.format(2)),
+        (2.77, '{"type": "stop"}'),
+    ]
     hear = json.dumps({"type": "subscribe", "stream": "audio", "rate": rate})
     record, got = recorded(tmp_path, doings, 4.0, watch=hear)
     again = played(record)[0].sound(rate)
