@@ -8,11 +8,11 @@ first phoneme.
 
 from __future__ import annotations
 
+import argparse
 import random
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from stopwatch import helped
 
 from realizer.arrays import Float64
 from realizer.speech import EspeakVoice, Say
@@ -105,7 +105,8 @@ def _reported(voice: EspeakVoice, text: str, language: str) -> tuple[dict[int, f
 
 
 def main() -> None:
-    helped(__doc__)
+    form = argparse.RawDescriptionHelpFormatter
+    argparse.ArgumentParser(description=__doc__, formatter_class=form).parse_args()
     voice = EspeakVoice()
     try:
         found = list(errors(voice, PLACEMENTS))
