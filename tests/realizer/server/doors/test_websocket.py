@@ -20,6 +20,7 @@ from websockets.exceptions import InvalidStatus
 from realizer.server.serve import Server
 from realizer.server.wire import FrameKind, unpack
 from realizer.settings import Settings
+from tests.benchmarks.packets import masked
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.3"/></bml>'
 LIMIT = 60  # s; a hung test ends
@@ -155,14 +156,6 @@ def deaf(server: Server) -> sockets.socket:
         b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
     )
     return raw
-
-
-def masked(text: str) -> bytes:
-    """One text message as a client sends it, with a mask of zeros."""
-    body = text.encode()
-    length = len(body)
-    head = bytes([0x80 | length]) if length < 126 else b"\xfe" + length.to_bytes(2, "big")
-    return b"\x81" + head + bytes(4) + body
 
 
 def test_a_viewer_that_never_reads_loses_frames_and_the_others_none() -> None:
