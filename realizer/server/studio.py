@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from realizer.errors import RealizerError, RenderError, VoiceError
@@ -26,6 +26,16 @@ RENDERERS = 6
 IDLE = 5.0  # s
 
 
+@dataclass(slots=True)
+class _Place:
+    """A renderer, how many draw with it just now, and when one last did."""
+
+    renderer: Renderer
+    used: float
+    busy: int = 0
+    begun: bool = False
+
+
 class Studio:
     """The engines. `speakers` and `drawers` are the threads that may call `speak` and `draw`.
 
@@ -42,8 +52,8 @@ class Studio:
         # And a process that starts must not hold up the pictures of all others.
         self.drawers = ThreadPoolExecutor(2, "renderer")
         self._voices: dict[str | None, Voice] = {}
-        # (face, look) -> its renderer and when it was last asked, the longest ago first.
-        self._renderers: dict[tuple[str, Look], tuple[Renderer, float]] = {}
+        self._places: dict[tuple[str, Look], _Place] = {}
+        self._begun = clock()  # when one last had started: all the others waited for their turn until then
         self._lock = threading.Lock()
         self._said: set[str] = set()
 
@@ -62,12 +72,15 @@ class Studio:
     def draw(self, order: Draw) -> bytes | RealizerError:
         """Bytes of the picture; or why there are none."""
         try:
-            look = order.look
+            place, look = self._place(order), order.look
             try:
-                return self._renderer(order).encoded(order.pose, look.form, look.quality)
-            except RenderError:
-                # A drawing process that died is started anew by the next call; one that cannot fails again.
-                return self._renderer(order).encoded(order.pose, look.form, look.quality)
+                try:
+                    return place.renderer.encoded(order.pose, look.form, look.quality)
+                except RenderError:
+                    # A process that died is started anew by the next call; one that cannot fails again.
+                    return place.renderer.encoded(order.pose, look.form, look.quality)
+            finally:
+                self._leave(place)
         except RealizerError as error:
             return error
         except Exception as error:
@@ -79,8 +92,8 @@ class Studio:
         self.drawers.shutdown(wait=False, cancel_futures=True)
         for voice in self._voices.values():
             voice.close()
-        for renderer, _ in self._renderers.values():
-            renderer.close()
+        for place in self._places.values():
+            place.renderer.close()
 
     def _voice(self, name: str | None) -> Voice:
         from realizer.speech import find_voice
@@ -90,8 +103,8 @@ class Studio:
                 self._voices[name] = find_voice(name)
             return self._voices[name]
 
-    def _renderer(self, order: Draw) -> Renderer:
-        """The renderer of a face and a look.
+    def _place(self, order: Draw) -> _Place:
+        """The renderer of a face and a look, until `_leave`.
 
         Raises:
             RenderError: there are too many that somebody looks at.
@@ -99,30 +112,54 @@ class Studio:
         from realizer.render import Renderer
 
         look = replace(order.look, quality=0, form="jpeg")  # which need no other process
-        key, now, left = (order.face, look), self._clock(), None
+        key, left = (order.face, look), None
         with self._lock:
-            renderer, _ = self._renderers.pop(key, (None, now))
-            if renderer is None:
-                if len(self._renderers) >= RENDERERS:
-                    oldest, (_, used) = next(iter(self._renderers.items()))
-                    if now - used < IDLE:
-                        raise RenderError(
-                            f"{RENDERERS} different pictures (face, size, camera, light, background) are "
-                            "drawn already: wanted one of them, or fewer"
-                        )
-                    left, _ = self._renderers.pop(oldest)
-                renderer = Renderer(
-                    order.face,
-                    look.size,
-                    look.camera,
-                    light=look.light,
-                    background=look.background,
-                    deformer=self._deformer,
+            now = self._clock()
+            place = self._places.get(key)
+            if place is None:
+                if len(self._places) >= RENDERERS:
+                    left = self._places.pop(self._unseen(now))
+                place = self._places[key] = _Place(
+                    Renderer(
+                        order.face,
+                        look.size,
+                        look.camera,
+                        light=look.light,
+                        background=look.background,
+                        deformer=self._deformer,
+                    ),
+                    now,
                 )
-            self._renderers[key] = (renderer, now)
+            place.busy += 1
+            place.used = now
         if left is not None:
-            left.close()
-        return renderer
+            left.renderer.close()
+        return place
+
+    def _unseen(self, now: float) -> tuple[str, Look]:
+        """Of what nobody has looked at for a while, that of the longest ago.
+
+        Raises:
+            RenderError: somebody looks at all of them.
+        """
+        unseen = [
+            (place.used, key)
+            for key, place in self._places.items()
+            if not place.busy and now - max(place.used, self._begun) >= IDLE
+        ]
+        if not unseen:
+            raise RenderError(
+                f"{RENDERERS} different pictures (face, size, camera, light, background) are "
+                "drawn already: wanted one of them, or fewer"
+            )
+        return min(unseen, key=lambda one: one[0])[1]
+
+    def _leave(self, place: _Place) -> None:
+        with self._lock:
+            place.busy -= 1
+            place.used = self._clock()
+            if not place.begun:
+                place.begun, self._begun = True, place.used
 
     def _tell(self, fault: str) -> None:
         if fault not in self._said:

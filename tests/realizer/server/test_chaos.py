@@ -132,9 +132,9 @@ def test_a_renderer_that_is_killed_is_started_again_and_pictures_go_on() -> None
         async with connect(server.url, max_queue=None) as client:
             await client.send('{"type":"subscribe","stream":"video","size":[32,32],"fps":5}')
             times = [await picture(client)]
-            ((renderer, _),) = server._shell._studio._renderers.values()
-            assert renderer.pid is not None
-            os.kill(renderer.pid, signal.SIGKILL)
+            (place,) = server._shell._studio._places.values()
+            assert place.renderer.pid is not None
+            os.kill(place.renderer.pid, signal.SIGKILL)
             times += [await picture(client) for _ in range(3)]
             assert times == sorted(set(times))
             await plays(client, "b")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,9 +19,13 @@ from realizer.server.studio import IDLE, Studio
 @dataclass
 class Clock:
     now: float = 0.0
+    asked: threading.Event | None = None  # is set when somebody asks
 
     def __call__(self) -> float:
-        return self.now
+        now = self.now
+        if self.asked is not None:
+            self.asked.set()
+        return now
 
 
 @pytest.fixture
@@ -64,6 +69,39 @@ def test_one_kind_of_picture_too_many_is_refused_and_the_others_are_drawn(
     clock.now = IDLE + 0.5
     assert width(studio.draw(order(99))) == 99
     assert isinstance(studio.draw(order(16)), RenderError)
+
+
+@pytest.mark.gl
+def test_a_renderer_that_takes_long_to_start_is_not_ended_for_another_one(
+    studio, clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("realizer.server.studio.RENDERERS", 2)
+    assert width(studio.draw(order(16))) == 16
+    begins = clock.asked = threading.Event()
+    starting = studio.drawers.submit(studio.draw, order(17))
+    assert begins.wait(60)
+    clock.now = IDLE + 1.0
+    clock.asked = None
+    assert width(starting.result(60)) == 17
+    # Who looks at the first one waited for the second one to start, for longer than otherwise counts.
+    assert isinstance(studio.draw(order(99)), RenderError)
+    assert width(studio.draw(order(16))) == 16
+    clock.now += IDLE
+    assert width(studio.draw(order(99))) == 99
+
+
+@pytest.mark.gl
+def test_a_renderer_that_draws_is_not_ended_for_another_one(
+    studio, clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("realizer.server.studio.RENDERERS", 1)
+    begins = clock.asked = threading.Event()
+    drawing = studio.drawers.submit(studio.draw, order(16))
+    assert begins.wait(60)
+    clock.asked = None
+    clock.now = 2 * IDLE
+    assert isinstance(studio.draw(order(99)), RenderError)
+    assert width(drawing.result(60)) == 16
 
 
 @pytest.mark.gl
