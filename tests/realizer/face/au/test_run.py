@@ -128,8 +128,8 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
 
 def test_a_session_draws_as_the_service_was_told(faces: dict[str, Face]) -> None:
     session = Session("s", Settings(deformer="au"), 0.0)
-    assert session.face(0).takes == faces["au"].takes
-    assert Session("s", Settings(), 0.0).face(0).takes == faces["mpeg4"].takes
+    assert session.faces.of(0).takes == faces["au"].takes
+    assert Session("s", Settings(), 0.0).faces.of(0).takes == faces["mpeg4"].takes
 
 
 @pytest.fixture(scope="module")
