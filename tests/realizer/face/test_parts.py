@@ -19,7 +19,8 @@ def opened(face: Face) -> np.ndarray:
     pose = np.zeros((1, 68), np.float32)
     for fap, value in WIDE.items():
         pose[0, fap - 1] = value
-    return deform(face, pose)[0]
+    shape: np.ndarray = deform(face, pose)[0]
+    return shape
 
 
 @pytest.mark.parametrize("name", ["upper_teeth", "lower_teeth"])
