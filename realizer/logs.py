@@ -8,7 +8,7 @@ import sys
 from datetime import UTC, datetime
 from typing import TextIO
 
-__all__ = ["JsonFormatter", "write_json"]
+__all__ = ["JsonFormatter", "write_json", "write_words"]
 
 # What every record has; the rest of its attributes was given by `extra`.
 USUAL = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
@@ -29,6 +29,12 @@ class JsonFormatter(logging.Formatter):
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False, default=str)
+
+
+def write_words(level: int, who: str = "") -> None:
+    """Let all logs from `level` on be lines for a reader, on standard error; `who` stands before each."""
+    logging.basicConfig(format=f"realizer: {who}%(message)s", stream=sys.stderr)
+    logging.getLogger().setLevel(level)
 
 
 def write_json(stream: TextIO | None = None) -> None:

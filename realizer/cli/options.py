@@ -249,10 +249,11 @@ def speak_up(context: click.Context, *, quiet: bool = False, verbose: bool = Fal
     """Say as much on standard error as was asked for, before or after the command's name."""
     import logging
 
+    from realizer.logs import write_words
+
     context.obj = {"quiet": quiet, "verbose": verbose}
     level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
-    logging.basicConfig(format="realizer: %(message)s", stream=sys.stderr)
-    logging.getLogger().setLevel(level)
+    write_words(level)
     # Long films say how far they are.
     logging.getLogger("realizer.outputs").setLevel(logging.ERROR if quiet else logging.INFO)
 

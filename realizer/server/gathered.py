@@ -86,7 +86,7 @@ async def gathered(
             async with asyncio.timeout(HASTE if path == "/healthz" else PATIENCE):
                 return await _asked(request, number, give)
         except (OSError, TimeoutError) as error:
-            log.warning("worker %d tells nothing for %s: %s", number, path, error or "it takes too long")
+            log.warning("worker %d tells nothing for %s: %s", number, path, str(error) or "it takes too long")
             return None
 
     answers = await asyncio.gather(*map(ask, range(workers)))

@@ -21,6 +21,7 @@ from multiprocessing.process import BaseProcess
 from urllib.parse import parse_qs
 
 from realizer.errors import RealizerError
+from realizer.logs import write_words
 from realizer.server.gathered import gathered, is_for_all
 from realizer.settings import Settings
 
@@ -30,6 +31,8 @@ log = logging.getLogger(__name__)
 
 # A request's first line must have come by then, and be no longer.
 PATIENCE, LONGEST = 10.0, 8192  # s, bytes
+# How long a worker is waited for that should have ended: then it hangs.
+GRACE = 5.0  # s
 # How long a worker that is full is waited for, and how often a request that is not whole is looked at.
 STEP = 0.005  # s
 # What a worker says when its doors are open; and, before the words, when they cannot be.
@@ -114,14 +117,19 @@ class Workers:
                 child.terminate()
 
     async def close(self) -> None:
-        """`end`, and wait for the workers."""
+        """`end`, and wait for the workers; one that hangs is killed."""
         self.end()
         for task in self._tasks:
             task.cancel()
         loop = asyncio.get_running_loop()
-        for child, control in self._children:
+        last = loop.time() + self._settings.drain + GRACE
+        for number, (child, control) in enumerate(self._children):
             control.close()  # a worker that is still starting ends by that
-            await loop.run_in_executor(None, child.join)
+            await loop.run_in_executor(None, child.join, max(0.0, last - loop.time()))
+            if child.is_alive():
+                log.error("worker %d does not end: it is killed", number)
+                child.kill()
+                await loop.run_in_executor(None, child.join)
 
     # inside -------------------------------------------------------------------------------------
 
@@ -133,7 +141,9 @@ class Workers:
     def _begin(self, number: int) -> tuple[BaseProcess, socket.socket]:
         ours, theirs = socket.socketpair()
         child = multiprocessing.get_context("spawn").Process(
-            target=_work, args=(self._settings, number, self.port, theirs), name=f"worker-{number}"
+            target=_work,
+            args=(self._settings, number, self.port, theirs, logging.getLogger().level),
+            name=f"worker-{number}",
         )
         child.start()
         theirs.close()
@@ -241,10 +251,11 @@ def handed(control: socket.socket) -> list[socket.socket]:
     return sockets
 
 
-def _work(settings: Settings, number: int, port: int, control: socket.socket) -> None:
-    """A worker, in its own process."""
+def _work(settings: Settings, number: int, port: int, control: socket.socket, level: int) -> None:
+    """A worker, in its own process; it says as much as its parent."""
     from realizer.server.serve import run, work
 
+    write_words(level, f"worker {number}: ")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends us, also from a terminal
     if number:  # doors that have a port or a broker of their own are open once
         settings = replace(settings, asap_ports=None, xface_port=None, xface_player=None, stomp=None)

@@ -299,6 +299,38 @@ def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
         assert service.wait(LIMIT) == 0
 
 
+def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("realizer.server.workers.GRACE", 0.2)
+
+    async def test() -> None:
+        service = await Workers(Settings(port=0, voice="silent", workers=2, drain=0.0)).start()
+        children = service.processes
+        os.kill(children[1], signal.SIGSTOP)
+        await service.close()
+        for child in children:
+            with pytest.raises(ProcessLookupError):
+                os.kill(child, 0)
+
+    played(test())
+    assert "worker 1 does not end: it is killed" in caplog.text
+
+
+def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> None:
+    command = [sys.executable, "-m", "realizer", "-v", "serve", "--port", "0", "--voice", "silent"]
+    command += ["--workers", "2", "--token", "a-token-nobody-knows"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        page = service.stdout.readline() and service.stdout.readline().split()[2]
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(page + "metrics?worker=1", timeout=LIMIT)
+        refused.value.close()
+        service.send_signal(signal.SIGTERM)
+        _, logged = service.communicate(timeout=LIMIT)
+    assert any(line.startswith("realizer: worker 1: ") and "token" in line for line in logged.splitlines())
+
+
 def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
