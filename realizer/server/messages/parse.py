@@ -120,9 +120,25 @@ def parse_control(text: str) -> Control | ErrorMessage:
     try:
         return _ADAPTER.validate_python(message)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        return ErrorMessage(code="invalid", message=_said(first), where=where)
+        errors = error.errors(include_url=False)
+        where = _where(errors[0], message)
+        same = [other for other in errors if _where(other, message) == where]
+        return ErrorMessage(code="invalid", message=_said(same), where=where)
+
+
+def _where(error: ErrorDetails, message: object) -> str:
+    """The path to what is wrong, without the names of the types that it could have had."""
+    kind, *parts = error["loc"]
+    path, value = [str(kind)], message
+    for part in parts:
+        if isinstance(value, list) and isinstance(part, int):
+            value = value[part] if part < len(value) else None
+        elif isinstance(value, dict) and part in value:
+            value = value[part]
+        elif error["type"] != "missing" or part != parts[-1]:
+            continue
+        path.append(str(part))
+    return ".".join(path)
 
 
 def _is_text(message: object) -> bool:
@@ -134,13 +150,14 @@ def _is_text(message: object) -> bool:
     return True
 
 
-def _said(error: ErrorDetails) -> str:
-    """What was wanted and what came."""
-    kind, context = error["type"], error.get("ctx", {})
-    got = "nothing" if kind == "missing" else _short(error["input"])
-    if kind in _WANTED:
-        return f"wanted {_WANTED[kind].format(**context)}; got {got}"
-    return f"{error['msg'].removeprefix('Value error, ')}; got {got}"
+def _said(errors: list[ErrorDetails]) -> str:
+    """What was wanted, one or the other, and what came."""
+    first = errors[0]
+    got = "nothing" if first["type"] == "missing" else _short(first["input"])
+    if first["type"] not in _WANTED:
+        return f"{first['msg'].removeprefix('Value error, ')}; got {got}"
+    wanted = [_WANTED[e["type"]].format(**e.get("ctx", {})) for e in errors if e["type"] in _WANTED]
+    return f"wanted {' or '.join(dict.fromkeys(wanted))}; got {got}"
 
 
 def _short(value: object) -> str:

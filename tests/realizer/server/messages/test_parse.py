@@ -46,6 +46,8 @@ def test_every_supported_type_is_understood() -> None:
         ("{" * 100_000, "bad-json", None, "JSON object"),
         ('{"a":' * 50_000, "bad-json", None, "nested too deeply"),
         (r'{"type":"ping","id":"\ud800"}', "bad-json", None, "half a character"),
+        ('{"type":"ping","id":{"a":[1]}}', "invalid", "ping.id", "wanted a whole number or a string; got"),
+        ('{"type":"scene","objects":{"c":{"x":1,"y":0}}}', "invalid", "scene.objects.c.z", "wanted a value"),
         (r'{"type":"ping","\uDFFF":1}', "bad-json", None, "half a character"),
         ("{}", "unsupported", "type", "hello, subscribe"),
         ('{"type":"dance"}', "unsupported", "type", '"dance"'),
