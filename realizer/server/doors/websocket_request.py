@@ -17,8 +17,11 @@ __all__: list[str] = []
 
 
 def address_of(socket: ServerConnection) -> str:
-    """Without the port; "" where the socket has none."""
-    remote = socket.remote_address
+    """Without the port; "" where the socket has none, or has none any more."""
+    try:
+        remote = socket.remote_address
+    except (AttributeError, OSError):  # uvloop asks the socket, which is gone where its client has reset it
+        return ""
     return str(remote[0]) if isinstance(remote, tuple) else ""
 
 

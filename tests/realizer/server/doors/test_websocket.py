@@ -5,10 +5,16 @@ from __future__ import annotations
 import asyncio
 import io
 import json
+import signal
 import socket as sockets
+import struct
+import subprocess
+import sys
+import urllib.request
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -293,3 +299,22 @@ def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
                 group.create_task(one(number))
 
     serving(test)
+
+
+def test_one_who_asks_and_resets_the_connection_leaves_no_traceback() -> None:
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        port = urlsplit(service.stdout.readline().split()[2]).port
+        for _ in range(20):
+            with sockets.create_connection(("127.0.0.1", port)) as client:
+                client.setsockopt(sockets.SOL_SOCKET, sockets.SO_LINGER, struct.pack("ii", 1, 0))
+                client.sendall(
+                    b"GET /ws HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                    b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+                )
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=20) as answer:
+            assert answer.status == 200
+        service.send_signal(signal.SIGTERM)
+        _, logged = service.communicate(timeout=20)
+    assert not logged
