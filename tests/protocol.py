@@ -65,7 +65,7 @@ BML = (
 )
 FEEDBACK = (
     "One element of BML 1.0 feedback a message, with an attribute `seq` (1, 2, ...) in the namespace "
-    "urn:bml-realizer:1."
+    "urn:bml-realizer:1; a warning that documents could not be kept, or came too late, has none."
 )
 HEADER = (
     f"Little-endian: u8 kind, u8 version ({VERSION}), u16 flags, u32 frame, f64 time in seconds on the "
