@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import Any
@@ -11,6 +12,8 @@ from realizer.batch.work import Outcome, failed, perform
 from realizer.errors import RealizerError
 
 __all__ = ["Cluster"]
+
+log = logging.getLogger(__name__)
 
 AHEAD = 4  # tasks a worker has waiting, so that it never waits for us; their outcomes must fit in memory
 PATIENCE = 20.0  # s to find the scheduler
@@ -61,6 +64,8 @@ class Cluster:
             return future
 
         threads = sum(self._client.nthreads().values())
+        if not threads:
+            log.warning("--dask %s: it has no worker yet, one is waited for", self._address)
         completed = self._dask.as_completed(
             [submit(task) for task in islice(source, AHEAD * max(1, threads))]
         )

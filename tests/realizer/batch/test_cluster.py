@@ -102,3 +102,12 @@ def test_an_address_without_a_scheduler_is_told(options: Options, monkeypatch: p
     monkeypatch.setattr("realizer.batch.cluster.PATIENCE", 0.2)
     with pytest.raises(RealizerError, match="wanted a Dask scheduler there"):
         Cluster(options, "tcp://127.0.0.1:9")
+
+
+def test_who_waits_for_the_first_worker_is_told(
+    scheduler: str, options: Options, caplog: pytest.LogCaptureFixture
+) -> None:
+    cluster = Cluster(options, scheduler)
+    assert list(cluster.perform([])) == []
+    cluster.close()
+    assert f"--dask {scheduler}: it has no worker yet" in caplog.text
