@@ -2,55 +2,39 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from bml_schema import WarningFeedback
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Position
 from realizer.errors import RealizerError
 from realizer.player import Player
 from realizer.server.broadcast import Broadcast
-from realizer.server.clips import ClipError, Clips
+from realizer.server.clips import Clips
 from realizer.server.connection import STUCK, Connection, PictureSubscription, Subscription, View
-from realizer.server.control import follow
 from realizer.server.effects import Close, Effect, Move, Send
 from realizer.server.faces import Faces
 from realizer.server.feedback_log import FeedbackLog
 from realizer.server.greeting import greeting
-from realizer.server.inbox import name_of
 from realizer.server.intake import Intake
-from realizer.server.journal import JournalError, Lost
+from realizer.server.journal import Lost
 from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.notes import Notes
 from realizer.server.limits import too_long
-from realizer.server.messages import (
-    ErrorMessage,
-    Gap,
-    Hello,
-    Ping,
-    StateQuery,
-    Subscribe,
-    Unsubscribe,
-    parse_control,
-)
+from realizer.server.messages import ErrorMessage, Gap
+from realizer.server.reception import take
 from realizer.server.rhythm import Rhythm
 from realizer.server.run import Run
 from realizer.server.streams import EPSILON
 from realizer.server.telling import Telling
-from realizer.server.wire import WireError, unpack_clip
 from realizer.settings import Settings
 from realizer.speech.utterance import Utterance
 
 __all__ = ["Session"]
 
 log = logging.getLogger(__name__)
-
-# Messages that change nothing for others, nor for who comes later.
-PASSING = (Hello, Ping, StateQuery, Subscribe, Unsubscribe)
 
 
 class Session:
@@ -131,7 +115,7 @@ class Session:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
         self._rhythm.stir()
         self._connections[connection] = Connection(connection, self.log.newest + 1)
-        if not self._tell(now - self.opened, "join", connection):
+        if not self.note(now - self.opened, "join", connection):
             return
         self.empty_since = None
         if seen is not None:
@@ -140,7 +124,7 @@ class Session:
     def disconnect(self, connection: int, now: float) -> None:
         """A client is gone. A session nobody named ends with it."""
         if self._connections.pop(connection, None) is not None:
-            self._tell(now - self.opened, "leave", connection)
+            self.note(now - self.opened, "leave", connection)
         self.intake.speeches.leave(connection)
         self._rhythm.unsettled = True
         self._rhythm.stir()
@@ -196,57 +180,11 @@ class Session:
         self._effects += self.broadcast.frames_due(t)[0]
         if self.notes.grown and not self._compact(t):
             return
-        kept = False
-        if isinstance(message, bytes):
-            if kept := self._keep(t, "sound", connection, message):
-                self._take_clip(connection, message)
-        elif message.lstrip("\ufeff \t\r\n").startswith("{"):
-            control = parse_control(message.lstrip("\ufeff \t\r\n"))
-            if isinstance(control, ErrorMessage):
-                self.reply(connection, control)
-            elif isinstance(control, PASSING):
-                known = self.player.characters
-                follow(self, self._connections[connection], control, t)
-                for name in self.player.characters:
-                    if name not in known:  # who is named first is who moves where nobody is named
-                        self._tell(t, "text", connection, json.dumps({"type": "character", "id": name}))
-            elif kept := self._keep(t, "text", connection, message):
-                follow(self, self._connections[connection], control, t)
-        elif self.ending:
-            self._refuse(message, "the service is ending and takes no more documents")
-        elif kept := self._keep(t, "text", connection, message):
-            self.intake.put(message, t)
+        kept = take(self, self._connections[connection], message, t)
         if not self.closed and self._work(t) and not kept:
-            self._tell(t, "tick")
+            self.note(t, "tick")
 
-    def _keep(self, t: float, kind: Kind, connection: int, message: str | bytes) -> bool:
-        """Write a message into the journal; where that cannot be it is not taken, and its client is told."""
-        try:
-            self.notes.keep(t, kind, connection, message)
-        except Lost as error:
-            self.lose(error)
-            return False
-        except JournalError as error:
-            log.error("session %s: %s", self.id, error)
-            words = f"this could not be kept, so it is not taken: {error}"
-            if isinstance(message, str) and message.lstrip("\ufeff \t\r\n").startswith("<"):
-                self._refuse(message, words)
-            else:
-                self.reply(connection, ErrorMessage(code="journal", message=words))
-            return False
-        return True
-
-    def _refuse(self, message: str, words: str) -> None:
-        """Tell at once that documents are not taken, without a number.
-
-        They are not in the journal: who goes on with the session from there would number all else otherwise.
-        """
-        told = WarningFeedback(id=name_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words).to_xml()
-        for one in self._connections.values():
-            if one.feedback is not None and one.feedback.takes(told):
-                self._effects.append(Send(one.id, told))
-
-    def _tell(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
+    def note(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
         """Write into the journal what has happened; False where the session is another process's now."""
         try:
             self.notes.tell(t, kind, number, body)
@@ -271,14 +209,6 @@ class Session:
         self.close()
         self._effects = closing
 
-    def _take_clip(self, connection: int, message: bytes) -> None:
-        try:
-            self.clips.take(unpack_clip(message))
-        except WireError as error:
-            self.reply(connection, ErrorMessage(code="unsupported", message=str(error)))
-        except ClipError as error:
-            self.reply(connection, ErrorMessage(code="clip", message=str(error), where=error.where))
-
     def spoken(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
         """The voice's answer to a Speak. Where it failed, the silent voice takes over."""
         if self.closed:
@@ -286,7 +216,7 @@ class Session:
         t = now - self.opened
         self._publish(t)
         self._effects += self.broadcast.frames_due(t)[0]
-        if self._tell(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
+        if self.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.intake.orders.answer(speak, result, t)
             self._work(t)
 
@@ -315,7 +245,7 @@ class Session:
         """
         t = now - self.opened
         if not self.closed and self._work(t, reads):
-            self._tell(t, "tick")
+            self.note(t, "tick")
 
     def frames(self, now: float) -> tuple[list[Effect], float] | None:
         """These, and feedback, and the `next_due` after them where nothing else is due.
@@ -410,6 +340,12 @@ class Session:
         """Tell all that is due to everybody who has not switched it off."""
         self._effects += self.telling.publish(t, self._connections.values())
 
+    def tell(self, feedback: str) -> None:
+        """Send everybody who takes it feedback that has no number: nobody who comes back gets it again."""
+        for one in self._connections.values():
+            if one.feedback is not None and one.feedback.takes(feedback):
+                self._effects.append(Send(one.id, feedback))
+
     def resume(self, connection: int, seen: int) -> None:
         """Send what followed `seen`, after a `gap` where some of it is gone or was never there."""
         first = self.log.first
@@ -429,4 +365,5 @@ class Session:
         self._effects.append(Move(connection, session, seen))
 
     def reply(self, connection: int, reply: Any) -> None:
-        self._effects.append(Send(connection, reply.text()))
+        if not self.closed:
+            self._effects.append(Send(connection, reply.text()))

@@ -160,7 +160,7 @@ def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
     if request.param == "pages":
 
         def pages(server: Server, most: int) -> None:
-            file = server._shell._journal._file  # type: ignore[union-attr]
+            file = server._shell._origin.journal._file  # type: ignore[union-attr]
             (used,) = file.execute("PRAGMA page_count").fetchone()
             file.execute(f"PRAGMA max_page_count = {most or used}")
 
