@@ -110,7 +110,7 @@ class Client:
             id: of the block that others can name; the syncs of its text are `ID:ID:sync` there.
             opening: composition, character, language of the message `speech`.
         """
-        speech = Speech(id, self.control, self._wait, opening)
+        speech = Speech(id, self.control, self._wait, self._check, opening)
         self._mail.follow(speech.heard)
         try:
             yield speech
@@ -210,4 +210,8 @@ class Client:
         async with self._news:
             await self._news.wait_for(lambda: there() or self._ended)
         if not there():
+            self._check()
+
+    def _check(self) -> None:
+        if self._ended:
             raise ClientError("the connection has ended" + (f": {self._why}" if self._why else ""))

@@ -97,6 +97,7 @@ class Speech:
     Args:
         control: sends a control message.
         wait: until something is so.
+        check: raises a ClientError where the connection has ended.
         opening: fields of its first message.
     """
 
@@ -105,12 +106,14 @@ class Speech:
         id: str,
         control: Callable[..., Awaitable[None]],
         wait: Callable[[Callable[[], bool]], Awaitable[None]],
+        check: Callable[[], None],
         opening: dict[str, Any],
     ) -> None:
         self.id = id
         self.heard = Heard(id)
         self._control = control
         self._wait = wait
+        self._check = check
         self._opening = opening
         self._unsent = ""
         self._closed = False
@@ -127,6 +130,7 @@ class Speech:
                 ended before it was whole. Or this connection has ended.
         """
         self.heard.check()
+        self._check()  # what waits for its turn would be lost in silence
         if self._closed:
             raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
         self._unsent += text
