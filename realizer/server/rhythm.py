@@ -13,8 +13,6 @@ from realizer.server.streams import EPSILON
 
 __all__: list[str] = []
 
-INFINITE = float("inf")
-
 
 class Rhythm:
     """Times are seconds on the session clock.

@@ -9,8 +9,8 @@ import json
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -258,6 +258,14 @@ def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
         asyncio.run(test(one, other))
 
 
+@asynccontextmanager
+async def two_that_share(where: str) -> AsyncIterator[tuple[Server, Server]]:
+    """Two services with one journal, for so long at most."""
+    settings = Settings(port=0, voice="silent", journal=where)
+    async with asyncio.timeout(LIMIT), Server(settings) as one, Server(settings) as other:
+        yield one, other
+
+
 async def held(client: ClientConnection) -> float:
     """How far AU 12L is held."""
     await client.send('{"type": "state"}')
@@ -272,11 +280,8 @@ def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_i
     monkeypatch.setattr(websocket_client, "GOODBYE", LIMIT)
 
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", journal=where)
         async with (
-            asyncio.timeout(LIMIT),
-            Server(settings) as one,
-            Server(settings) as other,
+            two_that_share(where) as (one, other),
             connect(f"{one.url}?session=deaf") as deaf,
         ):
             deaf.transport.pause_reading()  # it does not hear that it is let go of
@@ -299,11 +304,8 @@ def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_
     monkeypatch.setattr(shell, "SWEEP", 0.05)
 
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", journal=where)
         async with (
-            asyncio.timeout(LIMIT),
-            Server(settings) as one,
-            Server(settings) as other,
+            two_that_share(where) as (one, other),
             connect(f"{one.url}?session=seen") as watching,
             connect(f"{one.url}?session=stays") as stays,
         ):
