@@ -177,7 +177,7 @@ class Hub:
                 try:
                     there = self.open(effect.connection, effect.session, now, visitor=visitor)
                 except HubError as error:  # it cannot be kept; what it has left may be gone
-                    effects.append(Close(effect.connection, 1013, str(error)[:120]))
+                    effects.append(Close(effect.connection, 1013, str(error)))
                     continue
                 there.welcome(effect.connection, now)
                 if effect.seen is not None:

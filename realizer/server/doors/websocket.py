@@ -23,7 +23,7 @@ from websockets.http11 import Request, Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
-from realizer.server.doors.websocket_client import GOODBYE
+from realizer.server.doors.websocket_client import GOODBYE, WebSocketClient
 from realizer.server.doors.websocket_request import (
     address_of,
     headers_of,
@@ -212,7 +212,7 @@ class WebSocketDoor:
         try:
             self._room(socket)  # again: many may have been let in at the same moment
         except HubError as error:
-            await socket.close(1013, str(error)[:120])
+            await WebSocketClient(socket).close(1013, str(error))
             return
         self._from[address] += 1
         try:

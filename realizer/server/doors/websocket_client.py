@@ -13,6 +13,7 @@ __all__: list[str] = []
 
 # A client that has not answered the close by then is gone.
 GOODBYE = 2.0  # s
+REASON = 123  # bytes that a close frame has room for behind its code
 
 
 class WebSocketClient:
@@ -39,7 +40,12 @@ class WebSocketClient:
             self._end = asyncio.get_running_loop().create_task(self.close(code, reason))
 
     async def close(self, code: int, reason: str) -> None:
-        """Let it go, and wait until it is gone; one that does not read will never hear of it."""
+        """Let it go, and wait until it is gone; one that does not read will never hear of it.
+
+        Args:
+            reason: as much of it is told as there is room for.
+        """
+        reason = reason.encode()[:REASON].decode(errors="ignore")
         try:
             async with asyncio.timeout(GOODBYE):
                 await self._socket.close(code, reason)

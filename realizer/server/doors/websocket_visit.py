@@ -49,10 +49,10 @@ class Visits:
             await self._shell.restore(name, seen)
             number = self._shell.join(client, name, seen, visitor)
         except HubError as error:
-            await self._turn_away(socket, error)
+            await self._turn_away(socket, client, error)
             return
         except JournalError as error:
-            await socket.close(1013, str(error)[:120])
+            await client.close(1013, str(error))
             return
         told = {"connection": number, "session": name, "address": address_of(socket)}
         log.info("joined", extra=told)
@@ -94,7 +94,7 @@ class Visits:
                 message = await socket.recv()
         return message, self._guard.greets(message)
 
-    async def _turn_away(self, socket: ServerConnection, error: HubError) -> None:
+    async def _turn_away(self, socket: ServerConnection, client: WebSocketClient, error: HubError) -> None:
         """Say why one who is here already may not stay."""
         self._shell.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(socket), "status": error.status})
@@ -104,4 +104,4 @@ class Visits:
             told = ErrorMessage(code="token", message=str(error), where=where)
             with contextlib.suppress(ConnectionClosed):
                 await socket.send(told.text())
-        await socket.close(1008 if unknown else 1013, str(error)[:120])
+        await client.close(1008 if unknown else 1013, str(error))

@@ -87,3 +87,14 @@ def test_what_is_not_read_waits_and_is_counted() -> None:
             assert len(await theirs.recv()) == 1_000_000
 
     between(test)
+
+
+def test_of_a_long_reason_is_told_what_there_is_room_for() -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+        client.end(1013, "é" * 100)  # two bytes each, and room for 123
+        with pytest.raises(ConnectionClosed) as closed:
+            await theirs.recv()
+        assert closed.value.rcvd is not None
+        assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1013, "é" * 61)
+
+    between(test)
