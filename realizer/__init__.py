@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         TableError,
         VoiceError,
     )
-    from realizer.face import load_face
+    from realizer.face.load import load_face
     from realizer.face.model import Face
     from realizer.pipeline import realize, schedule
     from realizer.player import Player
@@ -46,7 +46,7 @@ _HOMES = {
     "Settings": "realizer.settings",
     "TableError": "realizer.errors",
     "VoiceError": "realizer.errors",
-    "load_face": "realizer.face",
+    "load_face": "realizer.face.load",
     "realize": "realizer.pipeline",
     "schedule": "realizer.pipeline",
     "serve": "realizer.server.serve",

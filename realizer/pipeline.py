@@ -65,7 +65,7 @@ def realize(
         TableError: a file of rules, a mapping or an expression that cannot be used.
         VoiceError: the named voice is not installed.
     """
-    from realizer.face import face_name, takes
+    from realizer.face.load import face_name, takes
 
     in_force = mapping_of(face, mapping)
     texts = [documents] if isinstance(documents, str | bytes) else list(documents)

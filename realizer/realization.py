@@ -122,7 +122,7 @@ class Realization:
         Raises:
             FaceError: no such face, or its folder is damaged.
         """
-        from realizer.face import load_face
+        from realizer.face.load import load_face
 
         return load_face(self.face_name, deformer=self.deformer)
 
@@ -133,7 +133,7 @@ class Realization:
         Raises:
             FaceError: no such face, or its folder is damaged.
         """
-        from realizer.face import takes
+        from realizer.face.load import takes
 
         return poses(self.aus, takes(self.face_name, deformer=self.deformer), self.mapping)
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from realizer.arrays import Float64
-from realizer.face import Face, deform
+from realizer.face.deform import deform
+from realizer.face.model import Face
 
 __all__ = ["Mouth"]
 

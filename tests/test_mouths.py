@@ -12,7 +12,7 @@ import pytest
 from realizer.animation.pose import poses
 from realizer.animation.visemes import coarticulation
 from realizer.arrays import Float64
-from realizer.face import load_face
+from realizer.face.load import load_face
 from realizer.pipeline import realize
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 from tests.mouths import Mouth

@@ -17,18 +17,9 @@ from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
-from realizer.emotion import (
-    UnknownWordError,
-    affect,
-    known_words,
-    place_of,
-    place_of_affect,
-    shares,
-    strength_at,
-    strength_of,
-    wheel,
-)
-from realizer.emotion import emotion as profile_of
+from realizer.emotion.wheel import affect, place_of_affect, shares, strength_at, wheel
+from realizer.emotion.words import UnknownWordError, known_words, place_of, strength_of
+from realizer.emotion.words import emotion as profile_of
 from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces

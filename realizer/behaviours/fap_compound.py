@@ -12,7 +12,7 @@ from realizer.animation.fap_clip import FAPClip
 from realizer.animation.mouth import mouth_faps
 from realizer.animation.visemes import shape_table
 from realizer.arrays import Float64, Int32
-from realizer.emotion import archetypes
+from realizer.emotion.archetypes import archetypes
 
 __all__ = ["FapExpression", "fap_expressions", "shown"]
 

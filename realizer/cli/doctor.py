@@ -52,7 +52,8 @@ def _node() -> Iterator[Finding]:
 
 
 def _faces() -> Iterator[Finding]:
-    from realizer.face import check_face, list_faces
+    from realizer.face.check import check_face
+    from realizer.face.load import list_faces
 
     found = list_faces()
     if not found:

@@ -167,7 +167,7 @@ def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: s
 
     from realizer.animation.pose import poses
     from realizer.cli.poses import Series, frames, of_expressions
-    from realizer.face import takes
+    from realizer.face.load import takes
     from realizer.mapping import mapping_of
     from realizer.render import Renderer
     from realizer.render.sheets import sheet

@@ -74,8 +74,8 @@ def build(name: str, data: Path, output: Path | None) -> None:
 def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, only: tuple[int, ...]) -> None:
     """Make a face of a head by MPEG-4 zones: a mesh is enough, its feature points are found."""
     from realizer.face.load import folder_of
-    from realizer.face.mpeg4 import write_faceeditor
     from realizer.face.mpeg4.build import copy_with_zones
+    from realizer.face.mpeg4.faceeditor import write_faceeditor
 
     setup, guesses = copy_with_zones(folder_of(name), output, parameters, only)
     if guesses:

@@ -52,18 +52,11 @@ def fit(
 
     # Small products, thousands of them: a second thread only costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from realizer.face import load_face
-    from realizer.face.au import (
-        fit_models,
-        read_measured,
-        read_shapes,
-        runaways,
-        table,
-        table_text,
-        write_model,
-        write_shapes,
-    )
-    from realizer.face.load import folder_of
+    from realizer.face.au.file import write_model
+    from realizer.face.au.fit import fit_models, table, table_text
+    from realizer.face.au.limit import runaways
+    from realizer.face.au.measure import read_measured, read_shapes, write_shapes
+    from realizer.face.load import folder_of, load_face
 
     if measurements and data:
         raise click.UsageError("wanted --from or --data, got both")

@@ -214,7 +214,7 @@ def check_camera(face: str, name: str) -> None:
     Raises:
         click.BadParameter: it has none; lists those it has.
     """
-    from realizer.face import load_face
+    from realizer.face.load import load_face
     from realizer.render.cameras import PRESETS, camera_for
 
     if name not in PRESETS:  # a face may bring its own

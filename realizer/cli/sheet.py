@@ -136,7 +136,7 @@ def _cells(
 
     from realizer.animation.pose import poses as poses_of
     from realizer.cli import poses
-    from realizer.face import takes
+    from realizer.face.load import takes
     from realizer.render import Renderer
     from realizer.render.difference import difference, faint, flatten
     from realizer.render.light import preset

@@ -50,8 +50,9 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
 
     from realizer.animation.fap_clip import FAPClip
     from realizer.animation.frames import FAPFrames
-    from realizer.emotion import faps_from_points, recogniser
+    from realizer.emotion.measure import faps_from_points
     from realizer.emotion.points_file import bridge, read_points
+    from realizer.emotion.recognise import recogniser
     from realizer.outputs.fap_text import encode
 
     if output.suffix.lower() != ".fap":

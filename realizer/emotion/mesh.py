@@ -10,7 +10,8 @@ import numpy as np
 
 from realizer.arrays import Bool, Float32, Float64
 from realizer.emotion.measure import faps_from_points
-from realizer.face import Face, deform
+from realizer.face.deform import deform
+from realizer.face.model import Face
 
 __all__ = ["faps_from_face", "faps_from_mesh", "points_of"]
 

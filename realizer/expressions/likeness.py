@@ -15,7 +15,7 @@ from realizer.animation.targets import au, axis
 from realizer.arrays import Bool, Float32, UInt8
 from realizer.errors import RealizerError
 from realizer.expressions.expression import Expression
-from realizer.face import list_faces, takes
+from realizer.face.load import list_faces, takes
 from realizer.mapping import mapping_of
 from realizer.render import Renderer
 from realizer.render.light import presets

@@ -59,7 +59,7 @@ def morphs(face: Face, poses: Float32) -> Morphs:
     Args:
         poses: (n, len(face.takes)), `Realization.poses`.
     """
-    from realizer.face import deform
+    from realizer.face.deform import deform
 
     still = poses.copy()
     columns = {name: k for k, name in enumerate(face.takes)}

@@ -211,6 +211,6 @@ class Renderer:
 
     @cached_property
     def _takes(self) -> tuple[str, ...]:
-        from realizer.face import takes
+        from realizer.face.load import takes
 
         return takes(self.face, deformer=self.deformer) if isinstance(self.face, str) else self.face.takes

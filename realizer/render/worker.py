@@ -31,7 +31,7 @@ class Artist:
     """A face, a canvas, and the memory that pictures go to."""
 
     def __init__(self, order: Open) -> None:
-        from realizer.face import load_face
+        from realizer.face.load import load_face
 
         self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         if isinstance(order.face, str):
@@ -60,7 +60,8 @@ class Artist:
 
 def shapes(face: Face, rows: Float32) -> Iterator[tuple[Float32, Float32]]:
     """Vertices and normals, (n_vertices, 3) each, of each of (n, k) poses."""
-    from realizer.face import deform, normals
+    from realizer.face.deform import deform
+    from realizer.face.surface import normals
 
     for first in range(0, len(rows), BATCH):
         vertices = deform(face, rows[first : first + BATCH])

@@ -78,7 +78,7 @@ def feeling(asked: str) -> str:
     from bml_schema import Emotion
     from realizer.behaviours import emotion
     from realizer.behaviours.kind import World
-    from realizer.emotion import shares
+    from realizer.emotion.wheel import shares
 
     fields = {k: v for k, v in _object(asked).items() if k in ("name", "angle", "activation", "profile")}
     node = Emotion(id="asked", **fields)

@@ -36,7 +36,7 @@ class Faces:
             FaceError: there is none of that name, or it cannot be loaded.
             TableError: its mapping cannot be used.
         """
-        from realizer.face import face_name, list_faces
+        from realizer.face.load import face_name, list_faces
 
         known = [info.name for info in list_faces()]
         if face_name(name) not in known:
@@ -46,7 +46,7 @@ class Faces:
         mapping_of(name, self._settings.mapping)
 
     def name(self, index: int) -> str:
-        from realizer.face import face_name
+        from realizer.face.load import face_name
 
         return face_name(self.given.get(index, self._settings.face))
 
@@ -62,6 +62,6 @@ class Faces:
         return mapping_of(self.name(index), self._settings.mapping)
 
     def _load(self, name: str) -> Face:
-        from realizer.face import load_face
+        from realizer.face.load import load_face
 
         return load_face(name, deformer=self._settings.deformer)

@@ -53,7 +53,7 @@ def capabilities(settings: Settings) -> dict[str, Any]:
     from realizer.animation.targets import AU_NAMES
     from realizer.behaviours import KINDS
     from realizer.emotion.words import known_words
-    from realizer.face import list_faces, load_face
+    from realizer.face.load import list_faces, load_face
     from realizer.render.cameras import camera_names
     from realizer.render.light import presets
     from realizer.speech import voices

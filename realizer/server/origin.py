@@ -61,7 +61,7 @@ class Origin:
         if settings.record is not None:
             self._record = FolderJournal(settings.record, head(settings, self._scene))
         # A face that is not there is said before a door opens.
-        from realizer.face import load_face
+        from realizer.face.load import load_face
 
         await loop.run_in_executor(None, lambda: load_face(settings.face, deformer=settings.deformer))
         mapping_of(settings.face, settings.mapping)

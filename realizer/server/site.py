@@ -127,7 +127,7 @@ def _examples() -> bytes:
 @functools.lru_cache(8)
 def _look(name: str, light: str | None, background: str | None) -> bytes:
     """How stills are lit and framed and what they add to a face, for whoever draws the mesh stream."""
-    from realizer.face import load_face
+    from realizer.face.load import load_face
     from realizer.render.cameras import camera_for
     from realizer.render.glints import Glints
     from realizer.render.light import preset, presets
@@ -148,6 +148,7 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
 
 @functools.lru_cache(8)
 def _glb(name: str) -> bytes:
-    from realizer.face import load_face, to_glb
+    from realizer.face.glb import to_glb
+    from realizer.face.load import load_face
 
     return to_glb(load_face(name))

@@ -169,7 +169,8 @@ class Window:
 
     def mesh(self, row: int) -> Int16:
         """(n_vertices, 3) int16 of one frame, counted from the first."""
-        from realizer.face import deform, quantise
+        from realizer.face.deform import deform
+        from realizer.face.surface import quantise
 
         if self._meshes is None or not 0 <= row - self._meshes_from < MESHES:
             face, self._meshes_from = self._face(), row - row % MESHES

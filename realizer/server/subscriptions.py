@@ -179,7 +179,7 @@ def _look(session: Session, message: Subscribe, index: int) -> Look:
 
 
 def _mesh_of(session: Session, index: int) -> dict[str, Any]:
-    from realizer.face import face_scale
+    from realizer.face.surface import face_scale
 
     face = session.faces.of(index)
     scale, offset = face_scale(face)

@@ -112,7 +112,7 @@ def _attribute(
 
 
 def _values() -> dict[str, list[str]]:
-    from realizer.emotion import known_words
+    from realizer.emotion.words import known_words
     from realizer.expressions.library import shipped
     from realizer.tables.lexemes import face_lexemes, head_lexemes
 
@@ -175,7 +175,7 @@ def _wheel() -> list[dict[str, Any]]:
 
 
 def _profiles() -> dict[str, list[str]]:
-    from realizer.emotion import archetypes
+    from realizer.emotion.archetypes import archetypes
 
     return {
         kind: [f"{name} {number}" for name, numbered in archetypes(kind).items() for number in numbered]

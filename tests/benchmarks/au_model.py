@@ -22,9 +22,15 @@ from decimate import decimated
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.animation.targets import au, axis
-from realizer.face import Face, deform, load_face, normals
-from realizer.face.au import Measured, Model, mix, read_model, read_shapes, table, table_text
-from realizer.face.load import folder_of
+from realizer.face.au.file import read_model
+from realizer.face.au.fit import table, table_text
+from realizer.face.au.measure import Measured, read_shapes
+from realizer.face.au.mixers import mix
+from realizer.face.au.model import Model
+from realizer.face.deform import deform
+from realizer.face.load import folder_of, load_face
+from realizer.face.model import Face
+from realizer.face.surface import normals
 
 SHOWN = (1, 4, 6, 9, 10, 12, 15, 18, 27, 43)
 HERS = 0.120

@@ -24,11 +24,11 @@ from realizer.animation.fap import to_fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.targets import au, axis
 from realizer.arrays import Float32, Float64, Int32
-from realizer.face import deform, load_face
-from realizer.face.au import Measured, read_shapes
+from realizer.face.au.measure import Measured, read_shapes
 from realizer.face.au.shapes import measure_shapes
 from realizer.face.au.units import units
-from realizer.face.load import folder_of
+from realizer.face.deform import deform
+from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.tables import faps
 

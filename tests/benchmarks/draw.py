@@ -19,7 +19,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
 import numpy as np
 from stopwatch import median, noise
 
-from realizer.face import deform, load_face, normals
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.surface import normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
 from realizer.render import Renderer, available
 from realizer.render.cameras import camera_for

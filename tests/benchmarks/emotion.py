@@ -19,20 +19,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realizer.emotion import (
-    Profile,
-    Recogniser,
-    archetypes,
-    as_features_see,
-    emotion,
-    faps_from_features,
-    features_from_points,
-    known_words,
-    recogniser,
-    wheel,
-)
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.measure import as_features_see, faps_from_features, features_from_points
 from realizer.emotion.mesh import faps_from_mesh, points_of
-from realizer.face import Face, deform, list_faces, load_face
+from realizer.emotion.profile import Profile
+from realizer.emotion.recognise import Recogniser, recogniser
+from realizer.emotion.wheel import wheel
+from realizer.emotion.words import emotion, known_words
+from realizer.face.deform import deform
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
 from realizer.tables.emotion_model import emotion_model
 
 Counts = dict[str, Counter[str]]

@@ -24,7 +24,7 @@ from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from realizer import tables
 from realizer.arrays import Float32, Float64
-from realizer.face import load_face
+from realizer.face.load import load_face
 from realizer.tables import by_number, faps, read_csv
 
 # Upper and lower lip, one above the other: they part by -(upper + lower).

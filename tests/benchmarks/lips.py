@@ -16,7 +16,7 @@ import numpy as np
 
 from realizer.animation.pose import poses
 from realizer.animation.visemes import coarticulation
-from realizer.face import load_face
+from realizer.face.load import load_face
 from realizer.pipeline import realize
 from realizer.speech import Say, Utterance, Voice, find_voice
 from tests.mouths import Mouth

@@ -25,7 +25,7 @@ from playwright.sync_api import Page, Route, sync_playwright
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.animation.targets import au, axis
-from realizer.face import load_face
+from realizer.face.load import load_face
 from realizer.mapping import mapping_of
 from realizer.render import Renderer
 from realizer.tables.cooccurrence import rules

@@ -17,7 +17,8 @@ from stopwatch import helped, measure, noise
 from bml_schema import parse
 from realizer.animation.fap import to_fap
 from realizer.behaviours import VOCABULARY
-from realizer.face import deform, load_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 from realizer.player import Player
 
 

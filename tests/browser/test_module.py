@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from realizer.face import face_scale, load_face
+from realizer.face.load import load_face
+from realizer.face.surface import face_scale
 
 from .test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from realizer.face import list_faces, load_face
+from realizer.face.load import list_faces, load_face
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = [
@@ -119,7 +119,7 @@ def still(light: str, aus: dict[int, float]):  # type: ignore[no-untyped-def]
     from realizer.animation.frames import AUFrames
     from realizer.animation.pose import poses
     from realizer.animation.targets import au, axis
-    from realizer.face import takes
+    from realizer.face.load import takes
     from realizer.render import Renderer
 
     row = np.zeros((1, len(axis())), np.float32)

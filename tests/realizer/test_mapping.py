@@ -9,8 +9,8 @@ import pytest
 
 from realizer.animation.mapping import FapMapping, standard
 from realizer.errors import FaceError, TableError
-from realizer.face import check_face, takes
-from realizer.face.load import folder_of
+from realizer.face.check import check_face
+from realizer.face.load import folder_of, takes
 from realizer.mapping import mapping_of
 from realizer.pipeline import realize
 from realizer.server.session import Session

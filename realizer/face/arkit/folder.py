@@ -26,9 +26,8 @@ from realizer.face.au.measure import write_shapes
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack, unpack
 from realizer.face.features import Point, write_features
 from realizer.face.load import load_face
-from realizer.face.mpeg4 import default_setup
 from realizer.face.mpeg4.build import apply_zones
-from realizer.face.mpeg4.defaults import split_sides
+from realizer.face.mpeg4.defaults import default_setup, split_sides
 from realizer.face.mpeg4.rigid import sliding
 from realizer.face.paint import occlusion
 from realizer.face.parts import smooth

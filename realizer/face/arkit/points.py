@@ -11,7 +11,7 @@ from realizer.arrays import Float64
 from realizer.face.arkit.sorting import behind
 from realizer.face.arkit.surface import Surface
 from realizer.face.features import Point
-from realizer.face.mpeg4 import find_points
+from realizer.face.mpeg4.landmarks import find_points
 from realizer.face.patch import vertex_normals
 
 __all__ = ["points_of"]

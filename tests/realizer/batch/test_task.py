@@ -35,7 +35,7 @@ def test_every_option_is_looked_at_below() -> None:
 
 @pytest.mark.parametrize("name", OTHER)
 def test_another_option_is_another_key(name: str, options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
-    from realizer.face import list_faces
+    from realizer.face.load import list_faces
 
     value = OTHER[name]
     if name == "face":

@@ -14,7 +14,7 @@ from realizer.animation.fap_clip import FAPClip
 from realizer.animation.mouth import mouth_faps
 from realizer.animation.visemes import shape_table
 from realizer.behaviours.fap_compound import FapExpression, fap_expressions, shown
-from realizer.emotion import archetypes
+from realizer.emotion.archetypes import archetypes
 from realizer.tables import faps
 
 JAW, BROW, CORNER, LIP = 2, 30, 11, 3  # columns

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.face import deform, load_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 
 SURPRISE = {"expression": "template:surprise", "duration": 1.0}
 ANGER = {"expression": "template:anger", "duration": 1.0}

@@ -10,7 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
-from realizer.emotion import affect, emotion, read_profiles, wheel
+from realizer.emotion.profile_file import read_profiles
+from realizer.emotion.wheel import affect, wheel
+from realizer.emotion.words import emotion
 
 
 def run(*args: str) -> Result:

@@ -10,9 +10,10 @@ from click.testing import CliRunner, Result
 
 from realizer.animation.fap_reader import read_fap
 from realizer.cli import cli
-from realizer.emotion import archetypes
+from realizer.emotion.archetypes import archetypes
 from realizer.emotion.mesh import points_of
-from realizer.face import deform, load_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 
 
 def run(*args: str) -> Result:

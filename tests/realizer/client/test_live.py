@@ -10,7 +10,7 @@ import pytest
 
 from bml_schema.feedback import WarningFeedback
 from realizer.client import ClientError, connect
-from realizer.face import load_face
+from realizer.face.load import load_face
 from realizer.server.serve import Server
 from realizer.server.wire import WireFrame
 from realizer.settings import Settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.emotion import archetypes
+from realizer.emotion.archetypes import archetypes
 from realizer.tables import faps
 
 SIX = {"anger", "sadness", "joy", "disgust", "fear", "surprise"}

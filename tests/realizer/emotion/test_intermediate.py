@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.emotion import Anchor, Profile, archetypes, between, same_category
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.intermediate import Anchor, between, same_category
+from realizer.emotion.profile import Profile
 from realizer.tables.feelings import whissell_words
 
 FEAR, SAD = archetypes("raw")["fear"][8], archetypes("raw")["sadness"][0]

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion import (
-    Profile,
+from realizer.emotion.measure import (
     as_features_see,
     faps_from_features,
     faps_from_points,
@@ -14,7 +13,10 @@ from realizer.emotion import (
     features_from_points,
 )
 from realizer.emotion.mesh import points_of
-from realizer.face import Face, deform, load_face
+from realizer.emotion.profile import Profile
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.model import Face
 from realizer.tables import faps
 from realizer.tables.facial_features import facial_features
 

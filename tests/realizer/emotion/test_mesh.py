@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion import archetypes, recogniser
+from realizer.emotion.archetypes import archetypes
 from realizer.emotion.mesh import faps_from_face, faps_from_mesh, points_of
-from realizer.face import Face, deform, load_face
+from realizer.emotion.recognise import recogniser
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.model import Face
 
 SEEDS = (0, 1, 2)
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.emotion import Profile, archetypes
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.profile import Profile
 
 FEAR = "F3 [400, 560], F5 [-240, -160], F31 [460, 540], F32 [460, 540]"
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.emotion import archetypes, read_profiles, write_profiles
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.profile_file import read_profiles, write_profiles
 
 # Paul 2010, figure 6.5, with the ranges that he shows.
 FIGURE = """\

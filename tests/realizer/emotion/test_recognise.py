@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion import Profile, Recogniser, archetypes, emotion, known_words, recogniser
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.profile import Profile
+from realizer.emotion.recognise import Recogniser, recogniser
+from realizer.emotion.words import emotion, known_words
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.feelings import ring
 

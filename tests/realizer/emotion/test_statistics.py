@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion import archetypes, from_faces, from_statistics, published_statistics
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.statistics import from_faces, from_statistics, published_statistics
 
 
 @pytest.mark.parametrize(("profiles", "raw"), [("raw", True), ("published", False)])

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.emotion import affect, archetypes, shares, wheel
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.wheel import affect, shares, wheel
 from realizer.tables.feelings import ring as places
 
 SETS = st.sampled_from(["own", "published", "raw"])

@@ -5,16 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion import (
-    UnknownWordError,
-    WordPlace,
-    archetypes,
-    emotion,
-    known_words,
-    place_of,
-    strength_of,
-    wheel,
-)
+from realizer.emotion.archetypes import archetypes
+from realizer.emotion.wheel import wheel
+from realizer.emotion.words import UnknownWordError, WordPlace, emotion, known_words, place_of, strength_of
 
 
 @pytest.mark.parametrize("profiles", ["own", "published", "raw"])

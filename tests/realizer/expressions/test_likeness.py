@@ -10,7 +10,7 @@ from realizer.animation.pose import poses
 from realizer.animation.targets import au, axis
 from realizer.expressions import shipped
 from realizer.expressions.likeness import UnknownPictureError, by_picture, read_picture
-from realizer.face import takes
+from realizer.face.load import takes
 from realizer.render import Renderer
 
 NAMES = ("SMILE", "RAISE_LEFT_BROW", "RAISE_RIGHT_BROW", "template:anger", "template:sadness", "OPEN_MOUTH")

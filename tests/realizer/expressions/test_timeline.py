@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from realizer.expressions import Entry, Timeline, Track, faults_of, remarks, shipped
-from realizer.face import takes
+from realizer.face.load import takes
 
 
 def test_names_that_nobody_knows_are_faults_and_breaks_are_not() -> None:

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from realizer.face import Face, deform, list_faces, load_face
+from realizer.face.deform import deform
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
 
 FACES = [info.name for info in list_faces() if info.licence == "CC0-1.0"]
 

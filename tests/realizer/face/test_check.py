@@ -12,9 +12,10 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.errors import FaceError
-from realizer.face import check_face, load_face
-from realizer.face.load import folder_of
-from realizer.face.mpeg4 import setup_of, write_setup
+from realizer.face.check import check_face
+from realizer.face.load import folder_of, load_face
+from realizer.face.mpeg4.build import setup_of
+from realizer.face.mpeg4.parameters import write_setup
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from realizer.face import list_faces, load_face
 from realizer.face.contours import CONTOURS, contours_of, together
+from realizer.face.load import list_faces, load_face
 from realizer.tables import faps
 
 FACES = [info.name for info in list_faces()]

@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 
 from realizer.errors import FaceError
-from realizer.face import load_face
 from realizer.face.hair import Style, hair, scalp_of, shadow, style_of
+from realizer.face.load import load_face
 from realizer.face.patch import Patch, vertex_normals
 from realizer.face.scalp import Scalp
 from realizer.tables import read_toml, text_of

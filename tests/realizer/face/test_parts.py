@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from realizer.face import Face, deform, list_faces, load_face, normals
+from realizer.face.deform import deform
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
 from realizer.face.paint import LIT, paint_mouth
 from realizer.face.parts import SHADES, teeth
+from realizer.face.surface import normals
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.onboard import OnboardCanvas

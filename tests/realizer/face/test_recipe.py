@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face import list_faces
+from realizer.face.load import list_faces
 from realizer.face.recipe import COLOURS, read_recipe
 
 GOOD = "\n".join(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from realizer.animation.targets import fap
-from realizer.face import deform, load_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 from realizer.outputs.morphs import TRUE, morphs
 from realizer.pipeline import realize
 

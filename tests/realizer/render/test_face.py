@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from realizer.face import deform, load_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 from realizer.render import Renderer
 from realizer.render.cameras import camera_for
 

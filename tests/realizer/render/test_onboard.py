@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.face import deform, load_face, normals
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.surface import normals
 from realizer.render.backdrop import backdrop
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset

@@ -8,7 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from realizer.face import deform, load_face, normals
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.surface import normals
 from realizer.render.wrinkles import Wrinkles
 
 # What stands for an action unit on this face, in FAPs: each at full strength.

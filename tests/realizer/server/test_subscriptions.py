@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.face import load_face
+from realizer.face.load import load_face
 from realizer.server.messages import STREAMS
 from realizer.server.subscriptions import NAMES
 from realizer.server.wire import unpack

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from realizer.colours import linear
-from realizer.face import Face, deform, load_face
 from realizer.face.arkit.names import shapes
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.model import Face
 from realizer.tables import au_to_fap
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125

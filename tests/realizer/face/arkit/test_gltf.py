@@ -16,11 +16,11 @@ from PIL import Image
 
 from realizer.cli.faces import faces
 from realizer.errors import FaceError
-from realizer.face import load_face
-from realizer.face.arkit import canonical, look_at, shapes
+from realizer.face.arkit.folder import look_at
 from realizer.face.arkit.gltf import Gltf
-from realizer.face.arkit.names import nearest
+from realizer.face.arkit.names import canonical, nearest, shapes
 from realizer.face.arkit.scene import read_pieces
+from realizer.face.load import load_face
 
 WAYS = {
     "as glTF asks": np.eye(3),

@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.face import Face, check_face, deform, load_face
-from realizer.face.arkit import Report, import_head
-from realizer.face.au import read_shapes
+from realizer.face.arkit.folder import Report, import_head
+from realizer.face.au.measure import read_shapes
+from realizer.face.check import check_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.model import Face
 from realizer.tables import Fap, faps
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face import deform, list_faces, load_face, takes
-from realizer.face.au import mix, opened
+from realizer.face.au.mixers import mix, opened
+from realizer.face.deform import deform
+from realizer.face.load import list_faces, load_face, takes
 from realizer.face.model import Face
 
 FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)

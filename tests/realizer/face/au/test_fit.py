@@ -9,18 +9,12 @@ import numpy as np
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face import list_faces, load_face
-from realizer.face.au import (
-    Model,
-    fit_models,
-    read_measured,
-    read_model,
-    read_shapes,
-    table,
-    table_text,
-    write_shapes,
-)
+from realizer.face.au.file import read_model
+from realizer.face.au.fit import fit_models, table, table_text
+from realizer.face.au.measure import read_measured, read_shapes, write_shapes
+from realizer.face.au.model import Model
 from realizer.face.au.units import units
+from realizer.face.load import list_faces, load_face
 
 HEAD = "# source: made for tests\n# units: metres\n# licence: MIT\nau,x,y,z,dx,dy,dz\n"
 

@@ -10,9 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.errors import FaceError
-from realizer.face import Face, list_faces, load_face
-from realizer.face.au import Measured, Model, fit_models, read_model, read_shapes, runaways, write_model
-from realizer.face.au.limit import FURTHEST, overshoot, watched
+from realizer.face.au.file import read_model, write_model
+from realizer.face.au.fit import fit_models
+from realizer.face.au.limit import FURTHEST, overshoot, runaways, watched
+from realizer.face.au.measure import Measured, read_shapes
+from realizer.face.au.model import Model
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
 
 FITTED = {info.name: info.path for info in list_faces() if (info.path / "au_extended.toml").is_file()}
 FOLDER = FITTED[load_face().name]

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from realizer.face import list_faces, load_face
-from realizer.face.au import Model, additive, mix, read_model, successive
+from realizer.face.au.file import read_model
+from realizer.face.au.mixers import additive, mix, successive
+from realizer.face.au.model import Model
+from realizer.face.load import list_faces, load_face
 
 
 @pytest.fixture(scope="module")

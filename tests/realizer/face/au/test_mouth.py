@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face import load_face
 from realizer.face.au.mouth import LOWER, UPPER, fit_mouth, halves
+from realizer.face.load import load_face
 
 
 def test_the_lips_feature_points_fall_on_their_own_sides() -> None:

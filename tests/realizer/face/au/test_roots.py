@@ -7,8 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from realizer.face import Face, deform, list_faces, load_face
 from realizer.face.au.roots import roots
+from realizer.face.deform import deform
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
 from realizer.render.sample import triangle
 
 FACES = {info.name for info in list_faces() if (info.path / "au_extended.toml").is_file()}

@@ -13,7 +13,8 @@ from click.testing import CliRunner
 
 import realizer
 from realizer.cli import cli
-from realizer.face import deform, load_face
+from realizer.face.deform import deform
+from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.player import Player
 from realizer.render import Renderer
@@ -114,7 +115,7 @@ def test_fap_streams_and_files_do_not_know_who_draws() -> None:
 
 
 def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None:
-    from realizer.face import quantise
+    from realizer.face.surface import quantise
 
     face = faces["au"]
     player = Player(idle=True, seed=3)

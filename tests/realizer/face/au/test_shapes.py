@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face import list_faces, load_face
-from realizer.face.au import read_shapes
+from realizer.face.au.measure import read_shapes
 from realizer.face.au.shapes import measure_shapes
 from realizer.face.au.units import units
+from realizer.face.load import list_faces, load_face
 
 SHAPED = [info.path for info in list_faces() if (info.path / "au_shapes.npz").is_file()]
 FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from realizer.face import list_faces, load_face
-from realizer.face.au import Model, successive
+from realizer.face.au.mixers import successive
+from realizer.face.au.model import Model
 from realizer.face.au.mouth import shares
 from realizer.face.au.roots import grown, skin
 from realizer.face.au.succession import Succession
+from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 
 FACES = [info.name for info in list_faces()]

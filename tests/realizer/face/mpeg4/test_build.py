@@ -9,10 +9,13 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.errors import FaceError
-from realizer.face import Face, check_face, deform, load_face
-from realizer.face.load import folder_of
-from realizer.face.mpeg4 import apply_zones, face_truth, mean_score, setup_of, write_setup
-from realizer.face.mpeg4.parameters import read_setup
+from realizer.face.check import check_face
+from realizer.face.deform import deform
+from realizer.face.load import folder_of, load_face
+from realizer.face.model import Face
+from realizer.face.mpeg4.build import apply_zones, setup_of
+from realizer.face.mpeg4.parameters import read_setup, write_setup
+from realizer.face.mpeg4.truth import face_truth, mean_score
 
 
 def copy(to: Path, fields: bool = False) -> Path:

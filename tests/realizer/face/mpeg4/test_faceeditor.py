@@ -9,18 +9,11 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.errors import FaceError
-from realizer.face import load_face
-from realizer.face.load import folder_of
-from realizer.face.mpeg4 import (
-    Setup,
-    Zone,
-    face_truth,
-    fitted,
-    mean_score,
-    read_faceeditor,
-    setup_of,
-    write_faceeditor,
-)
+from realizer.face.load import folder_of, load_face
+from realizer.face.mpeg4.build import setup_of
+from realizer.face.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
+from realizer.face.mpeg4.truth import face_truth, mean_score
+from realizer.face.mpeg4.zones import Setup, Zone
 
 FILE = """<?xml version="1.0"?>
 <!DOCTYPE faceeditor-parameters [

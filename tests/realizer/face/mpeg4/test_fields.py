@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from realizer.errors import FaceError
-from realizer.face.mpeg4 import Setup, Zone, synchronised, zone_fields
+from realizer.face.mpeg4.fields import zone_fields
+from realizer.face.mpeg4.zones import Setup, Zone, synchronised
 
 # A sheet of skin, 1 mm apart, in the plane z = 0.
 X, Y = np.meshgrid(np.arange(-40, 41) / 1000, np.arange(-40, 41) / 1000)

@@ -10,10 +10,11 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.errors import FaceError
-from realizer.face import check_face, list_faces, load_face
+from realizer.face.check import check_face
 from realizer.face.features import NAMES
-from realizer.face.load import folder_of
-from realizer.face.mpeg4 import face_truth, find_points, mean_score
+from realizer.face.load import folder_of, list_faces, load_face
+from realizer.face.mpeg4.landmarks import find_points
+from realizer.face.mpeg4.truth import face_truth, mean_score
 
 FACES = [info.name for info in list_faces()]
 BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {

@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from realizer.face import Face, list_faces, load_face
-from realizer.face.mpeg4 import PEERS, Truth, face_truth, mean_score
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
+from realizer.face.mpeg4.truth import PEERS, Truth, face_truth, mean_score
 
 FACES = [info.name for info in list_faces()]
 FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}
