@@ -36,7 +36,7 @@ from xml.sax.saxutils import escape
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress
 from realizer.client import Client, ClientError, connect
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 __all__ = ["converse", "flow", "heard", "openai", "scripted"]
 
@@ -233,8 +233,8 @@ async def run(url: str | None, voice: str | None, model: Model) -> None:
     """Converse with who types, over the service at an address, or over one of our own."""
     async with contextlib.AsyncExitStack() as stack:
         if url is None:
+            from realizer.core.settings import Settings
             from realizer.server.serve import Server  # a client alone does without
-            from realizer.settings import Settings
 
             settings = Settings.read({"port": 0, "voice": voice})
             url = (await stack.enter_async_context(Server(settings))).url

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from realizer.errors import (
+    from realizer.core.errors import (
         FaceError,
         RealizerError,
         RenderError,
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
         TableError,
         VoiceError,
     )
+    from realizer.core.settings import Settings
     from realizer.face.load import load_face
     from realizer.face.model import Face
     from realizer.pipeline import realize, schedule
-    from realizer.player import Player
+    from realizer.playback.player import Player
     from realizer.realization import Realization
     from realizer.scheduling.timing import Schedule
     from realizer.server.serve import serve
-    from realizer.settings import Settings
 
 __version__ = "0.1.0"
 
@@ -36,16 +36,16 @@ __version__ = "0.1.0"
 # where an optional part is missing.
 _HOMES = {
     "Face": "realizer.face.model",
-    "FaceError": "realizer.errors",
-    "Player": "realizer.player",
-    "RealizerError": "realizer.errors",
+    "FaceError": "realizer.core.errors",
+    "Player": "realizer.playback.player",
+    "RealizerError": "realizer.core.errors",
     "Realization": "realizer.realization",
-    "RenderError": "realizer.errors",
+    "RenderError": "realizer.core.errors",
     "Schedule": "realizer.scheduling.timing",
-    "ScheduleError": "realizer.errors",
-    "Settings": "realizer.settings",
-    "TableError": "realizer.errors",
-    "VoiceError": "realizer.errors",
+    "ScheduleError": "realizer.core.errors",
+    "Settings": "realizer.core.settings",
+    "TableError": "realizer.core.errors",
+    "VoiceError": "realizer.core.errors",
     "load_face": "realizer.face.load",
     "realize": "realizer.pipeline",
     "schedule": "realizer.pipeline",

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from bml_schema import Block, BMLError, read
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
-from realizer.errors import VoiceError
-from realizer.mapping import mapping_of
-from realizer.player import Player
+from realizer.core.errors import VoiceError
+from realizer.face.mapping import mapping_of
+from realizer.playback.player import Player
 from realizer.realization import Realization, seen
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.fitting import fitted, stretched

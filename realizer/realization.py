@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bml_schema import Feedback, WarningFeedback
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
+from realizer.animation.fap.mapping import FapMapping, standard
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.animation.mapping import FapMapping, standard
 from realizer.animation.pose import poses
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Float32, Float64, Int16
-from realizer.composition.playing import HUSH, Speaking
-from realizer.errors import RealizerError
-from realizer.player import Player
+from realizer.core.arrays import Float32, Float64, Int16
+from realizer.core.errors import RealizerError
+from realizer.core.units import frame_count
+from realizer.playback.player import Player
+from realizer.playback.playing import HUSH, Speaking
+from realizer.playback.sound import heard
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.sound import heard
 from realizer.speech.utterance import Utterance
 from realizer.tables import faps
-from realizer.units import frame_count
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
@@ -160,8 +160,8 @@ class Realization:
         Args:
             character: its place in `characters`.
         """
-        from realizer.animation.viseme_weights import viseme_weights
-        from realizer.animation.visemes import lip_shapes
+        from realizer.animation.lips.viseme_weights import viseme_weights
+        from realizer.animation.lips.visemes import lip_shapes
 
         times = self.aus.times
         weights = np.eye(1, len(lip_shapes())).repeat(len(times), axis=0)
@@ -276,7 +276,7 @@ def warned(
 
 
 def _performance_json(performance: Performance, visemes: Float64) -> dict[str, Any]:
-    from realizer.animation.viseme_weights import oculus_visemes, oculus_weights
+    from realizer.animation.lips.viseme_weights import oculus_visemes, oculus_weights
 
     return {
         "fap": {

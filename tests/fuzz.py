@@ -27,22 +27,22 @@ import numpy as np
 
 from bml_schema import Block, BlockProgress, BMLError, WarningFeedback, read
 from bml_schema.feedback import parse_feedback
-from realizer.animation.fap_clip import FAPClip
-from realizer.animation.fap_reader import read_fap
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.behaviours import VOCABULARY
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
 from realizer.outputs.fap_text import encode
 from realizer.pipeline import submitted
-from realizer.player import Player
-from realizer.server.doors.dialect import Leave, ToSession
-from realizer.server.doors.xface_brought import prepare
-from realizer.server.doors.xface_reader import Content, Fault, TaskReader
-from realizer.server.doors.xface_tasks import ABLE, UNABLE, Answer, Desk
-from realizer.server.doors.xface_wire import Task, pack_task, read_notes
-from realizer.server.effects import Send
-from realizer.server.messages import ErrorMessage, parse_control
-from realizer.server.session import Session
-from realizer.settings import Settings
+from realizer.playback.player import Player
+from realizer.protocol.messages import ErrorMessage, parse_control
+from realizer.server.session.effects import Send
+from realizer.server.session.session import Session
+from realizer.server.transports.dialect import Leave, ToSession
+from realizer.server.transports.xface.xface_brought import prepare
+from realizer.server.transports.xface.xface_reader import Content, Fault, TaskReader
+from realizer.server.transports.xface.xface_tasks import ABLE, UNABLE, Answer, Desk
+from realizer.server.transports.xface.xface_wire import Task, pack_task, read_notes
 from realizer.speech import SilentVoice
 from tests.interleavings import CONTROLS, FILTERS, Interleaving, no_error
 from tests.mutants import mutants

@@ -15,17 +15,17 @@ from zlib import crc32
 import numpy as np
 
 from bml_schema.feedback import parse_feedback
-from realizer.errors import RenderError, VoiceError
-from realizer.server.effects import Close, Draw, Effect, Send, Speak
-from realizer.server.hub import Hub
+from realizer.core.errors import RenderError, VoiceError
+from realizer.core.settings import Settings
+from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.journal import JournalError
 from realizer.server.journal import notes as thresholds
 from realizer.server.journal.entry import Entry, Kept
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.replay import restored
-from realizer.server.session import Session
-from realizer.server.wire import ClipPiece, pack_clip, unpack
-from realizer.settings import Settings
+from realizer.server.runtime.hub import Hub
+from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
+from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Utterance

@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 import realizer
-from realizer.server.messages import (
+from realizer.protocol.messages import (
     PROTOCOL,
     STREAMS,
     SUPPORTED,
@@ -34,7 +34,7 @@ from realizer.server.messages import (
     Subscribed,
     Welcome,
 )
-from realizer.server.wire import FINAL, FORGET, PAYLOADS, VERSION
+from realizer.protocol.wire import FINAL, FORGET, PAYLOADS, VERSION
 
 __all__ = ["BEGIN", "END", "FILE", "README", "asyncapi", "render", "tables", "within"]
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from bml_schema import Block, BMLError, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
 from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from realizer.pipeline import speak, warning_of
-from realizer.player import Player, Speaking
+from realizer.playback.player import Player, Speaking
 from realizer.scheduling.timing import Schedule
 from realizer.speech import SilentVoice
 from realizer.tables import faps

@@ -22,7 +22,7 @@ import yaml
 from websockets.asyncio.client import connect
 
 from realizer.cli.serve import serve
-from realizer.settings import Settings
+from realizer.core.settings import Settings
 
 ROOT = Path(__file__).parents[1]
 DOCKER = ROOT / "docker"

@@ -12,9 +12,9 @@ from websockets.asyncio.client import connect
 
 from bml_schema import Block, BMLError, Feedback, read
 from realizer.behaviours import VOCABULARY
-from realizer.server.feedback_log import FeedbackLog
+from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from realizer.settings import Settings
+from realizer.server.session.feedback_log import FeedbackLog
 from tests.fuzz import corpus, no_hang, plays, tried
 from tests.mutants import mutants
 

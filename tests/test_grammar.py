@@ -22,9 +22,9 @@ from bml_schema import (
     timed,
     write,
 )
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
 from realizer.pipeline import submitted
-from realizer.player import Player
+from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
 from realizer.speech import SilentVoice
 from tests.grammar import KINDS, texts

@@ -9,9 +9,9 @@ from itertools import accumulate
 import numpy as np
 import pytest
 
+from realizer.animation.lips.visemes import coarticulation
 from realizer.animation.pose import poses
-from realizer.animation.visemes import coarticulation
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 from realizer.face.load import load_face
 from realizer.pipeline import realize
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from websockets.asyncio.client import connect
 
-from realizer.server.messages import STREAMS, SUPPORTED, ErrorMessage, parse_control
+from realizer.core.settings import Settings
+from realizer.protocol.messages import STREAMS, SUPPORTED, ErrorMessage, parse_control
+from realizer.protocol.wire import PAYLOADS
 from realizer.server.serve import Server
-from realizer.server.wire import PAYLOADS
-from realizer.settings import Settings
 from tests.protocol import (
     ANSWERS,
     BEGIN,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from realizer.server.session import Session
+from realizer.server.session.session import Session
 
 __all__ = ["wakes"]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from realizer.animation.targets import Target
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 
 __all__ = ["Channel", "Gain", "Joint", "Layer", "later"]
 

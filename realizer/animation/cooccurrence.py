@@ -10,7 +10,7 @@ import numpy as np
 
 from realizer.animation.rounds import Rounds
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Bool, Float32, Index
+from realizer.core.arrays import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 __all__ = ["Bounds", "Shown", "bounds", "cooccur"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from realizer.animation.cooccurrence import Bounds, bounds
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Bool, Float32, Float64, Int32
+from realizer.core.arrays import Bool, Float32, Float64, Int32
 from realizer.tables.cooccurrence import Rules
 
 __all__ = ["AUFrames", "FAPFrames"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.arrays import Float32, Index
+from realizer.core.arrays import Float32, Index
 
 __all__ = ["Rounds"]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from realizer.batch.task import Options, Task
 from realizer.batch.work import Outcome, failed, perform
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 __all__ = ["Cluster"]
 

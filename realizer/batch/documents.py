@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 __all__ = ["Document", "DocumentsError", "find"]
 

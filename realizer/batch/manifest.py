@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
-from realizer.errors import RealizerError
-from realizer.outputs.files import write_text
+from realizer.core.errors import RealizerError
+from realizer.core.files import write_text
 
 __all__ = ["NAME", "BusyError", "Manifest", "Row"]
 

@@ -11,7 +11,7 @@ from realizer.batch.documents import Document
 from realizer.batch.manifest import Manifest, Row
 from realizer.batch.task import Options, Task, fingerprint, key_of
 from realizer.batch.work import Outcome, failed
-from realizer.outputs.files import write_bytes
+from realizer.core.files import write_bytes
 
 __all__ = ["Crew", "batch"]
 

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Any
 
 from realizer.batch.task import Options, Task, fingerprint
-from realizer.errors import RealizerError, VoiceError
+from realizer.core.errors import RealizerError, VoiceError
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.pipeline import realize
 from realizer.realization import Realization

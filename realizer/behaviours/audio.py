@@ -8,9 +8,9 @@ import numpy as np
 
 from bml_schema import AudioFile
 from realizer.animation.channel import Channel
-from realizer.arrays import Float64
 from realizer.behaviours import recordings
 from realizer.behaviours.kind import Fault, Kind, World
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Utterance
 

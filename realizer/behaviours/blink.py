@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bml_schema import Blink
 from realizer.animation.channel import Channel
-from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Kind, World
 from realizer.behaviours.preferred import preferred
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

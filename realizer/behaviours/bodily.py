@@ -6,9 +6,9 @@ from typing import Any
 
 from bml_schema import Gesture, Locomotion, Pointing, Posture, PostureShift
 from realizer.animation.channel import Channel
-from realizer.arrays import Float64
 from realizer.behaviours.kind import Kind, World
 from realizer.behaviours.preferred import preferred
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

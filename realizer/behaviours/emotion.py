@@ -13,13 +13,13 @@ import numpy as np
 from bml_schema import Emotion, Mood
 from realizer.animation.channel import Channel
 from realizer.animation.targets import Target, fap
-from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
-from realizer.emotion.wheel import affect, place_of_affect, shares, strength_at, wheel
-from realizer.emotion.words import UnknownWordError, known_words, place_of, strength_of
-from realizer.emotion.words import emotion as profile_of
+from realizer.core.arrays import Float64
+from realizer.emotions.wheel import affect, place_of_affect, shares, strength_at, wheel
+from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
+from realizer.emotions.words import emotion as profile_of
 from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
@@ -105,7 +105,7 @@ def _has_profile(feeling: Feeling) -> bool:
     """True.
 
     Raises:
-        UnknownWordError, ValueError: as `realizer.emotion.emotion`; those are not kept.
+        UnknownWordError, ValueError: as `realizer.emotions.emotion`; those are not kept.
     """
     profile_of(feeling.name or "", feeling.profiles)
     return True

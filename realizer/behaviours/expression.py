@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bml_schema import Expression
 from realizer.animation.channel import Channel
-from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import from_gaps
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -11,10 +11,10 @@ from bml_schema import Face, FaceFacs, FaceLexeme, FaceShift
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import Target, au
-from realizer.arrays import Float64
 from realizer.behaviours import poses
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import from_gaps, preferred
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 
 from realizer import tables
-from realizer.animation.fap_clip import FAPClip
-from realizer.animation.mouth import mouth_faps
-from realizer.animation.visemes import shape_table
-from realizer.arrays import Float64, Int32
-from realizer.emotion.archetypes import archetypes
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.lips.mouth import mouth_faps
+from realizer.animation.lips.visemes import shape_table
+from realizer.core.arrays import Float64, Int32
+from realizer.emotions.archetypes import archetypes
 
 __all__ = ["FapExpression", "fap_expressions", "shown"]
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from bml_schema import Block, FaceInterpolator, FaceKeyframe, Required, write
 from realizer import tables
-from realizer.animation.fap_clip import FAPClip
-from realizer.errors import RealizerError
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.core.errors import RealizerError
 
 __all__ = ["document_of"]
 

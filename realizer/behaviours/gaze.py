@@ -11,10 +11,10 @@ from bml_schema import Gaze, GazeShift
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au, presence
-from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.preferred import preferred
 from realizer.behaviours.scene import Turn, angles, facts, limits, target_faults, turn, within
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -11,11 +11,11 @@ from bml_schema import Head, HeadDirectionShift
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
-from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.poses import unknown
 from realizer.behaviours.preferred import from_gaps, preferred
 from realizer.behaviours.scene import angles, limits, target_faults, turn, within
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
 from realizer.tables.timing import Gap, gaps

@@ -12,10 +12,10 @@ from bml_schema import FaceKeyframe
 from realizer import tables
 from realizer.animation.channel import Channel
 from realizer.animation.targets import Target, au, fap
-from realizer.arrays import Float64
 from realizer.behaviours.fap_values import RECORDED, out_of_range
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.tracks import track
+from realizer.core.arrays import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
 from realizer.behaviours.kind import Fault, World
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 __all__ = ["MediaError"]
 

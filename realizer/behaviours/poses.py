@@ -9,8 +9,8 @@ import numpy as np
 
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import Target, au
-from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault
+from realizer.core.arrays import Float64
 
 __all__: list[str] = []
 

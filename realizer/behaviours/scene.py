@@ -14,8 +14,8 @@ import numpy as np
 from realizer import tables
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import au
-from realizer.arrays import Float64
 from realizer.behaviours.kind import Fault, Position, World
+from realizer.core.arrays import Float64
 
 __all__: list[str] = []
 

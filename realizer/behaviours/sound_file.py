@@ -8,9 +8,9 @@ from itertools import chain
 
 import numpy as np
 
-from realizer.arrays import Int16
 from realizer.behaviours.wav_file import read_wav
-from realizer.errors import RealizerError
+from realizer.core.arrays import Int16
+from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Recording
 
 __all__ = ["read_sound"]

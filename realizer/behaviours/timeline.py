@@ -9,9 +9,9 @@ import numpy as np
 from bml_schema import Timeline as Node
 from realizer.animation.channel import Channel
 from realizer.animation.targets import Target, presence, rank
-from realizer.arrays import Float64
 from realizer.behaviours import media, poses
 from realizer.behaviours.kind import Fault, Kind, World
+from realizer.core.arrays import Float64
 from realizer.expressions import Timeline, Track, faults_of, lasts, read_timeline, remarks, spans
 from realizer.scheduling.timing import Timing
 

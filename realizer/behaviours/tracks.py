@@ -6,7 +6,7 @@ import numpy as np
 
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.targets import AU_NAMES, Target
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 
 __all__: list[str] = []
 

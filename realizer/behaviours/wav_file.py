@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from realizer.arrays import Float32, Int16
-from realizer.errors import RealizerError
+from realizer.core.arrays import Float32, Int16
+from realizer.core.errors import RealizerError
 
 __all__ = ["read_wav"]
 

@@ -10,7 +10,7 @@ from realizer.charts.raster import png
 from realizer.charts.shapes import Picture
 from realizer.charts.svg import svg
 from realizer.charts.timeline import BlockLine
-from realizer.outputs.files import write_bytes
+from realizer.core.files import write_bytes
 
 __all__ = ["WRITERS", "write_timeline", "writer_for"]
 

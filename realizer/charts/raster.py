@@ -6,7 +6,7 @@ import io
 from typing import TYPE_CHECKING
 
 from realizer.charts.shapes import FINE, Box, Path, Picture, Text, font
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from bml_schema import Behaviour, Block, Place
 from realizer.charts.links import links_of
 from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Link, Point, Spoken
-from realizer.composition.cast import Cast
-from realizer.composition.playing import Playing
-from realizer.composition.relations import instants
+from realizer.playback.cast import Cast
+from realizer.playback.playing import Playing
+from realizer.playback.relations import instants
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 __all__ = ["line_of", "lines_of"]

@@ -15,7 +15,7 @@ from realizer.checking.finding import Finding, Label
 from realizer.checking.findings import near
 
 if TYPE_CHECKING:
-    from realizer.player import Player
+    from realizer.playback.player import Player
     from realizer.scheduling.timing import Schedule
 
 __all__ = ["ADVICE", "advice"]

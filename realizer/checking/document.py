@@ -13,7 +13,7 @@ from realizer.checking.finding import Finding
 from realizer.checking.findings import finding_of
 from realizer.checking.hidden import hidden, told_of, without_faults
 from realizer.pipeline import speak, submitted, warning_of
-from realizer.player import Player
+from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech import SilentVoice
 from realizer.speech.utterance import Utterance

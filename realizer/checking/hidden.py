@@ -10,7 +10,7 @@ from bml_schema.source import Source
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import World
 from realizer.checking.findings import attributes_of
-from realizer.player import Player
+from realizer.playback.player import Player
 from realizer.scheduling.timing import Warning
 
 __all__ = ["hidden", "told_of", "without_faults"]

@@ -24,7 +24,7 @@ from realizer.cli.replay import replay
 from realizer.cli.serve import serve
 from realizer.cli.timeline import timeline
 from realizer.cli.track import track
-from realizer.errors import RealizerError, TableError
+from realizer.core.errors import RealizerError, TableError
 
 __all__ = ["main"]
 

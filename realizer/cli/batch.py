@@ -16,7 +16,7 @@ from realizer.cli.play import PICTURES, performance
 if TYPE_CHECKING:
     from realizer.batch.run import Crew
     from realizer.batch.task import Options
-    from realizer.settings import Settings
+    from realizer.core.settings import Settings
 
 __all__: list[str] = []
 

@@ -22,7 +22,7 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
 
     Prints what was found, what is missing, and what to look at.
     """
-    from realizer.face.arkit.folder import import_head
+    from realizer.facebuild.arkit.folder import import_head
 
     folder = output or Path("faces") / (name or head.stem)
     for line in import_head(head, folder, name or folder.name).lines:
@@ -36,8 +36,8 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
 @click.argument("names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...")
 def check(names: tuple[str, ...]) -> int:
     """Say every fault of face folders, of all without a name; of a GLB head, what an import would find."""
-    from realizer.face.check import check_face
     from realizer.face.load import face_folders
+    from realizer.facebuild.check import check_face
 
     status = 0
     for name in names or face_folders():
@@ -59,8 +59,8 @@ def check(names: tuple[str, ...]) -> int:
 
 def _head_faults(head: Path) -> tuple[str, ...]:
     """Why a head cannot be imported; else says what an import finds."""
-    from realizer.errors import FaceError
-    from realizer.face.arkit.folder import look_at
+    from realizer.core.errors import FaceError
+    from realizer.facebuild.arkit.folder import look_at
 
     try:
         for line in look_at(head).lines:

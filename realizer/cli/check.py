@@ -63,7 +63,7 @@ def check(
     from realizer.checking import Finding, advice, checked
     from realizer.cli.diagnostics import one_line, render
     from realizer.cli.habits import habits
-    from realizer.player import Player
+    from realizer.playback.player import Player
 
     long = sys.stdout.isatty() if long is None else long
     width = shutil.get_terminal_size((100, 24)).columns

@@ -40,7 +40,7 @@ def demo(once: bool, port: int, voice: str | None, face: str) -> None:
 def _film(documents: list[str], voice: str | None, face: str) -> None:
     """All examples one after the other into demo.fap and demo.mp4."""
     from realizer.cli.options import tell_silence
-    from realizer.errors import RealizerError
+    from realizer.core.errors import RealizerError
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
     from realizer.pipeline import realize
@@ -71,8 +71,8 @@ def _line(feedback: Feedback) -> str:
 async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | None, face: str) -> None:
     """Serve, send every example as a client would, print what is told of it and when."""
     from realizer.client import connect
+    from realizer.core.settings import Settings
     from realizer.server.serve import Server
-    from realizer.settings import Settings
 
     settings = Settings.read({"port": port, "voice": voice, "face": face})
     try:

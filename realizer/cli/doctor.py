@@ -52,8 +52,8 @@ def _node() -> Iterator[Finding]:
 
 
 def _faces() -> Iterator[Finding]:
-    from realizer.face.check import check_face
     from realizer.face.load import list_faces
+    from realizer.facebuild.check import check_face
 
     found = list_faces()
     if not found:

@@ -13,7 +13,7 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from realizer.emotion.profile import Profile
+    from realizer.emotions.profile import Profile
 
 __all__: list[str] = []
 
@@ -101,8 +101,8 @@ def _asked(
     arousal: float | None,
     other: bool,
 ) -> Profile | None:
-    from realizer.emotion.wheel import affect, wheel
-    from realizer.emotion.words import emotion as profile_of
+    from realizer.emotions.wheel import affect, wheel
+    from realizer.emotions.words import emotion as profile_of
 
     if (valence is None) != (arousal is None):
         raise click.UsageError("wanted --valence and --arousal together, got one of them")
@@ -128,7 +128,7 @@ def _read(path: Path) -> Profile:
     Raises:
         ValueError: no such file, what is none of Paul's, or more than one profile.
     """
-    from realizer.emotion.profile_file import read_profiles
+    from realizer.emotions.profile_file import read_profiles
 
     try:
         found = read_profiles(path.read_text("utf-8-sig"), str(path))
@@ -146,7 +146,7 @@ def _mixed(
     profiles: str, angle: float | None, valence: float | None, arousal: float | None
 ) -> Mapping[str, float]:
     """How much of which archetype is at a place; nothing of a word, whose name says what it is."""
-    from realizer.emotion.wheel import shares
+    from realizer.emotions.wheel import shares
 
     if angle is not None:
         return shares(angle, profiles)
@@ -156,7 +156,7 @@ def _mixed(
 
 
 def _tell(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_json: bool) -> None:
-    from realizer.emotion.profile import Profile
+    from realizer.emotions.profile import Profile
     from realizer.tables import faps
 
     values = profile.frame() if seed is None else profile.draw(seed)
@@ -179,7 +179,7 @@ def _tell(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_jso
 
 
 def _write(profile: Profile, seed: int | None, path: Path, face: str, camera: str) -> None:
-    from realizer.emotion.profile_file import write_profiles
+    from realizer.emotions.profile_file import write_profiles
 
     if path.suffix.lower() == ".txt":
         path.write_text(write_profiles([profile]), "utf-8")
@@ -198,7 +198,7 @@ def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
     import numpy as np
     from PIL import Image
 
-    from realizer.emotion.wheel import wheel
+    from realizer.emotions.wheel import wheel
     from realizer.render import Renderer
     from realizer.render.sheets import sheet
     from realizer.tables.feelings import ring

@@ -73,7 +73,7 @@ def words_for(language: str | None, file: Path | None) -> Words:
     Raises:
         click.UsageError: a file that is no list of words.
     """
-    from realizer.errors import TableError
+    from realizer.core.errors import TableError
     from realizer.knowledge.languages import Words
     from realizer.tables.emotional_words import words_of
 
@@ -258,7 +258,7 @@ def _heard(block: Block, language: str) -> list[Heard]:
     from realizer.knowledge.enrich import Heard
     from realizer.knowledge.languages import language_of
     from realizer.pipeline import submitted
-    from realizer.player import Player
+    from realizer.playback.player import Player
     from realizer.speech import SilentVoice
 
     times = submitted(Player(language=language), block, SilentVoice()).times

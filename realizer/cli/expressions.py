@@ -13,8 +13,8 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
+    from realizer.analysis.likeness import Likeness
     from realizer.expressions import Expression
-    from realizer.expressions.likeness import Likeness
 
 __all__: list[str] = []
 
@@ -33,7 +33,7 @@ class Units(click.ParamType):  # type: ignore[type-arg]
     name = "units"
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
-        from realizer.errors import TableError
+        from realizer.core.errors import TableError
         from realizer.tables.lexemes import read_aus
 
         found: dict[tuple[int, str], float] = {}
@@ -129,7 +129,7 @@ def find(
 
 
 def _looked_up(like: Path, known: Sequence[Expression], face: str | None) -> Likeness:
-    from realizer.expressions.likeness import UnknownPictureError, by_picture, read_picture
+    from realizer.analysis.likeness import UnknownPictureError, by_picture, read_picture
 
     try:
         return by_picture(read_picture(like), known, None if face is None else [face])
@@ -168,7 +168,7 @@ def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: s
     from realizer.animation.pose import poses
     from realizer.cli.poses import Series, frames, of_expressions
     from realizer.face.load import takes
-    from realizer.mapping import mapping_of
+    from realizer.face.mapping import mapping_of
     from realizer.render import Renderer
     from realizer.render.sheets import sheet
 

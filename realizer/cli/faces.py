@@ -51,7 +51,7 @@ def list_() -> None:
 )
 def build(name: str, data: Path, output: Path | None) -> None:
     """Build a face folder from the CC0 MakeHuman data."""
-    from realizer.face.build import build_face
+    from realizer.facebuild.person.build import build_face
 
     folder = build_face(name, data, output or Path("faces") / name)
     click.echo(f"{folder}: built")
@@ -74,8 +74,8 @@ def build(name: str, data: Path, output: Path | None) -> None:
 def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, only: tuple[int, ...]) -> None:
     """Make a face of a head by MPEG-4 zones: a mesh is enough, its feature points are found."""
     from realizer.face.load import folder_of
-    from realizer.face.mpeg4.build import copy_with_zones
-    from realizer.face.mpeg4.faceeditor import write_faceeditor
+    from realizer.facebuild.mpeg4.build import copy_with_zones
+    from realizer.facebuild.mpeg4.faceeditor import write_faceeditor
 
     setup, guesses = copy_with_zones(folder_of(name), output, parameters, only)
     if guesses:

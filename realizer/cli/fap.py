@@ -13,7 +13,7 @@ from realizer.cli import options
 from realizer.cli.play import perform, performing
 
 if TYPE_CHECKING:
-    from realizer.animation.fap_clip import FAPClip
+    from realizer.animation.fap.fap_clip import FAPClip
 
 __all__: list[str] = []
 
@@ -86,8 +86,8 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
     realizer fap convert greta.fap -o clean.fap --fps 30
     """
     from realizer.behaviours.fap_compound import shown
+    from realizer.core.files import write_text
     from realizer.outputs.clip_files import ENCODINGS, limited
-    from realizer.outputs.files import write_text
 
     suffix = Path(output).suffix.lower()
     if suffix not in ENCODINGS:
@@ -128,7 +128,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     from bml_schema.documents import MOST_BYTES
     from realizer.behaviours.fap_compound import shown
     from realizer.behaviours.fap_document import document_of
-    from realizer.errors import RealizerError
+    from realizer.core.errors import RealizerError
 
     clip = shown(_read(file))
     _tell(context, file, clip)
@@ -153,7 +153,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
 
 
 def _read(file: str) -> FAPClip:
-    from realizer.errors import RealizerError
+    from realizer.core.errors import RealizerError
     from realizer.outputs.clip_files import read_clip
 
     (content,) = options.read_documents([file])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from realizer.errors import FaceError
+from realizer.core.errors import FaceError
 
 __all__: list[str] = []
 
@@ -53,10 +53,10 @@ def fit(
     # Small products, thousands of them: a second thread only costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from realizer.face.au.file import write_model
-    from realizer.face.au.fit import fit_models, table, table_text
-    from realizer.face.au.limit import runaways
-    from realizer.face.au.measure import read_measured, read_shapes, write_shapes
     from realizer.face.load import folder_of, load_face
+    from realizer.facebuild.au.fit import fit_models, table, table_text
+    from realizer.facebuild.au.limit import runaways
+    from realizer.facebuild.au.measure import read_measured, read_shapes, write_shapes
 
     if measurements and data:
         raise click.UsageError("wanted --from or --data, got both")
@@ -64,7 +64,7 @@ def fit(
     files = _files(output or folder, form)
     source = face.source
     if data:
-        from realizer.face.au.shapes import measure_shapes
+        from realizer.facebuild.au.shapes import measure_shapes
 
         measured = measure_shapes(face, folder, data)
     elif measurements:

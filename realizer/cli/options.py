@@ -13,8 +13,8 @@ import click
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from realizer.behaviours.kind import Position
+    from realizer.core.settings import Settings
     from realizer.scheduling.timing import Warning
-    from realizer.settings import Settings
 
 __all__: list[str] = []
 
@@ -86,7 +86,7 @@ def settings(**flags: Any) -> Settings:
     Raises:
         click.UsageError: a wrong value, and where it came from.
     """
-    from realizer.settings import Settings, SettingsError
+    from realizer.core.settings import Settings, SettingsError
 
     try:
         return Settings.read(flags)
@@ -125,7 +125,7 @@ def read_documents(names: Iterable[str]) -> list[bytes]:
 
 
 def read_scene(path: str | Path | None) -> dict[str, Position] | None:
-    from realizer.scene import parse_scene
+    from realizer.playback.scene import parse_scene
 
     if path is None:
         return None
@@ -199,7 +199,7 @@ def _colour(context: click.Context, parameter: click.Parameter, value: str | Non
 
 def _asked(check: Callable[[str], object], value: str) -> str:
     """The value, where `check` takes it; what it says otherwise is about how it was called."""
-    from realizer.errors import RenderError
+    from realizer.core.errors import RenderError
 
     try:
         check(value)
@@ -249,7 +249,7 @@ def speak_up(context: click.Context, *, quiet: bool = False, verbose: bool = Fal
     """Say as much on standard error as was asked for, before or after the command's name."""
     import logging
 
-    from realizer.logs import write_words
+    from realizer.core.logs import write_words
 
     context.obj = {"quiet": quiet, "verbose": verbose}
     level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING

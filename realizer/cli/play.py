@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from realizer.charts.timeline import BlockLine
-    from realizer.player import Player
+    from realizer.playback.player import Player
     from realizer.scheduling.timing import Schedule
 
 __all__: list[str] = []
@@ -233,7 +233,7 @@ def schedule(
     length they would like, what ties them, how much room before and after leave, and what was dropped.
     """
     from realizer.pipeline import play
-    from realizer.player import Player
+    from realizer.playback.player import Player
 
     if as_json and as_bml:
         raise click.UsageError("--json, --bml: wanted one of them, got both")

@@ -10,8 +10,8 @@ import numpy as np
 
 from realizer.animation.frames import AUFrames
 from realizer.animation.targets import au, axis, fap
-from realizer.arrays import Float32
-from realizer.emotion.wheel import wheel
+from realizer.core.arrays import Float32
+from realizer.emotions.wheel import wheel
 from realizer.expressions import Expression
 from realizer.tables import by_number, faps
 from realizer.tables.emotions import archetypes

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from realizer.cli import options
-from realizer.settings import Settings
+from realizer.core.settings import Settings
 
 __all__: list[str] = []
 
@@ -122,9 +122,9 @@ def serve(config: Path | None, **flags: Any) -> None:
     Prints one line for each open door when it is ready. SIGINT or SIGTERM: takes no more work, gives what
     plays 5 s, ends.
     """
+    from realizer.core.settings import SettingsError
     from realizer.server.serve import run
     from realizer.server.serve import serve as start
-    from realizer.settings import SettingsError
     from realizer.speech import find_voice
 
     try:

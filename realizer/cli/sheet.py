@@ -15,7 +15,7 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from realizer.animation.mapping import FapMapping
+    from realizer.animation.fap.mapping import FapMapping
     from realizer.cli.poses import Series
     from realizer.render.sheets import Cell
 
@@ -87,7 +87,7 @@ def sheet(
     from PIL import Image
 
     from realizer.cli import poses
-    from realizer.mapping import mapping_of
+    from realizer.face.mapping import mapping_of
     from realizer.render.sheets import Group, album
 
     if output.suffix != ".png":

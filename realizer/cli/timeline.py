@@ -77,7 +77,7 @@ def is_timeline(name: str) -> bool:
 
 def faults_in(content: bytes, library: Library) -> list[str]:
     """All that is wrong with a timeline: channel, entry, what was wanted, what came."""
-    from realizer.errors import TableError
+    from realizer.core.errors import TableError
     from realizer.expressions import faults_of, read_timeline
 
     try:

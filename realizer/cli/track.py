@@ -11,7 +11,7 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from realizer.arrays import Float64
+    from realizer.core.arrays import Float64
     from realizer.face.model import Fapu
 
 __all__: list[str] = []
@@ -48,11 +48,11 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
     """
     import numpy as np
 
-    from realizer.animation.fap_clip import FAPClip
+    from realizer.analysis.measure import faps_from_points
+    from realizer.analysis.points_file import bridge, read_points
+    from realizer.analysis.recognise import recogniser
+    from realizer.animation.fap.fap_clip import FAPClip
     from realizer.animation.frames import FAPFrames
-    from realizer.emotion.measure import faps_from_points
-    from realizer.emotion.points_file import bridge, read_points
-    from realizer.emotion.recognise import recogniser
     from realizer.outputs.fap_text import encode
 
     if output.suffix.lower() != ".fap":
@@ -83,7 +83,7 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
 def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
     import numpy as np
 
-    from realizer.errors import FaceError
+    from realizer.core.errors import FaceError
     from realizer.face.features import fapu_of
 
     try:

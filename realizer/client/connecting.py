@@ -8,7 +8,7 @@ from typing import Any
 from realizer.client.live import Client
 from realizer.client.mail import ClientError
 from realizer.client.plain import SyncClient
-from realizer.server.messages import PROTOCOL
+from realizer.protocol.messages import PROTOCOL
 
 __all__ = ["Connecting", "connect"]
 

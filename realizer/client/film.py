@@ -14,9 +14,9 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 import numpy as np
 
 from bml_schema.feedback import BlockProgress
-from realizer.arrays import Int16, UInt8
 from realizer.client.mail import ClientError
-from realizer.server.wire import WireFrame
+from realizer.core.arrays import Int16, UInt8
+from realizer.protocol.wire import WireFrame
 
 if TYPE_CHECKING:
     from realizer.client.live import Client
@@ -31,7 +31,7 @@ LOOK = {"format": "jpeg", "quality": 95}
 async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping[str, Any]) -> BlockProgress:
     """As `Client.film`, which see. A connection of its own: what the client subscribed to stays."""
     from realizer.client.connecting import connect
-    from realizer.outputs.files import replacing
+    from realizer.core.files import replacing
     from realizer.outputs.film import FORMATS, encode_film
 
     if path.suffix.lower() not in FORMATS:

@@ -10,8 +10,8 @@ from html import unescape
 from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
-from realizer.errors import RealizerError
-from realizer.server.wire import PAYLOADS, WireFrame, unpack
+from realizer.core.errors import RealizerError
+from realizer.protocol.wire import PAYLOADS, WireFrame, unpack
 
 __all__ = ["ClientError", "Frame"]
 

@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.expressions.expression import Expression, key
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import Gap, gaps

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
 from realizer.tables import action_units
 

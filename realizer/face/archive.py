@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.errors import FaceError
+from realizer.core.errors import FaceError
 
 __all__: list[str] = []
 

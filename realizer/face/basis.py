@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, Int32
-from realizer.errors import FaceError
+from realizer.core.arrays import Float32, Int32
+from realizer.core.errors import FaceError
 from realizer.face.archive import read_arrays
 from realizer.face.contours import contours_of
 from realizer.face.model import Fapu

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.arrays import Float32
-from realizer.errors import FaceError, TableError
+from realizer.core.arrays import Float32
+from realizer.core.errors import FaceError, TableError
 from realizer.face.model import Fapu
 from realizer.tables import read_csv
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.colours import linear
+from realizer.core.colours import linear
 from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.arrays import Float32
-from realizer.errors import FaceError
+from realizer.core.arrays import Float32
+from realizer.core.errors import FaceError
 from realizer.face.archive import read_arrays
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float64, Int32
+from realizer.core.arrays import Float64, Int32
 
 __all__: list[str] = []
 

@@ -11,7 +11,7 @@ from realizer.outputs import said
 from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
-    from realizer.composition.playing import Speaking
+    from realizer.playback.playing import Speaking
     from realizer.realization import Realization
 
 __all__ = ["Track", "captions"]

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from realizer.animation.fap_clip import FAPClip
-from realizer.animation.fap_reader import read_fap
-from realizer.errors import RealizerError
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.fap.fap_reader import read_fap
+from realizer.core.errors import RealizerError
 from realizer.outputs import fap_text
 from realizer.tables import faps
 

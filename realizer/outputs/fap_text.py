@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.animation.fap_clip import FAPClip
-from realizer.animation.viseme_weights import fap_1
-from realizer.arrays import Int32
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.lips.viseme_weights import fap_1
+from realizer.core.arrays import Int32
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

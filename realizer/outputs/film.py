@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.arrays import Int16, UInt8
-from realizer.errors import RealizerError
+from realizer.core.arrays import Int16, UInt8
+from realizer.core.errors import RealizerError
+from realizer.core.files import replacing
 from realizer.outputs.captions import Track, captions
-from realizer.outputs.files import replacing
 from realizer.outputs.output import Drawing, Output
 from realizer.outputs.said import Span
 

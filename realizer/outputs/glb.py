@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.arrays import Float32
+from realizer.core.arrays import Float32
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
 from realizer.outputs.morphs import morphs

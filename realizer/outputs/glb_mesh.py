@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.arrays import Bool, Float32
-from realizer.colours import linear
+from realizer.core.arrays import Bool, Float32
+from realizer.core.colours import linear
 from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from realizer.face.surface import normals
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from realizer.animation.targets import fap
-from realizer.arrays import Float32, Float64
-from realizer.units import ANGLE_UNIT
+from realizer.core.arrays import Float32, Float64
+from realizer.core.units import ANGLE_UNIT
 
 if TYPE_CHECKING:
     from realizer.face.model import Face

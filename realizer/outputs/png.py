@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
+from realizer.core.arrays import Float32, UInt8
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from realizer.composition.playing import Speaking
+    from realizer.playback.playing import Speaking
     from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 

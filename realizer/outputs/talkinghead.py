@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.animation.viseme_weights import oculus_visemes
-from realizer.animation.visemes import sounds
+from realizer.animation.lips.viseme_weights import oculus_visemes
+from realizer.animation.lips.visemes import sounds
 from realizer.outputs import said
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.outputs.output import Drawing, Output
 from realizer.outputs.said import Span
 
 if TYPE_CHECKING:
-    from realizer.composition.playing import Speaking
+    from realizer.playback.playing import Speaking
     from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_talkinghead"]

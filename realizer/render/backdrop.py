@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 
-from realizer.arrays import UInt8
-from realizer.errors import RenderError
+from realizer.core.arrays import UInt8
+from realizer.core.errors import RenderError
 from realizer.render.light import Light
 
 __all__ = ["TRANSPARENT", "backdrop", "channels", "colour_of", "over"]

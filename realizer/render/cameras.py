@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, Float64
-from realizer.errors import RenderError
+from realizer.core.arrays import Float32, Float64
+from realizer.core.errors import RenderError
 from realizer.face.model import Face
 
 __all__ = ["PRESETS", "Camera", "Framing", "camera_for", "camera_names"]

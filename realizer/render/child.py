@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import realizer
-from realizer.errors import RenderError
+from realizer.core.errors import RenderError
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection

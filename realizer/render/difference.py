@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
+from realizer.core.arrays import Float32, UInt8
 
 __all__ = ["FULL", "difference", "faint", "flatten", "ramp"]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, Int32
+from realizer.core.arrays import Float32, Int32
 from realizer.face.model import Face
 from realizer.render.light import Light, unit
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
-from realizer.colours import linear, srgb
-from realizer.errors import RenderError, TableError
+from realizer.core.arrays import Float32, UInt8
+from realizer.core.colours import linear, srgb
+from realizer.core.errors import RenderError, TableError
 
 __all__ = ["Lamp", "Light", "Shader", "preset", "presets"]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
-from realizer.errors import RenderError
+from realizer.core.arrays import Float32, UInt8
+from realizer.core.errors import RenderError
 from realizer.face.model import Face
 from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
+from realizer.core.arrays import Float32, UInt8
 from realizer.face.model import Face
 from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera

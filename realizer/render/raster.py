@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, Int32, UInt8
-from realizer.errors import RenderError
+from realizer.core.arrays import Float32, Int32, UInt8
+from realizer.core.errors import RenderError
 
 __all__ = ["Raster", "ready"]
 

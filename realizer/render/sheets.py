@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.arrays import UInt8
+from realizer.core.arrays import UInt8
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.arrays import Float64, Int32
+from realizer.core.arrays import Float64, Int32
 from realizer.face.model import Face
 
 __all__ = ["on_skin"]

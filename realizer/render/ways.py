@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Protocol
 
-from realizer.arrays import Float32, UInt8
-from realizer.errors import RenderError
+from realizer.core.arrays import Float32, UInt8
+from realizer.core.errors import RenderError
 from realizer.face.model import Face
 from realizer.render.cameras import Camera
 from realizer.render.light import Light

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
+from realizer.core.arrays import Float32, UInt8
 from realizer.face.model import Face
 
 __all__ = ["Draw", "Encode", "Failed", "Open", "Pixels"]

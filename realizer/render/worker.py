@@ -9,8 +9,8 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-from realizer.arrays import Float32, UInt8
-from realizer.errors import RealizerError
+from realizer.core.arrays import Float32, UInt8
+from realizer.core.errors import RealizerError
 from realizer.face.model import Face
 from realizer.render.backdrop import channels
 from realizer.render.cameras import camera_for
@@ -128,7 +128,7 @@ def serve(orders: Connection, answers: Connection) -> None:
 
 def check(way: str) -> int:
     """Draw one triangle; say on stdout which way was taken, or return 3 and say what is missing."""
-    from realizer.errors import RenderError
+    from realizer.core.errors import RenderError
     from realizer.render.sample import triangle
 
     face = triangle()

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float32, Float64, Int32
+from realizer.core.arrays import Float32, Float64, Int32
 from realizer.face.model import Face
 from realizer.render.skin import on_skin
 

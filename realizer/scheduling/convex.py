@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.arrays import Bool, Float64
+from realizer.core.arrays import Bool, Float64
 from realizer.scheduling.model import LOOSE, TIGHT, Index
 from realizer.scheduling.paths import components, raise_levels
 from realizer.scheduling.shapes import settle

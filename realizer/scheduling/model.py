@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from realizer.arrays import Bool, Float64
+from realizer.core.arrays import Bool, Float64
 from realizer.scheduling.clash import Clash, Web
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.ties import Ties

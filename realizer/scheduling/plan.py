@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 from realizer.scheduling.explain import choose, fault_warning, refusal, warning_of
 from realizer.scheduling.problem import Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve

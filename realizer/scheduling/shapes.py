@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.arrays import Bool, Float64
+from realizer.core.arrays import Bool, Float64
 from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
 from realizer.scheduling.ties import Ties

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 from realizer.scheduling.clash import Clash, Link, Web
 from realizer.scheduling.direct import direct
 from realizer.scheduling.groups import Group, groups_of, slides

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 from realizer.scheduling.clash import Link
 from realizer.scheduling.convex import Quadratic, kept, optimum, settled
 from realizer.scheduling.groups import Group

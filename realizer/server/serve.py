@@ -9,19 +9,19 @@ import socket
 from collections.abc import Awaitable, Coroutine, Iterator
 from types import TracebackType
 
-from realizer.errors import RealizerError
-from realizer.logs import write_json
+from realizer.core.errors import RealizerError
+from realizer.core.logs import write_json
+from realizer.core.settings import Settings, SettingsError
 from realizer.scheduling import warm_up
-from realizer.server.cycles import leave_to_shell
-from realizer.server.doors.asap import AsapDoor
-from realizer.server.doors.door import Door
-from realizer.server.doors.stomp import StompDoor
-from realizer.server.doors.websocket import WebSocketDoor, lines
-from realizer.server.doors.xface import XfaceDoor
-from realizer.server.doors.xface_player import XfacePlayerDoor
-from realizer.server.shell import Shell
-from realizer.server.workers import FAULT, READY, Workers, handed
-from realizer.settings import Settings, SettingsError
+from realizer.server.runtime.cycles import leave_to_shell
+from realizer.server.runtime.shell import Shell
+from realizer.server.runtime.workers import FAULT, READY, Workers, handed
+from realizer.server.transports.asap import AsapDoor
+from realizer.server.transports.door import Door
+from realizer.server.transports.stomp import StompDoor
+from realizer.server.transports.websocket.websocket import WebSocketDoor, lines
+from realizer.server.transports.xface.xface import XfaceDoor
+from realizer.server.transports.xface.xface_player import XfacePlayerDoor
 
 __all__ = ["Server", "run", "serve", "work"]
 

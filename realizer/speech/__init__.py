@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from realizer.speech.catalogue import VoiceInfo, find_voice, voices
-    from realizer.speech.espeak import EspeakVoice
-    from realizer.speech.hibari import HibariVoice
+    from realizer.speech.espeak.espeak import EspeakVoice
+    from realizer.speech.hibari.hibari import HibariVoice
     from realizer.speech.silent import SilentVoice
     from realizer.speech.utterance import Phoneme, Say, Utterance, Voice, Word
 
@@ -30,8 +30,8 @@ __all__ = [
 ]
 
 _HOME = {
-    "EspeakVoice": "espeak",
-    "HibariVoice": "hibari",
+    "EspeakVoice": "espeak.espeak",
+    "HibariVoice": "hibari.hibari",
     "SilentVoice": "silent",
     "VoiceInfo": "catalogue",
     "find_voice": "catalogue",

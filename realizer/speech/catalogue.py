@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from realizer.errors import VoiceError
+from realizer.core.errors import VoiceError
 from realizer.speech.silent import SilentVoice
 from realizer.speech.spelling import GENERIC, syllable_facts
 from realizer.speech.utterance import Voice
@@ -33,7 +33,8 @@ class VoiceInfo:
 
 def voices() -> tuple[VoiceInfo, ...]:
     """The voices, best first; starts no engine."""
-    from realizer.speech import espeak, hibari
+    from realizer.speech.espeak import espeak
+    from realizer.speech.hibari import hibari
 
     spelled = tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
     return (
@@ -73,7 +74,8 @@ def find_voice(name: str | None = None) -> Voice:
     Raises:
         VoiceError: no such voice, or it is not installed; the text says what to do.
     """
-    from realizer.speech import espeak, hibari
+    from realizer.speech.espeak import espeak
+    from realizer.speech.hibari import hibari
 
     if name is None:
         name = next(voice.name for voice in voices() if voice.available)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from realizer.errors import VoiceError
+from realizer.core.errors import VoiceError
 
 __all__ = ["RUN", "Engine", "EngineProcess"]
 

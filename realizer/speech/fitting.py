@@ -28,7 +28,7 @@ def fitted(voice: Voice, say: Say) -> Utterance:
         VoiceError: as `voice.say`.
     """
     if say.recording is not None:
-        from realizer.speech.given import played
+        from realizer.speech.recorded.given import played
 
         return with_volumes(say, played(say, say.recording))
     return with_volumes(say, _spoken(voice, say))

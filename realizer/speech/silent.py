@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from realizer.errors import VoiceError
+from realizer.core.errors import VoiceError
 from realizer.speech.fitting import fitted
 from realizer.speech.spelling import letters_to_phonemes, syllable_facts, units
 from realizer.speech.ssml import Mark, read_script

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
-from realizer.errors import VoiceError
+from realizer.core.errors import VoiceError
 from realizer.speech.prosody import understood
 from realizer.speech.utterance import MOST_TEXT, Say
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from realizer.arrays import Int16
-from realizer.speech.hibari_times import Sound
+from realizer.core.arrays import Int16
+from realizer.speech.hibari.hibari_times import Sound
 from realizer.speech.utterance import Phoneme
 from realizer.speech.words import PlacedMark
 

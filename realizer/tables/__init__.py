@@ -15,7 +15,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 
 __all__ = [
     "ActionUnit",

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 
 __all__ = ["Rule", "Rules", "Unit", "chosen", "parse_rule", "read_rules", "rules"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 
 __all__ = ["EmotionModel", "emotion_model"]
 

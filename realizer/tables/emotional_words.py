@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 
 __all__ = ["CATEGORIES", "WordList", "read_words", "word_list", "words_of"]
 

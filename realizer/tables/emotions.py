@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes, read_aus
 

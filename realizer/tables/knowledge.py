@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any, Literal
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables.emotional_words import CATEGORIES
 from realizer.tables.templates import templates
 

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 
 __all__ = ["FaceLexeme", "HeadLexeme", "face_lexemes", "head_lexemes"]
 

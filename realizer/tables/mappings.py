@@ -19,7 +19,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Literal, TypeAlias, cast
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables import AuToFap, action_units, au_to_fap, by_number, faps, nearest, read_csv
 
 __all__ = ["FORMS", "Units", "as_text", "own_file", "read_mapping", "write_mapping"]

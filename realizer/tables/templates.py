@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 

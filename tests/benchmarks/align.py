@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from realizer.speech import Say, find_voice
 from realizer.speech.align import Alignment, align
 

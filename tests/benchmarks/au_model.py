@@ -23,14 +23,14 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.animation.targets import au, axis
 from realizer.face.au.file import read_model
-from realizer.face.au.fit import table, table_text
-from realizer.face.au.measure import Measured, read_shapes
 from realizer.face.au.mixers import mix
 from realizer.face.au.model import Model
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.face.surface import normals
+from realizer.facebuild.au.fit import table, table_text
+from realizer.facebuild.au.measure import Measured, read_shapes
 
 SHOWN = (1, 4, 6, 9, 10, 12, 15, 18, 27, 43)
 HERS = 0.120

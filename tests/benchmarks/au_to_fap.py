@@ -20,16 +20,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import numpy.typing as npt
 
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.targets import au, axis
-from realizer.arrays import Float32, Float64, Int32
-from realizer.face.au.measure import Measured, read_shapes
-from realizer.face.au.shapes import measure_shapes
+from realizer.core.arrays import Float32, Float64, Int32
 from realizer.face.au.units import units
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
+from realizer.facebuild.au.measure import Measured, read_shapes
+from realizer.facebuild.au.shapes import measure_shapes
 from realizer.tables import faps
 
 # Feature points by the part of the face they stand for.

@@ -38,8 +38,8 @@ from stopwatch import Noise
 from realizer.batch.processes import Processes
 from realizer.batch.task import Options, Task
 from realizer.batch.work import Worker
-from realizer.speech.espeak import WORDS_A_MINUTE
-from realizer.speech.espeak_worker import load
+from realizer.speech.espeak.espeak import WORDS_A_MINUTE
+from realizer.speech.espeak.espeak_worker import load
 
 LENGTHS = (4, 30)  # s, about
 DOCUMENTS = 40

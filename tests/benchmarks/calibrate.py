@@ -12,7 +12,7 @@ import sys
 import numpy as np
 from align import SENTENCES
 
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from realizer.speech import Say, find_voice
 from realizer.speech.align import align
 

@@ -24,8 +24,8 @@ from realizer.charts.raster import png
 from realizer.charts.reading import lines_of
 from realizer.charts.svg import svg
 from realizer.pipeline import play
-from realizer.player import Player
-from realizer.server.plans import Plans
+from realizer.playback.player import Player
+from realizer.server.streams.plans import Plans
 
 
 def faces(count: int) -> str:

@@ -25,13 +25,13 @@ from plot import bars, exponent
 from stopwatch import noise
 
 from realizer.animation.blend import blend
-from realizer.animation.fap import to_fap
-from realizer.arrays import Float64
+from realizer.animation.fap.fap import to_fap
 from realizer.charts.colours import FAINT, INK, PAPER
 from realizer.charts.files import writer_for
 from realizer.charts.shapes import Box, Picture, Text
+from realizer.core.arrays import Float64
 from realizer.pipeline import play
-from realizer.player import Player
+from realizer.playback.player import Player
 
 FPS = 25
 SECONDS = 10.0

@@ -29,9 +29,9 @@ from stopwatch import helped
 
 from bml_schema import Block, read
 from realizer.behaviours import KINDS, VOCABULARY
-from realizer.planning import plan
-from realizer.player import Player
-from realizer.server.feedback_log import FeedbackLog
+from realizer.playback.planning import plan
+from realizer.playback.player import Player
+from realizer.server.session.feedback_log import FeedbackLog
 
 COUNTS = (1, 6, 20, 60)
 PARTS = ("read", "plan", "expand", "take in", "feedback", "together", "stretch")

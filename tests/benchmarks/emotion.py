@@ -19,13 +19,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realizer.emotion.archetypes import archetypes
-from realizer.emotion.measure import as_features_see, faps_from_features, features_from_points
-from realizer.emotion.mesh import faps_from_mesh, points_of
-from realizer.emotion.profile import Profile
-from realizer.emotion.recognise import Recogniser, recogniser
-from realizer.emotion.wheel import wheel
-from realizer.emotion.words import emotion, known_words
+from realizer.analysis.measure import as_features_see, faps_from_features, features_from_points
+from realizer.analysis.mesh import faps_from_mesh, points_of
+from realizer.analysis.recognise import Recogniser, recogniser
+from realizer.emotions.archetypes import archetypes
+from realizer.emotions.profile import Profile
+from realizer.emotions.wheel import wheel
+from realizer.emotions.words import emotion, known_words
 from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face

@@ -23,15 +23,15 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from unittest.mock import patch
 
-from realizer.server.effects import Speak
+from realizer.core.settings import Settings
 from realizer.server.journal import Entry, Journal, Kept, Log, journal_at
 from realizer.server.journal import notes as thresholds
 from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.folder import FolderJournal
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.replay import restored
-from realizer.server.session import Session
-from realizer.settings import Settings
+from realizer.server.session.effects import Speak
+from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
 from realizer.speech.utterance import Utterance
@@ -122,7 +122,7 @@ def size(kept: Kept) -> int:
 def report(name: str, where: str, documents: int, apart: float, bare: float) -> None:
     journal = Watched(journal_at(where))
     checkpoints = Checkpoints()
-    with patch("realizer.server.session.checkpoint", checkpoints):
+    with patch("realizer.server.session.session.checkpoint", checkpoints):
         cost = played(documents, apart, journal)
     began = time.process_time()
     kept = journal.take("long")

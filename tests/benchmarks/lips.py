@@ -14,8 +14,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from realizer.animation.lips.visemes import coarticulation
 from realizer.animation.pose import poses
-from realizer.animation.visemes import coarticulation
 from realizer.face.load import load_face
 from realizer.pipeline import realize
 from realizer.speech import Say, Utterance, Voice, find_voice

@@ -26,7 +26,7 @@ from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.animation.targets import au, axis
 from realizer.face.load import load_face
-from realizer.mapping import mapping_of
+from realizer.face.mapping import mapping_of
 from realizer.render import Renderer
 from realizer.tables.cooccurrence import rules
 from realizer.tables.lexemes import face_lexemes

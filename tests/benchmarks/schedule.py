@@ -33,7 +33,7 @@ from plot import exponent
 from stopwatch import helped, noise
 
 from bml_schema import MOST_BEHAVIOURS, Block, parse
-from realizer.player import Player
+from realizer.playback.player import Player
 from realizer.scheduling import Timing, schedule_block
 
 Work = tuple[Block, dict[str, Timing]]

@@ -16,7 +16,7 @@ import time
 from stopwatch import helped, noise
 from websockets.asyncio.client import connect
 
-from realizer.server.wire import unpack
+from realizer.protocol.wire import unpack
 
 ROUNDS = 30
 FPS = 25

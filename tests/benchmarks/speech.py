@@ -24,11 +24,11 @@ from dataclasses import replace
 import numpy as np
 from stopwatch import noise
 
-from realizer.animation.lips import lip_channels
-from realizer.server.effects import Send, Speak
-from realizer.server.session import Session
-from realizer.server.wire import FrameKind, unpack
-from realizer.settings import Settings
+from realizer.animation.lips.lips import lip_channels
+from realizer.core.settings import Settings
+from realizer.protocol.wire import FrameKind, unpack
+from realizer.server.session.effects import Send, Speak
+from realizer.server.session.session import Session
 from realizer.speech import Say, find_voice, voices
 from realizer.speech.fitting import fitted
 from realizer.speech.kept import Kept

@@ -14,8 +14,7 @@ import pytest
 
 from realizer.face.load import load_face
 from realizer.face.surface import face_scale
-
-from .test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
+from tests.browser.test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
 

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from realizer.animation.fap_reader import read_fap
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.tables import action_units, faps
-
-from .test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
+from tests.browser.test_page import ARGUMENTS, CHROMIUM, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
 

@@ -19,8 +19,8 @@ import pytest
 from bml_schema.behaviours import Head
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress
 from realizer.client import Client, connect
+from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from realizer.settings import Settings
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "dialogue.py"
 LIMIT = 90  # s

@@ -12,9 +12,9 @@ import pytest
 from bml_schema import BMLError
 from realizer import realize, schedule
 from realizer.examples import examples
-from realizer.player import Speaking
+from realizer.playback.player import Speaking
+from realizer.playback.scene import parse_scene
 from realizer.realization import Realization
-from realizer.scene import parse_scene
 from realizer.speech import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance
 from realizer.tables import faps

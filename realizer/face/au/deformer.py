@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Bool, Float32, Float64
+from realizer.core.arrays import Bool, Float32, Float64
 from realizer.face.au.mixers import OPENING, opened
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares

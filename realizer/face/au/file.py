@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Float64
-from realizer.errors import FaceError, TableError
+from realizer.core.arrays import Float64
+from realizer.core.errors import FaceError, TableError
 from realizer.face.au.functions import ANGLE, GAUSSIAN, LOWER
 from realizer.face.au.model import HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.tables import read_toml

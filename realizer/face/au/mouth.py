@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.arrays import Bool, Float64, Int32
-from realizer.errors import FaceError
+from realizer.core.arrays import Bool, Float64, Int32
+from realizer.core.errors import FaceError
 from realizer.face.au.model import Mouth
 from realizer.face.model import Face
 

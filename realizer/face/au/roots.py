@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.arrays import Bool, Float64, Int32
+from realizer.core.arrays import Bool, Float64, Int32
 from realizer.face.model import Face
 
 __all__ = ["grown", "roots", "skin"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 from realizer.face.au.model import Model, half
 from realizer.face.au.mouth import shares
 from realizer.face.au.roots import grown, skin

@@ -10,7 +10,7 @@ from realizer.server.journal.entry import JournalError
 from realizer.server.journal.plain import character_of, plain_character, plain_schedule, schedule_of
 
 if TYPE_CHECKING:
-    from realizer.server.session import Session
+    from realizer.server.session.session import Session
 
 __all__ = ["checkpoint", "restore"]
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, get_args
 
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 __all__ = ["KEPT", "Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost", "Recorder"]
 

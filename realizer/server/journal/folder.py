@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from realizer.behaviours.kind import Position
+from realizer.core.settings import Settings
 from realizer.server.journal.entry import Entry, JournalError, Kept
-from realizer.settings import Settings
 
 __all__ = ["FolderJournal", "Record", "head", "read_record"]
 

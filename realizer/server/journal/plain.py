@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from realizer.animation.blinks import Fewer
 from realizer.animation.channel import Channel, Gain, Joint, Layer
+from realizer.animation.idle.blinks import Fewer
 from realizer.animation.targets import axis
-from realizer.composition.character import Character, Shift
+from realizer.playback.character import Character, Shift
 from realizer.scheduling.timing import Schedule
 
 __all__ = ["character_of", "plain_character", "plain_schedule", "schedule_of"]

@@ -7,18 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 from bml_schema import Feedback
-from realizer.composition.playing import Speaking
+from realizer.core.settings import Settings, SettingsError
+from realizer.playback.playing import Speaking
 from realizer.realization import Realization, counted, warned
-from realizer.server.feedback_log import FeedbackLog
 from realizer.server.journal.checkpoint import restore
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.folder import Record
 from realizer.server.journal.replay import replay
 from realizer.server.journal.viewer import Viewer
-from realizer.server.session import Session
-from realizer.server.speeches import OPEN
-from realizer.server.studio import Studio
-from realizer.settings import Settings, SettingsError
+from realizer.server.runtime.studio import Studio
+from realizer.server.session.feedback_log import FeedbackLog
+from realizer.server.session.session import Session
+from realizer.server.speech.speeches import OPEN
 
 __all__ = ["played", "told"]
 

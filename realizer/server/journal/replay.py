@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from realizer.errors import RealizerError, VoiceError
-from realizer.server.effects import Effect, Speak
+from realizer.core.errors import RealizerError, VoiceError
 from realizer.server.journal.checkpoint import restore
 from realizer.server.journal.entry import Entry, Kept
-from realizer.server.session import Session
+from realizer.server.session.effects import Effect, Speak
+from realizer.server.session.session import Session
 from realizer.speech.utterance import Utterance
 
 __all__ = ["caught_up", "replay", "restored"]

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.composition.playing import Playing
-from realizer.mapping import mapping_of
+from realizer.face.mapping import mapping_of
+from realizer.playback.playing import Playing
 from realizer.realization import Performance, Worn
-from realizer.server.session import Session
-from realizer.server.streams import EPSILON, Window, first_at
+from realizer.server.session.session import Session
+from realizer.server.streams.streams import EPSILON, Window, first_at
 
 __all__ = ["Viewer"]
 

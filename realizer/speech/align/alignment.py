@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from realizer.arrays import Float64
-from realizer.errors import RealizerError
+from realizer.core.arrays import Float64
+from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Phoneme, Utterance, Word
 
 __all__ = ["AlignError", "Alignment", "laid_out", "likely", "moved"]

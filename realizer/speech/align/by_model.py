@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.arrays import Float32
+from realizer.core.arrays import Float32
 from realizer.speech.align import sphinx
 from realizer.speech.align.alignment import Alignment, laid_out, likely
 from realizer.speech.align.arpabet import to_arpabet, to_ipa

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.arrays import Bool, Float32, Float64
+from realizer.core.arrays import Bool, Float32, Float64
 from realizer.speech.align import features as f
 from realizer.speech.align.warp import Heard, Index, States, matched, quiet, usual
 from realizer.speech.utterance import Utterance

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from realizer.arrays import Float32, Float64
+from realizer.core.arrays import Float32, Float64
 from realizer.speech.align import features
 from realizer.speech.align.alignment import Alignment, moved
 from realizer.speech.utterance import Utterance

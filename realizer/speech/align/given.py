@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from realizer.speech.align.aligner import Aligner, aligned
 from realizer.speech.align.recording import mono
 from realizer.speech.utterance import Recording, Say, Utterance

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from realizer.arrays import Bool, Float64
+from realizer.core.arrays import Bool, Float64
 
 __all__ = ["Heard", "Index", "States", "matched", "quiet", "unlike", "usual"]
 

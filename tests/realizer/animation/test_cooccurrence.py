@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from realizer.animation.cooccurrence import bounds, cooccur
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Float32
+from realizer.core.arrays import Float32
 from realizer.tables.cooccurrence import Rule, rules
 
 NAMES = AU_NAMES()

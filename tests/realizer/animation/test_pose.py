@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import tables
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.animation.targets import AU_NAMES, axis

@@ -14,7 +14,7 @@ import pytest
 from realizer.batch.cluster import Cluster
 from realizer.batch.task import Options, Task
 from realizer.batch.work import Outcome, Worker
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 pytest.importorskip("distributed")
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from realizer.emotion.wheel import affect
-from realizer.emotion.wheel import wheel as place_on
-from realizer.emotion.words import emotion, known_words
+from realizer.emotions.wheel import affect
+from realizer.emotions.wheel import wheel as place_on
+from realizer.emotions.words import emotion, known_words
 from realizer.tables.emotions import emotion_faces
 from realizer.tables.feelings import ring, whissell_words
 from realizer.tables.lexemes import face_lexemes

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realizer.animation.fap_clip import FAPClip
-from realizer.animation.mouth import mouth_faps
-from realizer.animation.visemes import shape_table
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.lips.mouth import mouth_faps
+from realizer.animation.lips.visemes import shape_table
 from realizer.behaviours.fap_compound import FapExpression, fap_expressions, shown
-from realizer.emotion.archetypes import archetypes
+from realizer.emotions.archetypes import archetypes
 from realizer.tables import faps
 
 JAW, BROW, CORNER, LIP = 2, 30, 11, 3  # columns

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from realizer.animation.fap_clip import FAPClip
+from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours.fap_document import document_of
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from realizer.pipeline import realize
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.animation.fap_clip import FAPClip
+from realizer.animation.fap.fap_clip import FAPClip
 from realizer.outputs.fap_text import encode
 from realizer.pipeline import realize
 

@@ -8,7 +8,7 @@ import pytest
 from bml_schema import parse
 from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import VOCABULARY
-from realizer.player import Player
+from realizer.playback.player import Player
 from tests.realizer.behaviours.conftest import NAMESPACES
 
 LONG = '<wait id="w" duration="60"/>'

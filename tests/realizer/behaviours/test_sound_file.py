@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.behaviours.sound_file import read_sound
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 av = pytest.importorskip("av", reason="pip install 'bml-realizer[film]'")
 

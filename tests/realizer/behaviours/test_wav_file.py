@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.behaviours.wav_file import read_wav
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from tests.realizer.behaviours.conftest import tone, wav
 
 TONE = tone(0.1)

@@ -9,7 +9,7 @@ import pytest
 from realizer.charts.reading import lines_of
 from realizer.charts.timeline import BlockLine
 from realizer.pipeline import play
-from realizer.player import Player
+from realizer.playback.player import Player
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 
 from realizer.charts.raster import png
 from realizer.charts.shapes import Box, Path, Picture, Text
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 
 
 def pixels(*shapes) -> np.ndarray:

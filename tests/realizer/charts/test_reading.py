@@ -10,7 +10,7 @@ import pytest
 from bml_schema import parse
 from realizer.behaviours import VOCABULARY
 from realizer.charts.reading import lines_of
-from realizer.player import Player
+from realizer.playback.player import Player
 
 TALK = """<bml id="b">
   <speech id="s"><text>Hello <sync id="t"/> there</text></speech>

@@ -6,7 +6,7 @@ import pytest
 
 from bml_schema.source import Source
 from realizer.checking import Finding, advice, checked
-from realizer.player import Player
+from realizer.playback.player import Player
 
 GOOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
 

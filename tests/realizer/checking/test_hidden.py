@@ -6,7 +6,7 @@ import pytest
 
 from bml_schema.source import Source
 from realizer.checking import checked
-from realizer.player import Player
+from realizer.playback.player import Player
 
 
 def faults(text: str) -> list[tuple[str, str, str]]:

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
-from realizer.emotion.profile_file import read_profiles
-from realizer.emotion.wheel import affect, wheel
-from realizer.emotion.words import emotion
+from realizer.emotions.profile_file import read_profiles
+from realizer.emotions.wheel import affect, wheel
+from realizer.emotions.words import emotion
 
 
 def run(*args: str) -> Result:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from realizer.animation.fap_reader import read_fap
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 
 MASK = " ".join("1" if fap in (1, 2, 31) else "0" for fap in range(1, 69))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.animation.fap import to_fap
+from realizer.animation.fap.fap import to_fap
 from realizer.cli import poses
 from realizer.tables import action_units, faps
 from realizer.tables.emotions import archetypes

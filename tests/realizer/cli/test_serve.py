@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.cli import cli
+from realizer.core.settings import Settings
 from realizer.server import serve
-from realizer.settings import Settings
 
 
 def told(monkeypatch: pytest.MonkeyPatch, *args: str) -> Settings:

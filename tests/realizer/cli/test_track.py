@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from realizer.animation.fap_reader import read_fap
+from realizer.analysis.mesh import points_of
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
-from realizer.emotion.archetypes import archetypes
-from realizer.emotion.mesh import points_of
+from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 

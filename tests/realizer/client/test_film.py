@@ -14,9 +14,9 @@ from realizer.client import ClientError, connect
 from realizer.client.film import RATE
 from realizer.client.film import _each as each
 from realizer.client.film import _sound as sound_of
+from realizer.core.settings import Settings
+from realizer.protocol.wire import FrameKind, WireFrame, pack, unpack
 from realizer.server.serve import Server
-from realizer.server.wire import FrameKind, WireFrame, pack, unpack
-from realizer.settings import Settings
 
 LIMIT = 120  # s
 FPS = 5

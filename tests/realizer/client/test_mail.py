@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
 from realizer.client.mail import KEPT, ClientError, Mail, Until
-from realizer.server.wire import FrameKind, WireError, pack
+from realizer.protocol.wire import FrameKind, WireError, pack
 
 
 @pytest.fixture

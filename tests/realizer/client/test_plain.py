@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import pytest
 
 from realizer.client import ClientError, connect
+from realizer.core.settings import Settings
+from realizer.protocol.wire import WireFrame
 from realizer.server.serve import Server
-from realizer.server.wire import WireFrame
-from realizer.settings import Settings
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
 LIMIT = 30  # s

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.expressions import key, library_of, shipped
 from realizer.tables.emotions import archetypes
 from realizer.tables.expression_words import expression_words

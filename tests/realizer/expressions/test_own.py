@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.expressions import read_folder
 
 

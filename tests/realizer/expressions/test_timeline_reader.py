@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.expressions import Entry, Timeline, Track, read_timeline
 
 FILE = b"""

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.errors import FaceError
-from realizer.face.check import check_face
+from realizer.core.errors import FaceError
 from realizer.face.deform import deform
 from realizer.face.features import NAMES
 from realizer.face.glb import to_glb
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals, quantise
+from realizer.facebuild.check import check_face
 
 FACES = [info.name for info in list_faces()]
 

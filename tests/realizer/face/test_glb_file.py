@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.face.arkit.gltf import Gltf
 from realizer.face.glb_file import GlbFile
+from realizer.facebuild.arkit.gltf import Gltf
 
 ARRAYS = {
     "bytes": np.arange(8, dtype=np.uint8).reshape(2, 4),

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realizer.animation.fap_clip import FAPClip
-from realizer.errors import RealizerError
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.core.errors import RealizerError
 from realizer.outputs.clip_files import ENCODINGS, limited, read_clip
 from realizer.outputs.csv_table import encode_csv
 from realizer.outputs.json_text import encode_json

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realizer.animation.fap_clip import FAPClip
-from realizer.animation.fap_reader import read_fap
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.animation.frames import FAPFrames
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from realizer.outputs.fap_text import encode
 
 JAW, LIP, HEAD = 3, 4, 48

@@ -124,7 +124,7 @@ def test_without_pyav_a_sentence_says_what_to_install(tmp_path):
     code = (
         "import sys; sys.modules['av'] = None\n"
         "import numpy as np\n"
-        "from realizer.errors import RealizerError\n"
+        "from realizer.core.errors import RealizerError\n"
         "from realizer.outputs.film import FORMATS, encode_film\n"
         "try: encode_film('x.mp4', FORMATS['.mp4'], [], 0, 25.0, np.zeros(0, np.int16))\n"
         "except RealizerError as error: print(error)\n"

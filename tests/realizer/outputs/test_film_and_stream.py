@@ -10,8 +10,8 @@ from PIL import Image
 
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.pipeline import realize
-from realizer.server.effects import Draw, Speak
-from realizer.server.studio import Studio
+from realizer.server.runtime.studio import Studio
+from realizer.server.session.effects import Draw, Speak
 from tests.realizer.server.conftest import Driver
 
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")

@@ -10,10 +10,10 @@ import pytest
 import trimesh
 
 from realizer.animation.targets import fap
-from realizer.face.arkit.gltf import Gltf
 from realizer.face.deform import deform
 from realizer.face.glb import to_glb
 from realizer.face.load import load_face
+from realizer.facebuild.arkit.gltf import Gltf
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.glb import encode_glb
 from realizer.outputs.morphs import TRUE, morphs

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.face.arkit.names import shapes
 from realizer.outputs import OUTPUTS, Drawing, output_for
 from realizer.pipeline import realize
+from realizer.tables.names import shapes
 
 READERS = Path(__file__).parent / "readers"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realizer.animation.fap_reader import read_fap
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.animation.targets import AU_NAMES
 from realizer.outputs import OUTPUTS, Drawing, output_for
 from realizer.speech.utterance import Phoneme

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.errors import RenderError
+from realizer.core.errors import RenderError
 from realizer.render.backdrop import backdrop, channels, colour_of, over
 from realizer.render.light import preset
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realizer.errors import RenderError
+from realizer.core.errors import RenderError
 from realizer.render.cameras import PRESETS, camera_for, camera_names
 
 SIZES = [(512, 512), (640, 480), (300, 500)]

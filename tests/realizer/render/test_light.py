@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.colours import linear, srgb
-from realizer.errors import RenderError
+from realizer.core.colours import linear, srgb
+from realizer.core.errors import RenderError
 from realizer.render.light import Shader, preset, presets, unit
 
 FRONT = np.array([0, 0, 1], np.float32)

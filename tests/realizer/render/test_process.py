@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 import realizer
-from realizer.errors import RealizerError, RenderError
+from realizer.core.errors import RealizerError, RenderError
 from realizer.render import Renderer, available
 
 SIZE = (96, 80)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.errors import RenderError
+from realizer.core.errors import RenderError
 from realizer.render import ways
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset

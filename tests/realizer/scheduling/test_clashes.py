@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from scipy.optimize import linprog
 
 from bml_schema import parse
-from realizer.arrays import Float64
+from realizer.core.arrays import Float64
 from realizer.scheduling import Schedule, Timing, schedule_block
 from realizer.scheduling.clash import Clash, Gap
 from realizer.scheduling.explain import in_words

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from bml_schema.feedback import parse_feedback
-from realizer.server.effects import Close, Draw, Effect, Send, Speak
-from realizer.server.session import Session
-from realizer.server.wire import unpack
-from realizer.settings import Settings
+from realizer.core.settings import Settings
+from realizer.protocol.wire import unpack
+from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
+from realizer.server.session.session import Session
 from realizer.speech.utterance import Utterance
 from tests.waking import wakes
 

@@ -19,10 +19,10 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
+from realizer.core.settings import Settings, SettingsError
+from realizer.protocol.wire import FrameKind, unpack
 from realizer.server.serve import Server, serve
-from realizer.server.session import Session
-from realizer.server.wire import FrameKind, unpack
-from realizer.settings import Settings, SettingsError
+from realizer.server.session.session import Session
 
 DOCUMENT = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
   <speech id="s"><text>One <sync id="m"/>two</text></speech>

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from realizer.speech import espeak, hibari
-from realizer.speech.espeak import EspeakVoice
-from realizer.speech.hibari import HibariVoice
+from realizer.speech.espeak import espeak
+from realizer.speech.espeak.espeak import EspeakVoice
+from realizer.speech.hibari import hibari
+from realizer.speech.hibari.hibari import HibariVoice
 
 
 @pytest.fixture(autouse=True)

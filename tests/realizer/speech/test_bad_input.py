@@ -14,12 +14,12 @@ from bml_schema import Speech
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import World
 from realizer.behaviours.speech import say
-from realizer.errors import RealizerError, VoiceError
+from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
-from realizer.server.effects import Speak
-from realizer.server.studio import Studio
+from realizer.server.runtime.studio import Studio
+from realizer.server.session.effects import Speak
 from realizer.speech import EspeakVoice, Say, Utterance, Voice, engine_process
-from realizer.speech.hibari import HibariVoice
+from realizer.speech.hibari.hibari import HibariVoice
 
 SSML = "application/ssml+xml"
 

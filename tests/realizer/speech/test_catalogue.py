@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from realizer.errors import VoiceError
+from realizer.core.errors import VoiceError
 from realizer.speech import EspeakVoice, HibariVoice, find_voice, voices
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.lips import lip_channels
+from realizer.animation.lips.lips import lip_channels
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
 from realizer.speech.loudness import with_volumes

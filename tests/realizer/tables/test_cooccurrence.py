@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables.cooccurrence import Unit, read_rules, rules
 
 HEAD = "# source: test\n# units: none\n# licence: MIT\n[sets]\nX = [1, 0, 0]\nZ = [0, 0, 1]\n"

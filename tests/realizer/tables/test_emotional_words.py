@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables.emotional_words import CATEGORIES, read_words, word_list, words_of
 
 HEAD = "# source: test\n# units: none\n# licence: MIT\nword,category,origin\n"

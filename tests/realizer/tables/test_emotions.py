@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.emotion.wheel import wheel
+from realizer.emotions.wheel import wheel
 from realizer.tables.emotions import archetypes, emotion_faces
 from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables import AuToFap
 from realizer.tables.mappings import FORMS, read_mapping, write_mapping
 

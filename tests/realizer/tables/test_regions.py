@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables import regions
 
 

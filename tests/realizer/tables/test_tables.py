@@ -9,7 +9,7 @@ from importlib.resources import files
 import pytest
 
 from realizer import tables
-from realizer.errors import TableError
+from realizer.core.errors import TableError
 from realizer.tables import Fap, lexemes, timing
 
 FAPS = {row.fap: row for row in tables.faps()}

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.errors import FaceError
+from realizer.core.errors import FaceError
 from realizer.face.au.mixers import mix, opened
 from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face, takes

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from realizer.errors import FaceError
+from realizer.core.errors import FaceError
 from realizer.face.au.file import read_model, write_model
-from realizer.face.au.fit import table, table_text
-from realizer.face.au.measure import read_shapes
 from realizer.face.au.model import Model
 from realizer.face.au.units import units
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
+from realizer.facebuild.au.fit import table, table_text
+from realizer.facebuild.au.measure import read_shapes
 from tests.benchmarks.decimate import decimated
 
 FACES = {info.name: info.path for info in list_faces() if (info.path / "au_extended.toml").is_file()}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realizer.errors import FaceError
+from realizer.core.errors import FaceError
 from realizer.face.au.mouth import LOWER, UPPER, fit_mouth, halves
 from realizer.face.load import load_face
 

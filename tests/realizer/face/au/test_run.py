@@ -13,14 +13,14 @@ from click.testing import CliRunner
 
 import realizer
 from realizer.cli import cli
+from realizer.core.settings import Settings, SettingsError
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.player import Player
+from realizer.playback.player import Player
 from realizer.render import Renderer
-from realizer.server.session import Session
-from realizer.server.streams import Timeline
-from realizer.settings import Settings, SettingsError
+from realizer.server.session.session import Session
+from realizer.server.streams.streams import Timeline
 
 BOTH = ("mpeg4", "au")
 SPEECH = '<speech id="s" start="0.2"><text>Maybe you would both prefer a warm moment of fun.</text></speech>'

@@ -9,13 +9,13 @@ from random import Random
 import numpy as np
 import pytest
 
-from realizer.server.effects import Speak
+from realizer.core.settings import Settings
+from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import notes as thresholds
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.replay import restored
-from realizer.server.session import Session
-from realizer.server.wire import ClipPiece, pack_clip
-from realizer.settings import Settings
+from realizer.server.session.effects import Speak
+from realizer.server.session.session import Session
 from tests.interleavings import BODIES, CONTROLS, HEADS, NAMES, Memory, no_error, spoken
 from tests.waking import wakes
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.server.effects import Send, Speak
+from realizer.core.settings import Settings
+from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import Journal, JournalError, Kept, journal_at
 from realizer.server.journal.checkpoint import MOST_TOLD, restore
 from realizer.server.journal.notes import ENTRIES, LONG, Notes
 from realizer.server.journal.replay import restored
-from realizer.server.session import Session
-from realizer.server.wire import ClipPiece, pack_clip
-from realizer.settings import Settings
+from realizer.server.session.effects import Send, Speak
+from realizer.server.session.session import Session
 from tests.interleavings import Memory, spoken
 from tests.told import numbers
 from tests.waking import wakes

@@ -10,10 +10,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.blinks import Fewer
 from realizer.animation.channel import Channel, Gain, Joint, Layer
+from realizer.animation.idle.blinks import Fewer
 from realizer.animation.targets import axis
-from realizer.composition.character import Character, Shift
+from realizer.playback.character import Character, Shift
 from realizer.scheduling.timing import Schedule
 from realizer.server.journal.plain import character_of, plain_character, plain_schedule, schedule_of
 

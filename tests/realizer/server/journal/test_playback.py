@@ -10,14 +10,14 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.cli import cli
-from realizer.server.effects import Send, Speak
+from realizer.core.settings import Settings
 from realizer.server.journal import JournalError, playback
 from realizer.server.journal.entry import Entry
 from realizer.server.journal.folder import FolderJournal, head, read_record
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.playback import played
-from realizer.server.session import Session
-from realizer.settings import Settings
+from realizer.server.session.effects import Send, Speak
+from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
 

@@ -19,13 +19,13 @@ import numpy as np
 from click.testing import CliRunner
 from websockets.asyncio.client import ClientConnection, connect
 
-from realizer.animation.fap_reader import read_fap
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
+from realizer.core.settings import Settings
 from realizer.server.journal.folder import read_record
 from realizer.server.journal.notes import ENTRIES
 from realizer.server.journal.playback import told
 from realizer.server.serve import Server
-from realizer.settings import Settings
 from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends

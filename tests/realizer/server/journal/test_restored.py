@@ -19,13 +19,13 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
-from realizer.server import shell
-from realizer.server.doors import websocket_client
-from realizer.server.intake import Intake
+from realizer.core.settings import Settings
+from realizer.server.documents.intake import Intake
 from realizer.server.journal.notes import ENTRIES
+from realizer.server.runtime import shell
 from realizer.server.serve import Server
-from realizer.server.session import Session
-from realizer.settings import Settings
+from realizer.server.session.session import Session
+from realizer.server.transports.websocket import websocket_client
 from tests.realizer.server.conftest import Clock
 from tests.told import feedback, numbers
 
@@ -156,7 +156,7 @@ def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outli
 def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("realizer.server.shell.SWEEP", 0.05)
+    monkeypatch.setattr("realizer.server.runtime.shell.SWEEP", 0.05)
     where = str(tmp_path / "journal.db")
 
     async def run() -> None:

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from realizer.animation.targets import AU_NAMES
-from realizer.arrays import Int32
+from realizer.core.arrays import Int32
+from realizer.core.settings import Settings
 from realizer.outputs.output import Drawing
+from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.render import Renderer
-from realizer.server.effects import Send, Speak
 from realizer.server.journal.folder import FolderJournal, Record, head, read_record
 from realizer.server.journal.notes import Notes
 from realizer.server.journal.playback import played
-from realizer.server.session import Session
-from realizer.server.wire import ClipPiece, pack_clip, unpack
-from realizer.settings import Settings
+from realizer.server.session.effects import Send, Speak
+from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
 from realizer.speech.fitting import fitted
 from tests.waking import wakes

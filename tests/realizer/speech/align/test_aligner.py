@@ -7,7 +7,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import pytest
 
-from realizer.errors import RealizerError
+from realizer.core.errors import RealizerError
 from realizer.speech import SilentVoice
 from realizer.speech.align import AlignError, Alignment, align
 from realizer.speech.align.sphinx import missing

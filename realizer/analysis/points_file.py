@@ -1,0 +1,70 @@
+"""A table of tracked feature points, text in; the points as they move, and at rest, out."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from realizer.core.arrays import Float64
+from realizer.face.features import NAMES
+
+__all__ = ["bridge", "read_points"]
+
+COLUMNS = ["frame", "point", "x", "y", "z"]
+MOST_FRAMES = 100_000  # an hour at 25 frames a second, and a little
+
+
+def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], dict[str, Float64]]:
+    """Each point's way (n, 3) and its place at rest (3,), which is that of frame 0; metres as in the file.
+
+    The columns are frame,point,x,y,z, frames whole numbers from 0, points named as in MPEG-4 ("4.1"). Lines
+    that begin with # do not count. A point that a frame does not list was lost there, and is NaN.
+
+    Raises:
+        ValueError: other columns, a bad cell, a point that there is none of, a point twice in a frame, or no
+            place at rest; with the line.
+    """
+    found: dict[str, dict[int, tuple[float, float, float]]] = {}
+    last = 0
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    if not lines or [cell.strip() for cell in lines[0][1].split(",")] != COLUMNS:
+        got = lines[0][1][:60] if lines else ""
+        raise ValueError(f"{where}: wanted a first line {','.join(COLUMNS)}, got {got!r}")
+    for number, line in lines[1:]:
+        place = f"{where}, line {number}"
+        cells = next(csv.reader([line]))
+        try:
+            frame, name, (x, y, z) = int(cells[0]), cells[1].strip(), map(float, cells[2:])
+        except (ValueError, IndexError):
+            raise ValueError(f"{place}: wanted {','.join(COLUMNS)}, got {line[:60]!r}") from None
+        if not (0 <= frame < MOST_FRAMES and all(map(math.isfinite, (x, y, z)))):
+            raise ValueError(
+                f"{place}: wanted a frame 0..{MOST_FRAMES - 1} and finite places, got {line[:60]!r}"
+            )
+        if name not in NAMES:
+            raise ValueError(f"{place}: wanted a point of MPEG-4, 2.1 to 11.6, got {name[:20]!r}")
+        if frame in found.setdefault(name, {}):
+            raise ValueError(f"{place}: point {name} is there twice in frame {frame}")
+        found[name][frame] = x, y, z
+        last = max(last, frame)
+    if restless := sorted(name for name, places in found.items() if 0 not in places):
+        raise ValueError(f"{where}: wanted every point at rest in frame 0, got none of {', '.join(restless)}")
+    points = {}
+    for name, places in found.items():
+        way = np.full((last + 1, 3), np.nan)
+        way[list(places)] = list(places.values())
+        points[name] = way
+    return points, {name: way[0] for name, way in points.items()}
+
+
+def bridge(points: Mapping[str, Float64]) -> dict[str, Float64]:
+    """The same ways (n, 3) without NaN: over a gap a point goes straight, after its last place it stays."""
+    whole = {}
+    for name, way in points.items():
+        there = np.flatnonzero(~np.isnan(way).any(axis=1))
+        frames = np.arange(len(way))
+        whole[name] = np.stack([np.interp(frames, there, way[there, axis]) for axis in range(3)], axis=1)
+    return whole

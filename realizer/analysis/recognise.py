@@ -1,0 +1,134 @@
+"""FAPs in, beliefs in profiles and emotions out (Raouzaiou et al. 2002, section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Bool, Float64
+from realizer.emotions.archetypes import archetypes
+from realizer.emotions.profile import Profile
+from realizer.emotions.wheel import wheel
+from realizer.tables.emotion_model import emotion_model
+from realizer.tables.feelings import ring
+
+__all__ = ["Recogniser", "Recognition", "recogniser"]
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What a face shows.
+
+    Attributes:
+        emotion: the one that is believed in most (eq. 11); None where nothing fits.
+        emotions: emotion -> belief 0..1 (eq. 9), all of them.
+        profiles: name of a profile -> belief (eq. 8).
+    """
+
+    emotion: str | None
+    emotions: Mapping[str, float]
+    profiles: Mapping[str, float]
+
+
+class Recogniser:
+    """Fuzzy classes of profiles, ready for whole arrays.
+
+    A value belongs to a FAP's class as far as it lies in the range (`tables/emotion_model.toml`: the drawing
+    of figure 6 is not in the text). A profile is the product of its FAPs, an emotion the best of its
+    profiles. Where two are believed in alike, the one that asks for more FAPs is meant.
+    """
+
+    def __init__(
+        self, profiles: Iterable[Profile], absent: bool = True, strengths: Sequence[float] = (1.0,)
+    ) -> None:
+        """
+        Args:
+            profiles: at least one; an emotion is the name without the number at its end.
+            absent: what another profile moves and this one does not is in a class of its own, around 0;
+                without it (as published) a profile of few FAPs is believed in wherever one of more is.
+            strengths: a profile is believed in as far as it is at the likeliest of these parts of itself.
+        """
+        self.profiles = tuple(profiles)
+        if not self.profiles:
+            raise ValueError("profiles: wanted at least one, got none")
+        model = emotion_model()
+        shape = (len(self.profiles), 68)
+        self._middle, self._length = np.zeros(shape), np.full(shape, 2 * model.absent)
+        self._used = np.zeros(shape, bool)
+        for k, profile in enumerate(self.profiles):
+            for fap, (low, high) in profile.ranges.items():
+                self._middle[k, fap - 1] = (low + high) / 2
+                self._length[k, fap - 1] = high - low
+                self._used[k, fap - 1] = True
+        self._moving = self._used.copy()
+        self._moved = self._used.sum(axis=1)
+        self._classes = [self._class(strength, model.least_length) for strength in strengths]
+        if absent:
+            self._used |= self._used.any(axis=0)
+        self._core, self._base = model.core, model.base
+        self._emotions = [_emotion(profile.name) for profile in self.profiles]
+
+    def beliefs(self, frames: Any, seen: Bool | None = None) -> Float64:
+        """(n, profiles) of FAP frames (n, 68); `seen` (68,) says which FAPs were observed, None is all.
+
+        Raises:
+            ValueError: another shape, or values that are not finite.
+        """
+        values = np.asarray(frames, np.float64)
+        if values.ndim != 2 or values.shape[1] != 68:
+            raise ValueError(f"frames: wanted (n, 68), got {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError("frames: wanted finite values, got NaN or infinity")
+        judged = self._used if seen is None else self._used & seen
+        best: Float64 = np.zeros((len(values), len(self.profiles)))
+        for middle, half in self._classes:
+            away = np.abs(values[:, None] - middle) / half
+            membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
+            np.maximum(best, np.where(judged, membership, 1.0).prod(axis=2), out=best)
+        # A profile none of whose FAPs was seen is nothing to believe in.
+        return best * judged.any(axis=1)
+
+    def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
+        """The emotion of each frame (eq. 11), None where nothing fits."""
+        return [self._best(row) for row in self.beliefs(frames, seen)]
+
+    def recognise(self, frame: Any, seen: Bool | None = None) -> Recognition:
+        """What one FAP frame (68,) shows."""
+        beliefs = self.beliefs(np.asarray(frame)[None], seen)[0]
+        emotions: dict[str, float] = {}
+        for emotion, belief in zip(self._emotions, beliefs, strict=True):
+            emotions[emotion] = max(emotions.get(emotion, 0.0), float(belief))
+        names = (profile.name for profile in self.profiles)
+        return Recognition(self._best(beliefs), emotions, dict(zip(names, map(float, beliefs), strict=True)))
+
+    def _class(self, strength: float, least: float) -> tuple[Float64, Float64]:
+        """(profiles, 68) twice: the middles of the classes, and half their lengths; absence has one size."""
+        length = np.where(self._moving, np.maximum(self._length * strength, least), self._length)
+        return self._middle * strength, length / 2
+
+    def _best(self, beliefs: Float64) -> str | None:
+        best = int(np.lexsort((self._moved, beliefs))[-1])
+        return self._emotions[best] if beliefs[best] > 0 else None
+
+
+def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
+    """That of all profiles of a set: "own", "published" or "raw".
+
+    Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. In
+    the published sets an emotion has many profiles, weak and strong; in ours one, which counts at any
+    strength, and the advanced emotions of the wheel, which lie in the middle of two, are known too.
+    """
+    strengths = emotion_model().strengths if profiles == "own" else (1.0,)
+    every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
+    if profiles == "own":
+        blends = [place for place in ring("paul").values() if place.kind == "advanced"]
+        every += [replace(wheel(place.angle), name=place.name) for place in blends]
+    return Recogniser([*every, Profile("neutral", profiles, {})] if absent else every, absent, strengths)
+
+
+def _emotion(name: str) -> str:
+    emotion, _, number = name.rpartition(" ")
+    return emotion if emotion and number.isdecimal() else name

@@ -1,0 +1,75 @@
+"""Means and deviations of FAPs, or observed faces, in; a profile out (Raouzaiou et al. 2002, 3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from realizer import tables
+from realizer.emotions.profile import Profile
+from realizer.tables.profiles import statistics
+
+__all__ = ["from_faces", "from_statistics", "published_statistics"]
+
+LEAST = 1.0  # FAPU; what moves less on average is not part of an expression
+
+
+def from_statistics(
+    name: str, measured: Mapping[int, tuple[float, float]], source: str = "statistics"
+) -> Profile:
+    """The ranges from a deviation below the mean to one above it (eq. 1).
+
+    A FAP that moves in one direction alone keeps to it (eq. 2 and 3): such as has 0 for its least or most
+    value in MPEG-4.
+
+    Args:
+        measured: {FAP: (mean, standard deviation)} in the FAP's FAPU.
+
+    Raises:
+        ValueError: a deviation below 0, or no number.
+    """
+    ranges = {}
+    for fap, (mean, deviation) in measured.items():
+        if not deviation >= 0:
+            raise ValueError(f"{name}, FAP {fap}: wanted a deviation of 0 or more, got {deviation}")
+        row = tables.faps()[fap - 1]
+        low, high = mean - deviation, mean + deviation
+        if row.least == 0:
+            low, high = max(0.0, low), max(0.0, high)
+        if row.most == 0:
+            low, high = min(0.0, low), min(0.0, high)
+        ranges[fap] = low, high
+    return Profile(name, source, ranges)
+
+
+def published_statistics(emotion: str, raw: bool = False) -> dict[int, tuple[float, float]]:
+    """{FAP: (mean, deviation)} of an emotion's verified FAPs (table 4), as printed or as MPEG-4 has it."""
+    found = {}
+    for row in statistics():
+        mean = row.raw_mean if raw else row.mean
+        if row.emotion == emotion and mean is not None and row.deviation is not None:
+            found[row.fap] = mean, row.deviation
+    return found
+
+
+def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Profile:
+    """The profile of observed faces that show the same expression.
+
+    Args:
+        frames: (n, 68) FAP values, n of 2 or more; column = FAP - 1.
+        faps: the vocabulary; None is every FAP that moves on average.
+
+    Raises:
+        ValueError: another shape, or values that are not finite.
+    """
+    values = np.asarray(frames, np.float64)
+    if values.ndim != 2 or values.shape[1] != 68 or len(values) < 2:
+        raise ValueError(f"{name}: wanted at least two faces (n, 68), got {values.shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name}: wanted finite values, got NaN or infinity")
+    means, deviations = values.mean(axis=0), values.std(axis=0, ddof=1)
+    chosen = faps if faps is not None else (int(k) + 1 for k in np.flatnonzero(np.abs(means) >= LEAST))
+    measured = {fap: (float(means[fap - 1]), float(deviations[fap - 1])) for fap in chosen if fap >= 3}
+    return from_statistics(name, measured, "faces")

@@ -1,0 +1,96 @@
+"""The value of a FAP file: MPEG-4 FAP frames as whole numbers, at a rate of its own."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from realizer.animation.frames import FAPFrames
+from realizer.core.arrays import Bool, Int32
+from realizer.core.units import frame_count
+
+__all__ = ["FAPClip"]
+
+
+@dataclass(frozen=True, eq=False)
+class FAPClip:
+    """A text FAP file as numbers.
+
+    Attributes:
+        name: from the header; no blanks when written.
+        fps: frames a second.
+        values: (n, 68) int32 in each FAP's FAPU, column = FAP - 1; 0 where not given. Columns 0 and 1 are 0.
+        mask: (68,) bool, True where any frame gives the FAP.
+        visemes: (n, 4) int32: select1, select2, blend, def of FAP 1; zeros unless mask[0].
+        expressions: (n, 6) int32: select1, intensity1, select2, intensity2, init_face, def of FAP 2.
+        notes: how the text departed from the format, a sentence each; () for what we wrote ourselves.
+    """
+
+    name: str
+    fps: float
+    values: Int32
+    mask: Bool
+    visemes: Int32
+    expressions: Int32
+    notes: tuple[str, ...] = field(default=())
+
+    @staticmethod
+    def of(frames: FAPFrames, fps: float, name: str) -> FAPClip:
+        """The frames rounded to integers; FAP 1 and 2 stay out."""
+        values = frames.integers()
+        mask = frames.mask.copy()
+        mask[:2] = False
+        values[:, ~mask] = 0
+        count = len(values)
+        return FAPClip(
+            name, fps, values, mask, np.zeros((count, 4), np.int32), np.zeros((count, 6), np.int32)
+        )
+
+    def since(self, frame: int) -> FAPClip:
+        """What is left of it from a frame on."""
+        parts = (self.values[frame:], self.mask, self.visemes[frame:], self.expressions[frame:])
+        return FAPClip(self.name, self.fps, *parts, self.notes)
+
+    def resampled(self, fps: float) -> FAPClip:
+        """The same course at another rate: FAPs straight between frames, FAP 1 and 2 of the nearest frame.
+
+        Raises:
+            ValueError: not a positive, finite rate.
+        """
+        if not (math.isfinite(fps) and fps > 0):
+            raise ValueError(f"fps: wanted a number above 0, got {fps}")
+        if fps == self.fps or not len(self.values):
+            return replace(self, fps=fps)
+        last = len(self.values) - 1
+        count = frame_count(last / self.fps, fps)
+        at = np.minimum(np.arange(count) * (self.fps / fps), last)
+        before = np.minimum(at.astype(int), max(last - 1, 0))
+        part = (at - before)[:, None]
+        values = self.values[before] * (1 - part) + self.values[np.minimum(before + 1, last)] * part
+        nearest = np.rint(at).astype(int)
+        return replace(
+            self,
+            fps=fps,
+            values=np.rint(values).astype(np.int32),
+            visemes=self.visemes[nearest],
+            expressions=self.expressions[nearest],
+        )
+
+    def frames(self) -> FAPFrames:
+        """The values on a clock that starts at 0; FAP 1 and 2 are left out: frames have no place for them."""
+        mask = self.mask.copy()
+        mask[:2] = False
+        return FAPFrames(np.arange(len(self.values)) / self.fps, self.values.astype(np.float32), mask)
+
+    def __eq__(self, other: object) -> bool:
+        """Same name, rate and numbers; notes do not count."""
+        if not isinstance(other, FAPClip):
+            return NotImplemented
+        arrays = ("values", "mask", "visemes", "expressions")
+        return (self.name, self.fps) == (other.name, other.fps) and all(
+            np.array_equal(getattr(self, a), getattr(other, a)) for a in arrays
+        )
+
+    __hash__ = None  # type: ignore[assignment]

@@ -1,0 +1,226 @@
+"""Who speaks, and what documents ask for -> what a face does by itself while it speaks.
+
+Small nods and raised brows on accents, looks aside, and where phrases end, for blinks. Everything is a
+function of the seed, of what is said and when it starts, and of time, not of the frames that are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from realizer import tables
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.idle.blinks import PhraseEnd
+from realizer.animation.idle.chance import uniform
+from realizer.animation.targets import AU_NAMES, au, axis, region
+from realizer.core.arrays import Float64
+from realizer.speech.accents import Phrase, phrases, prosody_facts
+from realizer.speech.utterance import Utterance
+
+__all__ = ["AFTERMATH", "Asked", "Talk", "phrase_ends", "prosody_channels"]
+
+# A block is of interest for so long after it has ended: then it moves no blink that can still be seen. s
+AFTERMATH = 2.0
+
+# Signed angles: AUs of (negative, positive). A head that turns down has eyes that turn up by as much.
+PITCH, EYES_PITCH, EYES_YAW = (54, 53), (64, 63), (62, 61)
+BROWS = {1, 2, 4}
+BROW_FAPS = range(31, 39)
+SOURCE = "prosody"
+
+
+class Talk(NamedTuple):
+    """Something said from `start` on, seconds on the session clock, and cut off at `until`."""
+
+    start: float
+    until: float
+    utterance: Utterance
+
+
+class Asked(NamedTuple):
+    """What a document or a client moves, and since when (session clock) that is known."""
+
+    known: float
+    channel: Channel
+
+
+@dataclass(frozen=True, eq=False)
+class Gesture:
+    """One movement: what it moves ("head", "eyes" or "brows"), and how."""
+
+    region: str
+    channels: tuple[Channel, ...]
+
+    @property
+    def begin(self) -> float:
+        return float(self.channels[0].times[0])
+
+    @property
+    def end(self) -> float:
+        return float(self.channels[0].times[-1])
+
+
+def phrase_ends(talks: Iterable[Talk]) -> tuple[PhraseEnd, ...]:
+    """Where blinks belong, in order of time; beyond a cut as far as a blink might have been moved."""
+    reach = prosody_facts()["blinks"]["reach"]
+    ends = [
+        PhraseEnd(talk.start, talk.start + phrase.end)
+        for talk in talks
+        for phrase in phrases(talk.utterance)
+        if talk.start + phrase.end <= talk.until + reach
+    ]
+    return tuple(sorted(ends, key=lambda end: end.at))
+
+
+def prosody_channels(
+    talks: Iterable[Talk], start: float, end: float, seed: int, asked: Iterable[Asked] = ()
+) -> list[Channel]:
+    """What can be seen in start..end of the nods, raised brows and looks aside of those who speak.
+
+    They lie in the idle layer, so that a document which asks for less idle motion gets less of them. Where a
+    document moves the same part of the face at any time of a movement, the movement does not come; where
+    that became known when it had begun, it goes back at once.
+
+    Args:
+        talks: what the character says.
+        start, end: seconds on the session clock.
+        seed: of the character.
+        asked: what else moves it, whatever it moves.
+    """
+    shown: list[Channel] = []
+    fade = prosody_facts()["yield"]["fade"]
+    claims: list[tuple[str, float, float, float]] | None = None
+    for talk in talks:
+        for gesture in _gestures(phrases(talk.utterance), talk.start, seed):
+            if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
+                continue
+            if claims is None:  # most of the time nobody speaks
+                claims = list(_claims(asked))
+            leaves = talk.until
+            for part, known, first, last in claims:
+                if part == gesture.region and first < gesture.end and last > gesture.begin:
+                    leaves = min(leaves, known)
+            if gesture.begin < leaves:
+                shown += [
+                    c if leaves >= gesture.end else c.faded(leaves, leaves + fade) for c in gesture.channels
+                ]
+    return shown
+
+
+def _claims(asked: Iterable[Asked]) -> Iterator[tuple[str, float, float, float]]:
+    """(part of the face, since when known, first and last second) of what is asked of it."""
+    for known, channel in asked:
+        part = _parts().get(channel.target.column)
+        # Nods are laid on the direction that a head keeps, as its sway is.
+        if part is None or (part == "head" and channel.layer is Layer.BASE) or not channel.values.any():
+            continue
+        yield part, known, *channel.span
+
+
+@cache
+def _parts() -> dict[int, str]:
+    """Column -> what prosody would move there: "head", "eyes" or "brows"."""
+    parts = {}
+    numbers = {row.name: row.fap for row in tables.faps()}
+    for name, target in axis().items():
+        is_au = target.column < len(AU_NAMES())
+        if region(target) in ("head", "eyes"):
+            parts[target.column] = region(target)
+        elif (is_au and int(name.rstrip("LR")) in BROWS) or numbers.get(name) in BROW_FAPS:
+            parts[target.column] = "brows"
+    return parts
+
+
+@lru_cache(maxsize=64)
+def _gestures(said: tuple[Phrase, ...], start: float, seed: int) -> tuple[Gesture, ...]:
+    """All that comes with an utterance that starts at `start`, if nothing is in its way."""
+    return (*_accents(said, start, seed), *_asides(said, start, seed))
+
+
+def _accents(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
+    nod, brows = prosody_facts()["nod"], prosody_facts()["brows"]
+    nods, raises, sizes = _draws(seed, 400, start, sum(len(phrase.accents) for phrase in said))
+    k = 0
+    nodded = raised = -np.inf
+    for phrase in said:
+        for accent in phrase.accents:
+            chance = "nuclear" if accent.nuclear else "others"
+            # What comes too early in a text for its attack peaks a little later: nothing moves before it.
+            time = start + max(accent.time, nod["attack"])
+            # The last accent of the phrase goes first, and shows in one way or the other.
+            left = np.inf if accent.nuclear else phrase.accents[-1].time - accent.time
+            may_nod = min(left, time - nodded) >= nod["apart"]
+            may_raise = min(left, time - raised) >= brows["apart"]
+            nods_now = may_nod and (nods[k] < nod[chance] or (accent.nuclear and not may_raise))
+            raises_now = may_raise and (raises[k] < brows[chance] or (accent.nuclear and not nods_now))
+            if nods_now:
+                nodded = time
+                yield _nod(time, _size(nod, sizes[k], accent.nuclear))
+            if raises_now:
+                raised = time
+                yield _raise(time, _size(brows, sizes[k], accent.nuclear))
+            k += 1
+
+
+def _size(facts: Mapping[str, float], draw: float, nuclear: bool) -> float:
+    part = facts["least"] + (1.0 - facts["least"]) * draw
+    return facts["most"] * part * (1.0 if nuclear else facts["other"])
+
+
+def _nod(time: float, degrees: float) -> Gesture:
+    nod = prosody_facts()["nod"]
+    keys = np.array([time - nod["attack"], time, time + nod["relax"]])
+    down = np.array([0.0, -degrees, 0.0])
+    return Gesture("head", (*_turn(PITCH, keys, down), *_turn(EYES_PITCH, keys, -down)))
+
+
+def _raise(time: float, most: float) -> Gesture:
+    brows = prosody_facts()["brows"]
+    top = time + brows["hold"]
+    keys = np.array([time - brows["attack"], time, top, top + brows["relax"]])
+    values = np.array([0.0, most, most, 0.0])
+    lifts = (target for number in (1, 2) for target in au(number))
+    return Gesture("brows", tuple(Channel(t, keys, values, layer=Layer.IDLE, source=SOURCE) for t in lifts))
+
+
+def _asides(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
+    aside = prosody_facts()["aside"]
+    if not said or said[-1].end - said[0].start < aside["least"]:
+        return
+    comes, lengths, late, yaws, pitches = _draws(seed, 450, start, len(said), kinds=5)
+    for k, phrase in enumerate(said):
+        length = phrase.end - phrase.start
+        if length < aside["phrase"] or comes[k] >= aside["chance"]:
+            continue
+        most = min(aside["longest"], aside["share"] * length)
+        away = min(most, aside["shortest"] + lengths[k] * max(0.0, most - aside["shortest"]))
+        # It begins in the first part of the phrase, and the eyes are back for its end.
+        begin = start + phrase.start + late[k] * 0.5 * (length - away)
+        # Away first to one side, never straight up or down.
+        yaw = np.interp(abs(2.0 * yaws[k] - 1.0), (0.0, 1.0), aside["yaw"]) * np.sign(yaws[k] - 0.5)
+        pitch = np.interp(pitches[k], (0.0, 1.0), aside["pitch"])
+        keys = begin + np.array([0.0, aside["saccade"], away, away + aside["saccade"]])
+        there = np.array([0.0, 1.0, 1.0, 0.0])
+        yield Gesture("eyes", (*_turn(EYES_YAW, keys, yaw * there), *_turn(EYES_PITCH, keys, pitch * there)))
+
+
+def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> list[Float64]:
+    """(count,) numbers for each of some kinds, those of an utterance by when it starts.
+
+    The first of them stay what they are where more is appended to a text, or its timing turns out otherwise.
+    """
+    k = round(start * 1000.0) * 65536 + np.arange(count, dtype=np.int64)
+    return list(uniform(seed, range(kind, kind + kinds), k))
+
+
+def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> Iterator[Channel]:
+    """Signed degrees as AUs."""
+    for number, sign in zip(sides, (-1.0, 1.0), strict=True):
+        values = np.maximum(sign * degrees, 0.0) / tables.by_number()[number].degrees
+        if values.any():
+            yield Channel(au(number)[0], times, values, layer=Layer.IDLE, source=SOURCE)

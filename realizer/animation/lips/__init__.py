@@ -1,0 +1,3 @@
+"""Phonemes to lip, jaw and tongue channels."""
+
+__all__: list[str] = []

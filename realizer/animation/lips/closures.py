@@ -1,0 +1,77 @@
+"""The sounds of an utterance in, when speech has the lips and when a sound closes or bites them out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.animation.lips.dominance import Track
+from realizer.animation.lips.visemes import coarticulation
+from realizer.core.arrays import Bool, Float64
+
+__all__ = ["BILABIAL", "LABIODENTAL", "held", "lips_taken"]
+
+BILABIAL, LABIODENTAL = 1, 2  # visemes
+
+
+def lips_taken(track: Track, times: Float64) -> Float64:
+    """(n,) 0..1: how far speech has the lips; 0 at the ends and in long pauses.
+
+    Whole from the first sound that closes the lips to the last: an expression would part them.
+    """
+    facts = coarticulation()
+    pauses = facts["pauses"]
+    ends = np.zeros(len(track.rest), bool)
+    ends[[0, -1]] = True
+    let_go = track.rest & (ends | (track.end - track.begin > pauses["released"]))
+    middle = (track.begin + track.end) / 2
+    closing = track.mix[:, list(facts["closure"]["visemes"])].sum(axis=1) > 0.5
+    half = np.maximum(facts["closure"]["hold"], track.end - track.begin) / 2
+    taken = np.zeros(len(times))
+    for run in np.split(np.arange(len(let_go)), np.flatnonzero(np.diff(let_go)) + 1):
+        if let_go[run[0]]:
+            continue
+        rise = max(times[0], track.begin[run[0]] - pauses["attack"])
+        fall = min(times[-1], track.end[run[-1]] + pauses["release"])
+        attack, release = (min(pauses[name], (fall - rise) / 2) for name in ("attack", "release"))
+        shut = run[closing[run]]
+        if len(shut):
+            before = middle[shut[0]] - half[shut[0]] - rise
+            after = fall - middle[shut[-1]] - half[shut[-1]]
+            attack = max(min(attack, before), pauses["least"])
+            release = max(min(release, after), pauses["least"])
+        up, down = _smoothstep((times - rise) / attack), _smoothstep((fall - times) / release)
+        taken = np.maximum(taken, np.minimum(up, down))
+    return taken
+
+
+def _smoothstep(x: Float64) -> Float64:
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3 - 2 * x)
+
+
+def held(track: Track, times: Float64) -> tuple[Bool, Bool]:
+    """(n,) each: whether a sound that closes the lips, or bites the lower one, holds them at each time.
+
+    Two different ones that stand close together part as far as a frame allows, and share what is between.
+    """
+    closure, pad = coarticulation()["closure"], coarticulation()["articulators"]["lips"]["smooth"]
+    which = np.flatnonzero(track.mix[:, [BILABIAL, LABIODENTAL]].max(axis=1) > 0.5)
+    bites = track.mix[which, LABIODENTAL] > 0.5
+    length = (track.end - track.begin)[which]
+    middle = (track.begin + track.end)[which] / 2
+    differ = np.flatnonzero(bites[1:] != bites[:-1])
+    near = np.clip((closure["apart"] - np.diff(middle)[differ]) / 2, 0.0, closure["moved"])
+    np.subtract.at(middle, differ, near)
+    np.add.at(middle, differ + 1, near)
+    half = np.maximum(closure["hold"], length - 2 * pad) / 2 + pad
+    opens, closes = middle - half, middle + half
+    for k in differ:
+        if closes[k] > opens[k + 1]:
+            # Lips that part need time, which the closure gives: pressed lips are closed for longer.
+            border = (closes[k] + opens[k + 1]) / 2 + (1 if bites[k] else -1) * closure["gives"]
+            closes[k], opens[k + 1] = max(border, opens[k]), min(border, closes[k + 1])
+    holds = np.zeros((2, len(times)), bool)
+    for row, mine in zip(holds, (~bites, bites), strict=True):
+        begun = np.searchsorted(np.sort(opens[mine]), times, "right")
+        row[:] = begun > np.searchsorted(np.sort(closes[mine]), times, "left")
+    return holds[0], holds[1]

@@ -1,0 +1,171 @@
+"""Phonemes with their times in, how much each sound has to say at a time out: dominance functions.
+
+Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.animation.lips.visemes import SHAPE, VISEMES, coarticulation, shape_table, sounds
+from realizer.core.arrays import Bool, Float64
+from realizer.speech.utterance import Phoneme
+
+__all__ = ["CLASSES", "Track", "dominances", "key_times", "track_of"]
+
+CLASSES = {"jaw": ("jaw",), "lips": ("upper", "lower"), "shape": SHAPE[3:7], "tongue": SHAPE[7:]}
+STRESS = {0: "none", 1: "primary", 2: "secondary"}
+
+Index = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The sounds of an utterance in order, without the short pauses between them.
+
+    Attributes:
+        begin, end: (m,) float64 seconds.
+        mix: (m, 15) float64, part of each viseme.
+        vowel: (m,) whether it is a vowel.
+        size: (m,) float64, how much of its shape it reaches.
+        effort: (m,) float64, how much further than that jaw and lips open; 1 is usual.
+        rest: (m,) whether it is a pause.
+    """
+
+    begin: Float64
+    end: Float64
+    mix: Float64
+    vowel: Bool
+    size: Float64
+    effort: Float64
+    rest: Bool
+
+
+class _Row(NamedTuple):
+    begin: float
+    end: float
+    mix: tuple[tuple[int, float], ...]
+    vowel: bool = False
+    size: float = 1.0
+    effort: float = 1.0
+
+
+SILENT = ((0, 1.0),)
+
+
+def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
+    """The sounds of phonemes (in order, "" is a pause); None where nothing is said."""
+    facts = coarticulation()
+    rows: list[_Row] = []
+    for phoneme in phonemes:
+        parts = sounds(phoneme.ipa)
+        if not parts:
+            if rows and rows[-1].mix == SILENT:  # two pauses are one
+                rows[-1] = rows[-1]._replace(end=phoneme.end)
+            else:
+                rows.append(_Row(phoneme.start, phoneme.end, SILENT))
+            continue
+        at, length = phoneme.start, phoneme.end - phoneme.start
+        for part in parts:
+            until = at + part.share * length
+            if part.vowel:
+                rows.append(_Row(at, until, part.mix, True, _size(phoneme, until - at), _effort(phoneme)))
+            else:
+                rows.append(_Row(at, until, part.mix))
+            at = until
+    if all(row.mix in (SILENT, ()) for row in rows):
+        return None
+    # A short pause between sounds does not bring the mouth to rest; at the ends it always does.
+    inner = range(1, len(rows) - 1)
+    absorbed = facts["pauses"]["absorbed"]
+    rows = [
+        row
+        for k, row in enumerate(rows)
+        if not (k in inner and row.mix == SILENT and row.end - row.begin < absorbed)
+    ]
+    begin, end = np.array([row.begin for row in rows]), np.array([row.end for row in rows])
+    middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or reach to the middle of what was absorbed
+    mix = np.zeros((len(rows), VISEMES))
+    for k, row in enumerate(rows):
+        for viseme, amount in row.mix:
+            mix[k, viseme] = amount
+    return Track(
+        begin=np.concatenate((begin[:1], middle)),
+        end=np.concatenate((middle, end[-1:])),
+        mix=mix,
+        vowel=np.array([row.vowel for row in rows]),
+        size=np.array([row.size for row in rows]),
+        effort=np.array([row.effort for row in rows]),
+        rest=np.array([row.mix == SILENT for row in rows]),
+    )
+
+
+def _size(phoneme: Phoneme, length: float) -> float:
+    """How much of its shape a vowel of that length reaches: what is missing falls off exponentially.
+
+    Source: Lindblom 1963, "Spectrographic study of vowel reduction", of formants; here of the mouth.
+    """
+    short = coarticulation()["undershoot"]
+    stress = coarticulation()["stress"][STRESS.get(phoneme.stress, "none")]
+    return float(stress * (1 - short["lost"] * math.exp(-length / short["decay"])))
+
+
+def _effort(phoneme: Phoneme) -> float:
+    """How much further a vowel opens because it is loud."""
+    facts = coarticulation()["loudness"]
+    return float(min(max(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"]), facts["most"]))
+
+
+def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:
+    """(n,) seconds from `lead` before the first phoneme to the last, at the table's rate (at least two)."""
+    rate = coarticulation()["rate"]
+    first, last = phonemes[0].start - lead, max(phonemes[-1].end, phonemes[0].start + 2 / rate)
+    return np.linspace(first, last, int(np.ceil((last - first) * rate)) + 1)
+
+
+def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, tuple[str, ...]]]:
+    """How much the sounds around each time have to say, for each class of articulators.
+
+    Yields:
+        Which sounds, (k, n); their parts, (k, n), which add to a little less than 1: the rest is the neutral
+        mouth's; the columns of `SHAPE` that the class moves.
+    """
+    facts = coarticulation()
+    rule = facts["dominance"]
+    length = np.maximum(track.end - track.begin, 1e-3)
+    base = np.where(track.vowel, rule["base_vowel"], rule["base_consonant"])
+    rate = base * (rule["length"] / length) ** rule["exponent"]
+    strength = np.where(track.vowel, rule["strength_vowel"], rule["strength_consonant"])
+    weight = (track.mix @ shape_table()[1]).T * strength
+    # A pause is at rest over its whole length but its edges; a sound is strongest in its middle part.
+    edge = np.where(track.rest, np.minimum(0.1, length / 3), length * (1 - rule["core"]) / 2)
+    core_begin, core_end = track.begin + edge, track.end - edge
+
+    # Sounds further away than `neighbours` add nothing that can be seen: a band, not a matrix. Times lie
+    # along the last axis, where numpy is fast.
+    band = np.arange(-rule["neighbours"], rule["neighbours"] + 1)[:, None]
+    near = np.searchsorted(track.begin, times, "right") - 1 + band
+    beyond = (near < 0) | (near >= len(length))
+    near = near.clip(0, len(length) - 1)
+    fall = _taken(rate, near)
+    before = fall * np.maximum(_taken(core_begin, near) - times, 0)
+    after = fall * np.maximum(times - _taken(core_end, near), 0)
+    before[beyond] = np.inf
+
+    for own, (name, members) in zip(weight, CLASSES.items(), strict=True):
+        pace = facts["articulators"][name]
+        d = np.exp(-pace["before"] * before - pace["after"] * after)
+        d *= _taken(own, near)
+        d /= d.sum(axis=0) + rule["rest"]
+        yield near, d, members
+
+
+def _taken(values: Float64, near: Index) -> Float64:
+    """`values[..., near]`, of indices that are known to be there: half as long."""
+    return values.take(near, axis=-1, mode="clip")

@@ -1,0 +1,93 @@
+"""Phonemes with their times in, how much of each viseme is seen out: of MPEG-4 (FAP 1), or of Oculus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from realizer import tables
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
+from realizer.animation.lips.dominance import dominances, key_times, track_of
+from realizer.animation.lips.visemes import VISEMES
+from realizer.core.arrays import Float64, Int32
+from realizer.speech.utterance import Phoneme
+
+__all__ = ["OculusViseme", "fap_1", "oculus_visemes", "oculus_weights", "viseme_weights"]
+
+BLEND = 63  # the first viseme alone
+
+
+@dataclass(frozen=True, slots=True)
+class OculusViseme:
+    """A viseme of Oculus (and of Ready Player Me, as `viseme_NAME`) and the MPEG-4 viseme that it is."""
+
+    name: str
+    viseme: int
+
+
+@cache
+def oculus_visemes() -> tuple[OculusViseme, ...]:
+    """The 15, in the order of their numbers there."""
+    return tables.read_csv(tables.text_of("visemes_oculus.csv"), OculusViseme, "visemes_oculus.csv")
+
+
+def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
+    """How much of each MPEG-4 viseme the mouth shows.
+
+    The parts that sounds have in jaw, lips, width and tongue, as `lip_channels` mixes them, on average;
+    sounds that close the lips or bite the lower one are alone while they hold it.
+
+    Args:
+        phonemes: in order, seconds from the start of the utterance; "" is a pause.
+        times: (n,) seconds on the same clock.
+
+    Returns:
+        (n, 15) float64, 0..1, column = viseme (0 is none); each row adds to 1.
+    """
+    weights = np.zeros((len(times), VISEMES))
+    weights[:, 0] = 1.0
+    track = track_of(phonemes)
+    if track is None:
+        return weights
+    keys = key_times(phonemes)
+    shown = np.zeros((len(keys), VISEMES))
+    classes = list(dominances(track, keys))
+    for near, parts, _ in classes:
+        shown += np.einsum("kn,knv->nv", parts, track.mix[near]) / len(classes)
+    for viseme, holds in zip((BILABIAL, LABIODENTAL), held(track, keys), strict=True):
+        # Over a key on either side, as the lips themselves pass into a closure.
+        share = np.convolve(np.pad(holds.astype(float), 1, "edge"), [0.25, 0.5, 0.25], "valid")[:, None]
+        shown = shown * (1 - share) + share * np.eye(VISEMES)[viseme]
+    shown *= lips_taken(track, keys)[:, None]
+    for viseme in range(1, VISEMES):
+        weights[:, viseme] = np.interp(times, keys, shown[:, viseme], left=0.0, right=0.0)
+    weights[:, 0] = np.maximum(1 - weights[:, 1:].sum(axis=1), 0.0)
+    return weights
+
+
+def oculus_weights(weights: Float64) -> Float64:
+    """(n, 15) of MPEG-4's visemes as (n, 15) of Oculus', in the order of `oculus_visemes`."""
+    return np.ascontiguousarray(weights[:, [row.viseme for row in oculus_visemes()]])
+
+
+def fap_1(weights: Float64) -> Int32:
+    """The two strongest visemes and how they are mixed: select1, select2, blend, def of FAP 1.
+
+    What a decoder shows is select1 x blend / 63 + select2 x (1 - blend / 63); one alone is select1 with 63.
+
+    Args:
+        weights: (n, 15), column = viseme.
+
+    Returns:
+        (n, 4) int32; `def` is 0: the visemes are the standard's own.
+    """
+    order = np.argsort(-weights, axis=1, kind="stable")[:, :2]
+    first, second = np.take_along_axis(weights, order, axis=1).T
+    blend = np.rint(BLEND * first / np.maximum(first + second, 1e-12)).astype(np.int32)
+    out = np.zeros((len(weights), 4), np.int32)
+    out[:, :2], out[:, 2] = order, blend
+    out[blend == BLEND, 1] = 0
+    return out

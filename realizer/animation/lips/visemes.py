@@ -1,0 +1,183 @@
+"""IPA in, mixtures of the MPEG-4 visemes out: by articulatory features, so that every language has lips."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cache, lru_cache
+from typing import Any, Literal
+
+import numpy as np
+
+from realizer import tables
+from realizer.core.arrays import Float64
+
+__all__ = [
+    "LipShape",
+    "PhonemeFeatures",
+    "Sound",
+    "coarticulation",
+    "lip_shapes",
+    "phoneme_features",
+    "sounds",
+]
+
+VISEMES = 15  # 0 none, 1..14: ISO/IEC 14496-2
+ROUNDED = 14  # the viseme of a rounded mouth
+BILABIAL = 1
+SHAPE = ("jaw", "upper", "lower", "width", "push_upper", "push_lower", "corner", "tip", "thrust", "body")
+WEIGHT = ("weight_jaw", "weight_lips", "weight_shape", "weight_tongue")
+
+
+@dataclass(frozen=True, slots=True)
+class PhonemeFeatures:
+    """How one IPA symbol is made; `height` of vowels only, 0 close .. 1 open."""
+
+    ipa: str
+    kind: Literal["vowel", "consonant"]
+    place: str
+    manner: str
+    height: float | None
+    rounded: float
+
+
+@dataclass(frozen=True, slots=True)
+class VisemeRule:
+    place: str
+    manner: str
+    viseme: int
+
+
+@dataclass(frozen=True, slots=True)
+class LipShape:
+    """The mouth of one viseme in FAPU, and how strongly it insists; columns as in the table's head."""
+
+    viseme: int
+    example: str
+    jaw: float
+    upper: float
+    lower: float
+    width: float
+    push_upper: float
+    push_lower: float
+    corner: float
+    tip: float
+    thrust: float
+    body: float
+    weight_jaw: float
+    weight_lips: float
+    weight_shape: float
+    weight_tongue: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sound:
+    """One articulation inside a phoneme.
+
+    Attributes:
+        mix: part of each viseme, (viseme, part) pairs whose parts add to 1; () where the lips have no aim.
+        vowel: whether it is one.
+        share: part of the phoneme's time, 0..1.
+    """
+
+    mix: tuple[tuple[int, float], ...]
+    vowel: bool
+    share: float
+
+
+@cache
+def phoneme_features() -> Mapping[str, PhonemeFeatures]:
+    """IPA symbol -> features."""
+    rows = tables.read_csv(tables.text_of("phonemes.csv"), PhonemeFeatures, "phonemes.csv")
+    return {row.ipa: row for row in rows}
+
+
+@cache
+def lip_shapes() -> tuple[LipShape, ...]:
+    """The 15 mouths; index = viseme."""
+    return tables.read_csv(tables.text_of("visemes.csv"), LipShape, "visemes.csv")
+
+
+@cache
+def coarticulation() -> dict[str, Any]:
+    """Constants of the dominance model, with their source in the table's head."""
+    return tables.read_toml(tables.text_of("coarticulation.toml"), "coarticulation.toml")
+
+
+@cache
+def shape_table() -> tuple[Float64, Float64]:
+    """(15, 10) shapes in FAPU, columns `SHAPE`; (15, 4) weights, columns `WEIGHT`."""
+    assert {f.name for f in fields(LipShape)} >= {*SHAPE, *WEIGHT}
+    shapes = np.array([[getattr(row, name) for name in SHAPE] for row in lip_shapes()], np.float64)
+    weights = np.array([[getattr(row, name) for name in WEIGHT] for row in lip_shapes()], np.float64)
+    return shapes, weights
+
+
+@lru_cache(maxsize=2048)
+def sounds(ipa: str) -> tuple[Sound, ...]:
+    """The articulations of one phoneme string, in order; their shares add to 1.
+
+    A string may hold several sounds ("oʊ", "əl", "ɔːɹ", "tʃ"). Length, stress, tone and diacritics are
+    stripped; letters that no table knows are taken for what they look like, or left out.
+    """
+    found: list[tuple[tuple[tuple[int, float], ...], bool]] = []
+    for symbol, labialised in _symbols(ipa):
+        row = phoneme_features()[symbol]
+        mix = _vowel_mix(row) if row.kind == "vowel" else _consonant_mix(row)
+        if labialised and mix and mix[0][0] not in coarticulation()["closure"]["visemes"]:
+            mix = (*((viseme, part / 2) for viseme, part in mix), (ROUNDED, 0.5))
+        found.append((mix, row.kind == "vowel"))
+    consonant = coarticulation()["diphthong"]["consonant"]
+    first = coarticulation()["diphthong"]["first"]
+    times = [1.0 if vowel else consonant for _, vowel in found]
+    if len(found) == 2 and all(vowel for _, vowel in found):
+        times = [first, 1 - first]
+    whole = sum(times)
+    return tuple(Sound(mix, vowel, t / whole) for (mix, vowel), t in zip(found, times, strict=True))
+
+
+def _symbols(ipa: str) -> list[tuple[str, bool]]:
+    """(symbol of the table, is it labialised) in order."""
+    known = phoneme_features()
+    symbols: list[tuple[str, bool]] = []
+    # Composed first: ç is a letter of its own, õ is o with a mark.
+    for letter in unicodedata.normalize("NFC", ipa):
+        if letter == "ʷ" and symbols:
+            symbols[-1] = (symbols[-1][0], True)
+            continue
+        plain = letter if letter in known else unicodedata.normalize("NFD", letter.lower())[0]
+        if plain in known:
+            pair = symbols[-1][0] + plain if symbols else ""
+            if pair in known:  # an affricate: two letters, one sound
+                symbols[-1] = (pair, symbols[-1][1])
+            else:
+                symbols.append((plain, False))
+    return symbols
+
+
+def _vowel_mix(row: PhonemeFeatures) -> tuple[tuple[int, float], ...]:
+    """Between the vowels that MPEG-4 names, along height; unrounded and rounded ones apart."""
+    anchors = coarticulation()["vowels"]
+    mix: dict[int, float] = {}
+    for points, part in ((anchors["unrounded"], 1 - row.rounded), (anchors["rounded"], row.rounded)):
+        heights = [height for height, _ in points]
+        for k, (_, viseme) in enumerate(points):
+            share = part * float(np.interp(row.height or 0.0, heights, np.eye(len(points))[k]))
+            if share:
+                mix[viseme] = mix.get(viseme, 0.0) + share
+    return tuple(mix.items())
+
+
+def _consonant_mix(row: PhonemeFeatures) -> tuple[tuple[int, float], ...]:
+    viseme = _viseme_of(row.place, row.manner)
+    return ((viseme, 1.0),) if viseme else ()
+
+
+@cache
+def _viseme_of(place: str, manner: str) -> int:
+    rules = tables.read_csv(tables.text_of("phonemes_visemes.csv"), VisemeRule, "phonemes_visemes.csv")
+    for rule in rules:
+        if rule.place in (place, "any") and rule.manner in (manner, "any"):
+            return rule.viseme
+    return 0

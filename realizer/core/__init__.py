@@ -1,0 +1,3 @@
+"""Values and settings that every layer shares."""
+
+__all__: list[str] = []

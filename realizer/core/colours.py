@@ -1,0 +1,21 @@
+"""8-bit sRGB in, linear light out, and back (IEC 61966-2-1): the one place that knows the curve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.core.arrays import Float32, UInt8
+
+__all__ = ["linear", "srgb"]
+
+
+def linear(colours: UInt8) -> Float32:
+    """Linear light 0..1, float32, of 8-bit sRGB."""
+    c = np.asarray(colours, np.float32) / np.float32(255)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def srgb(light: Float32) -> Float32:
+    """sRGB 0..1, float32, of linear light; below 0 and above 1 are cut."""
+    c = np.clip(np.asarray(light, np.float32), 0, 1)
+    return np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055).astype(np.float32)

@@ -1,0 +1,77 @@
+"""Archetypes and the numbers of a word in, the profile between them out (Raouzaiou et al. 2002, 4)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from realizer.emotions.profile import Profile
+
+__all__ = ["Anchor", "between", "same_category"]
+
+
+class Anchor(NamedTuple):
+    """An archetype on the wheel: its profile, activation above 0, and angle in degrees."""
+
+    profile: Profile
+    activation: float
+    angle: float
+
+
+def same_category(archetype: Profile, own: float, activation: float, name: str = "") -> Profile:
+    """The archetype's FAPs, as far as the activations are to each other (4.1, rules 1 to 3).
+
+    Args:
+        own: the activation of the archetype's word, above 0.
+        activation: that of the intermediate emotion's.
+
+    Raises:
+        ValueError: an activation that is not a number, or below 0.
+    """
+    _check(own, activation)
+    return archetype.scaled(activation / own, name)
+
+
+def between(one: Anchor, two: Anchor, angle: float, activation: float, name: str = "") -> Profile:
+    """The profile of an emotion between two archetypes, by the published rules (4.2, rules 1 to 6).
+
+    The nearer archetype weighs more, as in the paper's own example (eq. 13); its eq. 5 and 6 have the weights
+    exchanged. The rules are not continuous: see `wheel` for what is.
+
+    Args:
+        one, two: counted in the sense of rising angles, over 0 if need be.
+        angle: degrees, from one to two.
+        activation: that of the intermediate emotion's word.
+
+    Raises:
+        ValueError: an angle that does not lie between, or an activation that is no number.
+    """
+    _check(one.activation, activation)
+    _check(two.activation, activation)
+    width = (two.angle - one.angle) % 360.0
+    share = ((angle - one.angle) % 360.0) / width if width else math.inf  # how much of `two`
+    if not share <= 1.0:
+        raise ValueError(f"angle: wanted one from {one.angle:g} to {two.angle:g} degrees, got {angle:g}")
+    first = one.profile.scaled(activation / one.activation).ranges
+    second = two.profile.scaled(activation / two.activation).ranges
+    ranges: dict[int, tuple[float, float]] = {}
+    for fap in sorted({*first, *second}):  # rule 1
+        if fap not in first or fap not in second:  # rule 4: averaged with the neutral face
+            low, high = first[fap] if fap in first else second[fap]
+            ranges[fap] = low / 2, high / 2
+        elif sum(first[fap]) * sum(second[fap]) >= 0:  # rule 2: the middles have the same direction
+            # Weighing middles and lengths is weighing both ends.
+            low, high = ((1 - share) * a + share * b for a, b in zip(first[fap], second[fap], strict=True))
+            ranges[fap] = low, high
+        else:  # rule 3: what both agree on, mostly nothing
+            low, high = max(first[fap][0], second[fap][0]), min(first[fap][1], second[fap][1])
+            if low <= high:
+                ranges[fap] = low, high
+    return Profile(name or f"between {one.profile.name} and {two.profile.name}", one.profile.source, ranges)
+
+
+def _check(own: float, activation: float) -> None:
+    if not (math.isfinite(own) and own > 0 and math.isfinite(activation) and activation >= 0):
+        raise ValueError(
+            f"activation: wanted 0 or more, and an archetype's above 0, got {activation} and {own}"
+        )

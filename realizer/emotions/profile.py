@@ -1,0 +1,132 @@
+"""An expression as ranges of FAPs: its middle, draws from it, its text."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from realizer import tables
+from realizer.core.arrays import Float32
+
+__all__ = ["Profile"]
+
+RANGE = re.compile(r"\s*F(\d+)\s*\[\s*([^,\[\]]+),([^,\[\]]+)\]\s*")
+OUTER = 47  # the FAP of a point of the outer lips is that of the inner one + 47 (ISO/IEC 14496-2 annex C)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The FAPs that an expression moves, and how far (Raouzaiou et al. 2002, section 2).
+
+    Attributes:
+        name: such as "fear 8".
+        source: "own", "published", "raw", or how it was made.
+        ranges: {FAP 3..68: (low, high)} in the FAP's FAPU, rising FAPs.
+
+    Raises:
+        ValueError: no FAP, not a number, or low above high.
+    """
+
+    name: str
+    source: str
+    ranges: Mapping[int, tuple[float, float]]
+
+    def __post_init__(self) -> None:
+        for fap, (low, high) in self.ranges.items():
+            if not 3 <= fap <= 68:
+                raise ValueError(f"{self.name}: wanted a FAP 3..68, got {fap}")
+            if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+                raise ValueError(f"{self.name}, FAP {fap}: wanted low <= high, finite, got [{low}, {high}]")
+        ordered = {fap: self.ranges[fap] for fap in sorted(self.ranges)}
+        object.__setattr__(self, "ranges", MappingProxyType(ordered))
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.source, tuple(self.ranges.items())))
+
+    def __str__(self) -> str:
+        """As Paul 2010, figure 6.5 writes it: F3 [400, 560], F5 [-240, -160]."""
+        return ", ".join(
+            f"F{fap} [{_plain(low)}, {_plain(high)}]" for fap, (low, high) in self.ranges.items()
+        )
+
+    @classmethod
+    def parse(cls, text: str, name: str = "profile", source: str = "text") -> Profile:
+        """The profile of such a text; ranges that are written backwards are turned round.
+
+        Raises:
+            ValueError: what is no range, or a FAP twice; with the place in the text.
+        """
+        ranges: dict[int, tuple[float, float]] = {}
+        place = 0
+        while place < len(text.rstrip()):
+            match = RANGE.match(text, place)
+            if match is None:
+                raise ValueError(
+                    f"{name}, column {place + 1}: wanted F3 [low, high], got {text[place:][:30]!r}"
+                )
+            fap = int(match[1])
+            try:
+                low, high = sorted((float(match[2]), float(match[3])))
+            except ValueError:
+                raise ValueError(f"{name}, F{fap}: wanted two numbers, got {match[0].strip()!r}") from None
+            if fap in ranges:
+                raise ValueError(f"{name}: wanted each FAP once, got F{fap} twice")
+            ranges[fap] = low, high
+            place = match.end()
+            if place < len(text) and text[place] != ",":
+                raise ValueError(f"{name}, column {place + 1}: wanted a comma, got {text[place:][:30]!r}")
+            place += 1
+        return cls(name, source, ranges)
+
+    def midpoint(self) -> dict[int, float]:
+        """FAP -> the middle of its range."""
+        return {fap: (low + high) / 2 for fap, (low, high) in self.ranges.items()}
+
+    def frame(self) -> Float32:
+        """(68,) the middle of each range, column = FAP - 1; 0 elsewhere."""
+        return _frame(self.midpoint())
+
+    def draw(self, seed: int | np.random.Generator) -> Float32:
+        """(68,) a place in each range, so that one expression does not look twice alike.
+
+        Both sides of the face, and the inner and the outer point of a lip, go equally far into their ranges:
+        otherwise the face would be torn.
+        """
+        chance = np.random.default_rng(seed)
+        parts: dict[int, float] = {}
+        values = {}
+        for fap, (low, high) in self.ranges.items():
+            one = _one_of(fap)
+            if one not in parts:
+                parts[one] = float(chance.uniform())
+            values[fap] = low + (high - low) * parts[one]
+        return _frame(values)
+
+    def scaled(self, factor: float, name: str | None = None) -> Profile:
+        """Every range times `factor`, 0 or more."""
+        if not (math.isfinite(factor) and factor >= 0):
+            raise ValueError(f"{self.name}: wanted a factor of 0 or more, got {factor}")
+        ranges = {fap: (low * factor, high * factor) for fap, (low, high) in self.ranges.items()}
+        return Profile(name or self.name, self.source, ranges)
+
+
+def _one_of(fap: int) -> int:
+    """The FAP that stands for this one, its mirror image, and their inner points of the lips."""
+    inner = fap - OUTER if 4 <= fap - OUTER <= 13 else fap
+    return min(inner, tables.faps()[inner - 1].mirror)
+
+
+def _frame(values: Mapping[int, float]) -> Float32:
+    frame = np.zeros(68, np.float32)
+    for fap, value in values.items():
+        frame[fap - 1] = value
+    return frame
+
+
+def _plain(value: float) -> str:
+    return f"{round(value, 3) + 0.0:.7g}"  # + 0.0: no minus before a zero

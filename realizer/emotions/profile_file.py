@@ -1,0 +1,53 @@
+"""Paul's file of profiles (2010, 6.3): text in, profiles out, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from realizer.emotions.profile import Profile
+
+__all__ = ["read_profiles", "write_profiles"]
+
+
+def read_profiles(text: str, where: str = "profiles") -> tuple[Profile, ...]:
+    """The profiles of a file: a line with an emotion and a number, then a line of ranges, and so on.
+
+    Empty lines, and those that begin with #, do not count.
+
+    Args:
+        where: what to call the file in messages.
+
+    Raises:
+        ValueError: a label without a number, one that comes twice, or what is no range; with the line.
+    """
+    found: dict[str, Profile] = {}
+    label = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        if not (line := line.strip()) or line.startswith("#"):
+            continue
+        if label:
+            try:
+                found[label] = Profile.parse(line, label, where)
+            except ValueError as error:
+                raise ValueError(f"{where}, line {number}: {error}") from None
+            label = ""
+            continue
+        emotion, _, index = line.rpartition(" ")
+        if not emotion.strip() or not index.isdecimal():
+            raise ValueError(f"{where}, line {number}: wanted an emotion and a number, got {line[:60]!r}")
+        label = f"{emotion.strip()} {int(index)}"
+        if label in found:
+            raise ValueError(f"{where}, line {number}: {label} is there twice")
+    if label:
+        raise ValueError(f"{where}: wanted a line of ranges after {label!r}, got the end")
+    return tuple(found.values())
+
+
+def write_profiles(profiles: Iterable[Profile]) -> str:
+    """The text of such a file; a profile whose name has no number gets 0."""
+    lines = []
+    for profile in profiles:
+        numbered = profile.name.rpartition(" ")[2].isdecimal() and " " in profile.name
+        label = profile.name if numbered else f"{profile.name} 0"
+        lines += [label[:1].upper() + label[1:], str(profile)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,274 @@
+"""A head's shapes and feature points in, fields of the FAPs out, each exactly 1 at its feature point.
+
+A shape such as a raised brow moves several feature points at once. Along the line that joins them each has a
+share that is 1 at itself and 0 at the others; a FAP's field is its share of the shape over what the shape
+does on that line. So the FAPs that the shape itself asks for give the shape back, and every point obeys its
+own FAP alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Float64, Int32
+from realizer.facebuild.arkit.mouth import Mouth, averages
+from realizer.facebuild.mpeg4.measure import WAYS
+from realizer.facebuild.mpeg4.zones import Triple
+from realizer.facebuild.parts import smooth
+from realizer.tables import faps
+
+__all__ = ["Grown", "shape_fields"]
+
+FLOOR = 0.35  # of the most on its line: a point that a shape hardly moves does not blow its field up
+TRUE = 0.25  # of its largest move: what a shape has to move a point along a FAP's way to serve it
+BLOWN = 0.1  # the same for cheeks: they go forwards more than aside
+# FAP -> its point, its station along the lips (0 right corner .. 4 left), and 1 on the outer contour.
+UPPER = {
+    4: ("2.2", 2, 0), 8: ("2.6", 3, 0), 9: ("2.7", 1, 0), 51: ("8.1", 2, 1), 55: ("8.5", 3, 1),
+    56: ("8.6", 1, 1),
+}  # fmt: skip
+LOWER = {
+    5: ("2.3", 2, 0), 10: ("2.8", 3, 0), 11: ("2.9", 1, 0), 52: ("8.2", 2, 1), 57: ("8.7", 3, 1),
+    58: ("8.8", 1, 1),
+}  # fmt: skip
+BROWS = {1: ((31, "4.1"), (33, "4.3"), (35, "4.5")), -1: ((32, "4.2"), (34, "4.4"), (36, "4.6"))}
+CORNERS = {1: ((6, 12, "2.4", 0), (53, 59, "8.3", 1)), -1: ((7, 13, "2.5", 0), (54, 60, "8.4", 1))}
+WORDS = {1: "Left", -1: "Right"}
+BINS = 24  # places across an eye
+
+
+class Grown:
+    """The skin with its shapes, and where the feature points sit on it.
+
+    Args:
+        skin: (n, 3) metres; triangles: (m, 3); moves: ARKit's name -> (n, 3).
+        points: feature point -> metres; vertex: feature point -> vertex of the skin.
+        mouth: where the vertices stand about the mouth; upper_lid: side (1, -1) -> (n,) 1 above the slit.
+        zones: FAP -> (n, 3) what zones make of it.
+    """
+
+    def __init__(
+        self, skin: Float64, triangles: Int32, moves: Mapping[str, Float64], points: Mapping[str, Triple],
+        vertex: Mapping[str, int], mouth: Mouth, upper_lid: Mapping[int, Float64],
+        zones: Mapping[int, Float64],
+    ) -> None:  # fmt: skip
+        self.skin, self.moves, self.mouth, self.upper_lid = skin, moves, mouth, upper_lid
+        self.place = {name: np.array(value, float) for name, value in points.items()}
+        self.vertex, self.zones = vertex, zones
+        self.mean = averages(len(skin), triangles)
+        self.eyes = float(self.place["3.5"][0] - self.place["3.6"][0])
+        # 1 on the lips, which FAP 3 leaves to their own FAPs, falling to 0 at the chin.
+        reach = 0.95 * float(np.linalg.norm(self.place["8.2"] - self.place["2.1"]))
+        self.held = np.asarray(smooth(mouth.away, reach, 0.0015))
+
+    def move(self, *names: str) -> Float64 | None:
+        """The sum of shapes; None where one is missing."""
+        if any(name not in self.moves for name in names):
+            return None
+        return np.asarray(np.sum([self.moves[name] for name in names], axis=0))
+
+    def smoothed(self, field: Float64, times: int = 1) -> Float64:
+        for _ in range(times):
+            field = np.asarray(self.mean @ field)
+        return field
+
+    def without(
+        self, move: Float64, fields: Mapping[int, Float64 | None], others: tuple[int, ...]
+    ) -> Float64:
+        """A shape less what other FAPs do of it, as their feature points tell."""
+        for fap in others:
+            row = faps()[fap - 1]
+            field = fields.get(fap)
+            field = self.zones[fap] if field is None else field
+            vertex = self.vertex[row.feature_point]
+            amount = float(move[vertex] @ field[vertex]) / max(float(field[vertex] @ field[vertex]), 1e-12)
+            move = move - amount * field
+        return move
+
+    def exact(self, fap: int, field: Float64, least: float = TRUE) -> Float64 | None:
+        """The field with 1 along the FAP's way at its point; None where it goes another way."""
+        row = faps()[fap - 1]
+        here = field[self.vertex[row.feature_point]]
+        along = float(here @ np.array(WAYS[row.direction]))
+        if along < least * float(np.linalg.norm(field, axis=1).max(initial=1e-12)):
+            return None
+        return field / along
+
+
+def shape_fields(grown: Grown) -> dict[int, Float64]:
+    """FAP -> (n, 3) field on the skin, of every FAP that the head's shapes serve."""
+    found = _brows(grown) | _cheeks(grown) | _lids(grown) | _chin(grown) | _pushed(grown)
+    found |= _corners(grown, found)
+    found |= _upper_lip(grown, found) | _lower_lip(grown)
+    return {fap: field for fap, field in found.items() if field is not None}
+
+
+def _upper_lip(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+    """The upper lip's FAPs from the shape that bares the upper teeth."""
+    move = grown.move("mouthUpperUpLeft", "mouthUpperUpRight")
+    if move is None:
+        return {}
+    # Nose and cheeks have FAPs of their own.
+    move = grown.without(move, made, (41, 42, 61, 62, 63, 17))
+    near = smooth(grown.mouth.away, 0.030, 0.0) * grown.mouth.upper
+    return _line(grown, UPPER, move, near)
+
+
+def _lower_lip(grown: Grown) -> dict[int, Float64 | None]:
+    """The lower lip's FAPs: what is the lip's of an opening mouth; the rest is FAP 3's."""
+    move = grown.move("jawOpen")
+    if move is None:
+        return {}
+    return _line(grown, LOWER, move, grown.held * (1 - grown.mouth.upper))
+
+
+def _line(
+    grown: Grown, line: Mapping[int, tuple[str, int, int]], move: Float64, near: Float64
+) -> dict[int, Float64 | None]:
+    """A shape parted among the points of a lip."""
+    mouth, height = grown.mouth, np.zeros((2, 5))
+    way = np.array(WAYS[faps()[min(line) - 1].direction])
+    for name, knot, outer in line.values():
+        height[outer, knot] = -float(move[grown.vertex[name]] @ way)
+    most = height.max()
+    if most <= 0:
+        return {}
+    height[:, [0, 4]] = height[:, [1, 3]]  # at the corners the shape ends, and other shapes begin
+    height = np.maximum(height, FLOOR * most)
+    local = (1 - mouth.outer) * (height[0] @ mouth.knots) + mouth.outer * (height[1] @ mouth.knots)
+    profile = -move / local[:, None] * near[:, None]
+    return {
+        fap: grown.exact(
+            fap, profile * ((mouth.outer if outer else 1 - mouth.outer) * mouth.knots[knot])[:, None]
+        )
+        for fap, (_, knot, outer) in line.items()
+    }
+
+
+def _corners(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+    """The corners' FAPs: a smile and a stretch, mixed so that the corner goes straight up or straight out."""
+    out: dict[int, Float64 | None] = {}
+    for side, rows in CORNERS.items():
+        smile, wide = (grown.move(f"mouth{stem}{WORDS[side]}") for stem in ("Smile", "Stretch"))
+        if smile is None or wide is None:
+            continue
+        smile, wide = (grown.without(shape, made, (41 if side > 0 else 42,)) for shape in (smile, wide))
+        for across, upward, name, outer in rows:
+            vertex = grown.vertex[name]
+            pull = np.array(
+                [[smile[vertex, 0] * side, wide[vertex, 0] * side], [smile[vertex, 1], wide[vertex, 1]]]
+            )
+            size = np.linalg.norm(pull, axis=0)
+            if size.min() < 1e-4 or abs(np.linalg.det(pull / size)) < 0.2:
+                continue  # both pull the same way
+            mixes = np.linalg.solve(pull, np.eye(2))
+            share = (grown.mouth.outer if outer else 1 - grown.mouth.outer) * grown.mouth.knots[
+                4 if side > 0 else 0
+            ]
+            for fap, mix in ((across, mixes[:, 0]), (upward, mixes[:, 1])):
+                out[fap] = grown.exact(fap, (smile * mix[0] + wide * mix[1]) * share[:, None])
+    return out
+
+
+def _pushed(grown: Grown) -> dict[int, Float64 | None]:
+    """FAPs 16 and 17: how far a funnel brings each lip forwards."""
+    move = grown.move("mouthFunnel")
+    if move is None:
+        return {}
+    bow = (1 + np.cos(np.pi * np.clip(grown.mouth.along, -1, 1))) / 2
+    ahead = np.clip(move[:, 2:], 0, None) * bow[:, None] * [0, 0, 1.0]
+    upper = grown.mouth.upper[:, None]
+    return {16: grown.exact(16, ahead * (1 - upper)), 17: grown.exact(17, ahead * upper)}
+
+
+def _calm(grown: Grown) -> Float64:
+    """(n, 1) 0 on the lids' edges, which follow no brow and no cheek, 1 elsewhere."""
+    shut = np.zeros(len(grown.skin))
+    for word in WORDS.values():
+        blink = grown.move(f"eyeBlink{word}")
+        if blink is not None:
+            size = np.linalg.norm(blink, axis=1)
+            shut = np.maximum(shut, size / max(float(size.max()), 1e-12))
+    return np.asarray(1 - smooth(shut, 0.08, 0.6))[:, None]
+
+
+def _brows(grown: Grown) -> dict[int, Float64 | None]:
+    move = grown.move("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
+    if move is None:
+        return {}
+    move = grown.smoothed(move * _calm(grown), 1)
+    out: dict[int, Float64 | None] = {}
+    for side, line in BROWS.items():
+        x = grown.skin[:, 0] * side
+        stations = np.abs([grown.place[name][0] for _, name in line])
+        if (np.diff(stations) <= 0).any():
+            continue
+        height = np.array([move[grown.vertex[name], 1] for _, name in line])
+        height = np.maximum(height, FLOOR * height.max())
+        if height.max() <= 0:
+            continue
+        ramps = smooth(x, stations[0], stations[1]), smooth(x, stations[1], stations[2])
+        shares = (1 - ramps[0], ramps[0] - ramps[1], ramps[1])
+        local = sum(share * tall for share, tall in zip(shares, height, strict=True))
+        # The two sides share the middle: together they lift it once.
+        half = smooth(x, -0.2 * grown.eyes, 0.2 * grown.eyes)
+        for (fap, _), share in zip(line, shares, strict=True):
+            out[fap] = grown.exact(fap, move * (half * share / local)[:, None])
+    return out
+
+
+def _cheeks(grown: Grown) -> dict[int, Float64 | None]:
+    out: dict[int, Float64 | None] = {}
+    free = np.asarray(smooth(grown.mouth.away, 0.0, 0.012))[:, None]
+    puff = grown.move("cheekPuff")
+    for side, puffed, lifted in ((1, 39, 41), (-1, 40, 42)):
+        if puff is not None:
+            half = smooth(grown.skin[:, 0] * side, -0.008, 0.008)
+            far = smooth(grown.mouth.away, 0.0, 0.032)
+            out[puffed] = grown.exact(puffed, puff * (half * far)[:, None], BLOWN)
+        squint = grown.move(f"cheekSquint{WORDS[side]}")
+        if squint is not None:
+            out[lifted] = grown.exact(lifted, grown.smoothed(squint * free * _calm(grown), 1))
+    return out
+
+
+def _chin(grown: Grown) -> dict[int, Float64 | None]:
+    """FAP 18 from the shrug of the lower lip, without the lip."""
+    move = grown.move("mouthShrugLower")
+    if move is None:
+        return {}
+    free = smooth(grown.mouth.away, 0.001, 0.010) * (1 - grown.mouth.upper)
+    return {18: grown.exact(18, grown.smoothed(move * free[:, None], 1))}
+
+
+def _lids(grown: Grown) -> dict[int, Float64 | None]:
+    """FAPs 19 to 22 from the blink: at every place across the eye the lids together close what is open."""
+    out: dict[int, Float64 | None] = {}
+    for side, top, bottom in ((1, 19, 21), (-1, 20, 22)):
+        move = grown.move(f"eyeBlink{WORDS[side]}")
+        if move is None:
+            continue
+        up = grown.upper_lid[side]
+        x = grown.skin[:, 0] * side
+        falls, rises = -move[:, 1] * up, move[:, 1] * (1 - up)
+        moved = np.linalg.norm(move, axis=1) > 0.1 * np.linalg.norm(move, axis=1).max()
+        places = np.linspace(x[moved].min(), x[moved].max(), BINS)
+        fall, rise = _most(x, falls, places), _most(x, rises, places)
+        gap = np.interp(x, places, fall + rise) / np.maximum(np.interp(x, places, fall), 1e-6)
+        out[top] = grown.exact(top, move * (up * np.clip(gap, 1, 3))[:, None])
+        middle = abs(float(grown.place["3.3"][0]))
+        open_ = np.interp(x, places, fall + rise) / max(float(np.interp(middle, places, fall + rise)), 1e-9)
+        out[bottom] = grown.exact(bottom, grown.zones[bottom] * np.clip(open_, 0, 1.2)[:, None])
+    return out
+
+
+def _most(x: Float64, amount: Any, places: Float64) -> Float64:
+    """The largest amount near each place, smooth from place to place."""
+    step = places[1] - places[0]
+    near = np.abs(x[:, None] - places) < 0.75 * step
+    most = np.where(near, amount[:, None], 0).max(axis=0)
+    padded = np.pad(most, 1, mode="edge")
+    return np.asarray((padded[:-2] + 2 * padded[1:-1] + padded[2:]) / 4)

@@ -1,0 +1,220 @@
+"""A GLB or glTF 2.0 file in, its JSON and its arrays out.
+
+Read here and by no library: trimesh leaves morph targets out and pygltflib hands raw bytes, so what a head
+needs (sparse, normalised and strided accessors) would have to be written anyway.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import io
+import json
+import struct
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from realizer.core.arrays import Float64
+from realizer.core.errors import FaceError
+
+__all__ = ["Gltf"]
+
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+# What a file may ask of its reader; the rest changes how surfaces look, or hides the numbers.
+UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
+PACKED = {
+    "KHR_draco_mesh_compression": "Draco compression",
+    "EXT_meshopt_compression": "meshopt compression",
+    "KHR_meshopt_compression": "meshopt compression",
+}
+
+
+class Gltf:
+    """A glTF 2.0 file.
+
+    Attributes:
+        path: where it came from.
+        json: the document.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read a .glb, or a .gltf with the files beside it.
+
+        Raises:
+            FaceError: no such file, a truncated or foreign one, another version, or packed geometry.
+        """
+        self.path = path
+        try:
+            raw = path.read_bytes()
+        except OSError as error:
+            raise FaceError(f"{path}: wanted a GLB head, got {error.strerror}") from None
+        self._binary: bytes | None = None
+        text = self._chunks(raw) if raw[:4] == b"glTF" else raw
+        try:
+            self.json: dict[str, Any] = json.loads(text)
+        except (ValueError, UnicodeDecodeError):
+            raise FaceError(
+                f"{path}: wanted a GLB file (binary glTF 2.0) or a .gltf, got neither; export the head again"
+            ) from None
+        if not isinstance(self.json, dict) or not isinstance(self.json.get("asset"), dict):
+            raise FaceError(f"{path}: wanted a glTF document with an asset, got none; export the head again")
+        version = str(self.json["asset"].get("version", ""))
+        if not version.startswith("2."):
+            raise FaceError(f"{path}: wanted glTF 2.0, got version {version!r}; export the head as glTF 2.0")
+        for name in self.json.get("extensionsRequired", []):
+            if name in PACKED:
+                raise FaceError(f"{path}: its geometry is packed ({PACKED[name]}); export it without")
+            if name.startswith("KHR_draco") or (name.startswith("EXT_") and name not in UNDERSTOOD):
+                raise FaceError(f"{path}: it requires {name}, which is not understood; export it without")
+        self._buffers: dict[int, bytes] = {}
+
+    def _chunks(self, raw: bytes) -> bytes:
+        if len(raw) < 20:
+            raise FaceError(f"{self.path}: wanted a GLB header, got {len(raw)} bytes; export the head again")
+        _, version, length = struct.unpack_from("<III", raw)
+        if version != 2:
+            raise FaceError(f"{self.path}: wanted GLB version 2, got {version}; export the head as glTF 2.0")
+        if length > len(raw):
+            raise FaceError(
+                f"{self.path}: truncated: its header says {length} bytes, there are {len(raw)}; "
+                "copy or export it again"
+            )
+        text, at = b"", 12
+        while at + 8 <= length:
+            size, kind = struct.unpack_from("<II", raw, at)
+            chunk = raw[at + 8 : at + 8 + size]
+            if len(chunk) < size:
+                raise FaceError(
+                    f"{self.path}: truncated: a chunk says {size} bytes, there are {len(chunk)}; "
+                    "copy or export it again"
+                )
+            if kind == JSON_CHUNK and not text:
+                text = chunk
+            elif kind == BINARY_CHUNK and self._binary is None:
+                self._binary = chunk
+            at += 8 + size
+        return text
+
+    def list(self, name: str) -> list[dict[str, Any]]:
+        """One of the document's lists, such as "meshes"; empty where there is none."""
+        found = self.json.get(name, [])
+        return found if isinstance(found, list) else []
+
+    def item(self, name: str, index: Any) -> dict[str, Any]:
+        """One of the document's things by its index.
+
+        Raises:
+            FaceError: it is not there.
+        """
+        items = self.list(name)
+        if not isinstance(index, int) or not 0 <= index < len(items):
+            raise FaceError(f"{self.path}: {name}: wanted an index 0..{len(items) - 1}, got {index!r}")
+        return items[index]
+
+    def accessor(self, index: Any) -> Float64:
+        """An accessor's values, (count, width) float64, normalised ones as -1..1 or 0..1.
+
+        Raises:
+            FaceError: it, its view or its bytes are not there.
+        """
+        accessor = self.item("accessors", index)
+        where = f"accessors[{index}]"
+        kind, width = accessor.get("componentType"), WIDTHS.get(accessor.get("type", ""))
+        count = accessor.get("count")
+        if kind not in KINDS or width is None or not isinstance(count, int) or count < 0:
+            raise FaceError(f"{self.path}: {where}: wanted a component type, type and count, got {accessor}")
+        start = accessor.get("byteOffset", 0)
+        values = self._strided(accessor.get("bufferView"), start, KINDS[kind], count, width, where)
+        sparse = accessor.get("sparse")
+        if sparse:
+            size = sparse["count"]
+            places, given = sparse["indices"], sparse["values"]
+            index_kind = KINDS.get(places.get("componentType"), "<u4")
+            rows = self._strided(
+                places["bufferView"], places.get("byteOffset", 0), index_kind, size, 1, where
+            ).ravel()
+            if len(rows) and rows.max() >= count:
+                raise FaceError(f"{self.path}: {where}: sparse: wanted rows 0..{count - 1}, got {rows.max()}")
+            values[rows] = self._strided(
+                given["bufferView"], given.get("byteOffset", 0), KINDS[kind], size, width, where
+            )
+        out = values.astype(np.float64)
+        if accessor.get("normalized") and kind != 5126:
+            out = np.maximum(out / np.iinfo(KINDS[kind]).max, -1.0)
+        return np.asarray(out)
+
+    def _strided(self, view: Any, start: int, kind: str, count: int, width: int, where: str) -> Any:
+        """(count, width) of a buffer view, owned; zeros where there is none."""
+        dtype = np.dtype(kind)
+        if view is None:
+            return np.zeros((count, width), dtype)
+        layout = self.item("bufferViews", view)
+        raw = self._view(view)
+        step = layout.get("byteStride") or dtype.itemsize * width
+        need = start + step * (count - 1) + dtype.itemsize * width if count else 0
+        if need > len(raw):
+            raise FaceError(
+                f"{self.path}: {where}: wanted {need} bytes, its view has {len(raw)}; the file is truncated "
+                "or broken: export it again"
+            )
+        if not count:
+            return np.zeros((0, width), dtype)
+        found = np.ndarray((count, width), dtype, raw, start, (step, dtype.itemsize))
+        return found.copy()
+
+    def _view(self, index: Any) -> bytes:
+        view = self.item("bufferViews", index)
+        raw = self._buffer(view.get("buffer", 0))
+        start, size = view.get("byteOffset", 0), view.get("byteLength", 0)
+        if start + size > len(raw):
+            raise FaceError(
+                f"{self.path}: bufferViews[{index}]: wanted {start + size} bytes, its buffer has {len(raw)}; "
+                "the file is truncated: copy or export it again"
+            )
+        return raw[start : start + size]
+
+    def _buffer(self, index: int) -> bytes:
+        if index not in self._buffers:
+            uri = self.item("buffers", index).get("uri")
+            if uri is None:
+                if self._binary is None:
+                    raise FaceError(f"{self.path}: buffers[{index}]: wanted a binary chunk, got none")
+                self._buffers[index] = self._binary
+            else:
+                self._buffers[index] = self._fetch(uri)
+        return self._buffers[index]
+
+    def _fetch(self, uri: str) -> bytes:
+        """The bytes behind a URI: data, or a file beside this one; never the network."""
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=False)
+            except binascii.Error:
+                raise FaceError(f"{self.path}: a data URI is broken; export the head again") from None
+        place = Path(unquote(uri))
+        if "://" in uri or place.is_absolute() or ".." in place.parts:
+            raise FaceError(f"{self.path}: {uri}: wanted a file beside this one; export the head as one GLB")
+        try:
+            return (self.path.parent / place).read_bytes()
+        except OSError as error:
+            raise FaceError(
+                f"{self.path.parent / place}: {error.strerror}; put it beside {self.path.name}, "
+                "or export the head as one GLB"
+            ) from None
+
+    def pixels(self, image: Any) -> Any:
+        """(height, width, 4) uint8 sRGB of an image; None where it is of a kind that is not read."""
+        from PIL import Image, UnidentifiedImageError
+
+        found = self.item("images", image)
+        raw = self._view(found["bufferView"]) if "bufferView" in found else self._fetch(found.get("uri", ""))
+        try:
+            with Image.open(io.BytesIO(raw)) as picture:
+                return np.asarray(picture.convert("RGBA"))
+        except (UnidentifiedImageError, OSError):
+            return None

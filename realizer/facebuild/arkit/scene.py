@@ -1,0 +1,254 @@
+"""A glTF file in, its pieces of surface out: where they lie, what colour they have, what their shapes do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Float64, Int32
+from realizer.core.colours import srgb
+from realizer.core.errors import FaceError
+from realizer.facebuild.arkit.gltf import Gltf
+
+__all__ = ["Piece", "read_pieces"]
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+THIN = 0.35  # alpha; what lets more through is glass: a cornea, a tear line
+
+
+@dataclass(eq=False)
+class Piece:
+    """A primitive as it stands in the scene.
+
+    Attributes:
+        names: of its material, mesh and node, in that order; "" where one has none.
+        vertices: (n, 3) in the file's own unit and directions; triangles: (m, 3).
+        colours: (n, 3) sRGB 0..255.
+        textured: the colours come from a picture.
+        glass: one looks through it.
+        moves: name of a morph target -> (n, 3).
+    """
+
+    names: tuple[str, str, str]
+    vertices: Float64
+    triangles: Int32
+    colours: Float64
+    textured: bool = False
+    glass: bool = False
+    moves: dict[str, Float64] = field(default_factory=dict)
+
+
+def read_pieces(gltf: Gltf) -> list[Piece]:
+    """Every piece of surface of the file's scene.
+
+    Raises:
+        FaceError: an index or an array that is not there.
+    """
+    worlds = dict(_worlds(gltf))
+    pieces = []
+    for number, world in worlds.items():
+        node = gltf.item("nodes", number)
+        if "mesh" not in node:
+            continue
+        mesh = gltf.item("meshes", node["mesh"])
+        for k, primitive in enumerate(mesh.get("primitives", [])):
+            if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
+                continue
+            where = f"{gltf.path}: mesh {mesh.get('name', node['mesh'])!r}, primitive {k}"
+            pieces.append(_piece(gltf, node, mesh, primitive, world, worlds, where))
+    return [piece for piece in pieces if len(piece.vertices) and len(piece.triangles)]
+
+
+def _worlds(gltf: Gltf) -> Iterator[tuple[int, Float64]]:
+    """Number and (4, 4) matrix of each node of the scene."""
+    scenes = gltf.list("scenes")
+    nodes = gltf.list("nodes")
+    if scenes:
+        todo = [(k, np.eye(4)) for k in gltf.item("scenes", gltf.json.get("scene", 0)).get("nodes", [])]
+    else:
+        children = {k for node in nodes for k in node.get("children", [])}
+        todo = [(k, np.eye(4)) for k in range(len(nodes)) if k not in children]
+    seen: set[int] = set()
+    while todo:
+        number, above = todo.pop(0)
+        if number in seen:
+            raise FaceError(f"{gltf.path}: nodes[{number}] is its own ancestor or has two parents")
+        seen.add(number)
+        node = gltf.item("nodes", number)
+        world = above @ _matrix(node)
+        yield number, world
+        todo += [(k, world) for k in node.get("children", [])]
+
+
+def _matrix(node: dict[str, Any]) -> Float64:
+    if "matrix" in node:
+        return np.array(node["matrix"], float).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    out = np.eye(4)
+    out[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), float)
+    out[:3, 3] = node.get("translation", (0, 0, 0))
+    return out
+
+
+def _name(item: dict[str, Any]) -> str:
+    return str(item.get("name", ""))
+
+
+def _piece(
+    gltf: Gltf, node: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any], world: Float64,
+    worlds: dict[int, Float64], where: str,
+) -> Piece:  # fmt: skip
+    attributes = primitive.get("attributes", {})
+    if "POSITION" not in attributes:
+        raise FaceError(f"{where}: wanted POSITION, got {', '.join(attributes) or 'no attribute'}")
+    at = gltf.accessor(attributes["POSITION"])
+    n = len(at)
+    if at.shape[1:] != (3,) or not np.isfinite(at).all() or not np.isfinite(world).all():
+        raise FaceError(f"{where}: POSITION: wanted finite x, y, z of each vertex; export the head again")
+    if "indices" in primitive:
+        corners = gltf.accessor(primitive["indices"]).ravel().astype(np.int64)
+    else:
+        corners = np.arange(n)
+    if len(corners) and corners.max() >= n:
+        raise FaceError(f"{where}: indices: wanted 0..{n - 1}, got {corners.max()}; export the head again")
+    material = gltf.item("materials", primitive["material"]) if "material" in primitive else {}
+    colours, textured, alpha = _colours(gltf, material, attributes, n)
+    turns = _skinned(gltf, node, attributes, worlds, n)
+    matrices = np.broadcast_to(world, (n, 4, 4)) if turns is None else turns
+    triangles = _triangles(corners, primitive.get("mode", TRIANGLES))
+    if np.linalg.det(matrices[:, :3, :3]).mean() < 0:
+        triangles = triangles[:, ::-1]  # a mirror image turns inside out
+    names = _target_names(gltf, mesh, primitive)
+    moves: dict[str, Float64] = {}
+    for name, target in zip(names, primitive.get("targets", []), strict=True):
+        if "POSITION" in target:
+            move = gltf.accessor(target["POSITION"])
+            if len(move) != n:
+                raise FaceError(f"{where}: shape {name!r}: wanted {n} moves, one a vertex, got {len(move)}")
+            if move.shape != at.shape or not np.isfinite(move).all():
+                raise FaceError(f"{where}: shape {name!r}: wanted finite x, y, z of each move; export again")
+            moves[name] = np.einsum("nij,nj->ni", matrices[:, :3, :3], move)
+    return Piece(
+        names=(_name(material), _name(mesh), _name(node)),
+        vertices=np.einsum("nij,nj->ni", matrices[:, :3, :3], at) + matrices[:, :3, 3],
+        triangles=triangles.astype(np.int32),
+        colours=colours,
+        textured=textured,
+        glass=material.get("alphaMode", "OPAQUE") == "BLEND" and alpha < THIN,
+        moves=moves,
+    )
+
+
+def _triangles(corners: Any, mode: int) -> Any:
+    if mode == TRIANGLES:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    k = np.arange(max(len(corners) - 2, 0))
+    if mode == FAN:
+        return np.stack([corners[0] * np.ones_like(k), corners[k + 1], corners[k + 2]], 1)
+    # Every second triangle of a strip is wound the other way.
+    odd = k % 2
+    return np.stack([corners[k], corners[k + 1 + odd], corners[k + 2 - odd]], 1)
+
+
+def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -> list[str]:
+    """Names of a primitive's morph targets.
+
+    glTF has no place of its own for them: most tools write mesh.extras.targetNames, some the primitive's
+    extras, and some name the accessors.
+    """
+    targets = primitive.get("targets", [])
+    for holder in (mesh, primitive):
+        names = (
+            (holder.get("extras") or {}).get("targetNames")
+            if isinstance(holder.get("extras"), dict)
+            else None
+        )
+        if isinstance(names, list) and len(names) == len(targets):
+            return [str(name) for name in names]
+    return [
+        str(gltf.item("accessors", target["POSITION"]).get("name", f"target {k}"))
+        if "POSITION" in target
+        else f"target {k}"
+        for k, target in enumerate(targets)
+    ]
+
+
+def _skinned(
+    gltf: Gltf, node: dict[str, Any], attributes: dict[str, Any], worlds: dict[int, Float64], n: int
+) -> Any:
+    """(n, 4, 4) where the skeleton puts each vertex in the pose of the file; None without a skeleton."""
+    if "skin" not in node or "JOINTS_0" not in attributes or "WEIGHTS_0" not in attributes:
+        return None
+    skin = gltf.item("skins", node["skin"])
+    joints = skin.get("joints", [])
+    bind = (
+        gltf.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
+        if "inverseBindMatrices" in skin
+        else np.broadcast_to(np.eye(4), (len(joints), 4, 4))
+    )
+    posed = np.stack([worlds.get(joint, np.eye(4)) @ bind[k] for k, joint in enumerate(joints)])
+    index, weight = gltf.accessor(attributes["JOINTS_0"]).astype(int), gltf.accessor(attributes["WEIGHTS_0"])
+    weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+    index = np.clip(index, 0, len(joints) - 1)
+    out = np.zeros((n, 4, 4))
+    for k in range(index.shape[1]):
+        out += posed[index[:, k]] * weight[:, k, None, None]
+    return out
+
+
+def _colours(
+    gltf: Gltf, material: dict[str, Any], attributes: dict[str, Any], n: int
+) -> tuple[Float64, bool, float]:
+    """(n, 3) sRGB 0..255 of texture, factor and vertex colours; whether a picture was there; mean alpha."""
+    look = material.get("pbrMetallicRoughness", {})
+    factor = np.array(look.get("baseColorFactor", (1, 1, 1, 1)), float)
+    light, alpha, textured = np.tile(factor[:3], (n, 1)), np.full(n, factor[3]), False
+    if "COLOR_0" in attributes:
+        given = gltf.accessor(attributes["COLOR_0"])
+        light = light * given[:, :3]
+        alpha = alpha * (given[:, 3] if given.shape[1] > 3 else 1)
+    texture = look.get("baseColorTexture")
+    if texture:
+        shift = texture.get("extensions", {}).get("KHR_texture_transform", {})
+        name = f"TEXCOORD_{shift.get('texCoord', texture.get('texCoord', 0))}"
+        source = gltf.item("textures", texture.get("index")).get("source")
+        pixels = gltf.pixels(source) if source is not None else None
+        if pixels is not None and name in attributes:
+            uv = _shifted(gltf.accessor(attributes[name]), shift)
+            seen = sample(pixels, uv)
+            light, alpha, textured = light * _linear(seen[:, :3]), alpha * seen[:, 3] / 255, True
+    return np.asarray(srgb(light.astype(np.float32)), np.float64) * 255, textured, float(alpha.mean())
+
+
+def _shifted(uv: Float64, shift: dict[str, Any]) -> Float64:
+    turn = float(shift.get("rotation", 0))
+    uv = uv * np.array(shift.get("scale", (1, 1)), float)
+    c, s = np.cos(turn), np.sin(turn)
+    return np.asarray(uv @ np.array([[c, -s], [s, c]]) + np.array(shift.get("offset", (0, 0)), float))
+
+
+def sample(pixels: Any, uv: Float64) -> Float64:
+    """(n, 4) of a picture at texture coordinates (n, 2), between the four nearest pixels; it repeats."""
+    height, width = pixels.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    dx, dy = (x - left)[:, None], (y - top)[:, None]
+    rows, columns = (top % height, (top + 1) % height), (left % width, (left + 1) % width)
+    upper = pixels[rows[0], columns[0]] * (1 - dx) + pixels[rows[0], columns[1]] * dx
+    lower = pixels[rows[1], columns[0]] * (1 - dx) + pixels[rows[1], columns[1]] * dx
+    return np.asarray(upper * (1 - dy) + lower * dy)
+
+
+def _linear(colours: Float64) -> Float64:
+    c = np.asarray(colours) / 255
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

@@ -1,0 +1,3 @@
+"""Fitting the action unit model of a face."""
+
+__all__: list[str] = []

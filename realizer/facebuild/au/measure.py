@@ -1,0 +1,124 @@
+"""What an action unit does to a face, measured: a CSV file of landmarks, or the face's own shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Bool, Float64
+from realizer.core.errors import FaceError, TableError
+from realizer.face.archive import read_arrays
+from realizer.face.au.units import units
+from realizer.tables import read_csv
+
+__all__ = ["Measured", "read_measured", "read_shapes", "write_shapes"]
+
+FINE = 1e-5  # m; the shapes are stored in whole multiples of it
+ARRAYS = {"at": 2, "seen": 1, "upper": 1, "au": 1, "moves": 3}
+FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """An action unit shown with full intensity, measured.
+
+    Attributes:
+        au: its number.
+        at: (n, 3) metres, the landmarks on the neutral face.
+        moves: (n, 3) metres, where each goes.
+        seen: (n,) whether one can see it: what is hidden counts little in a fit and not in its table.
+        upper: (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
+    """
+
+    au: int
+    at: Float64
+    moves: Float64
+    seen: Bool
+    upper: Float64 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Landmark:
+    """A row of a measurements file."""
+
+    au: int
+    x: float
+    y: float
+    z: float
+    dx: float
+    dy: float
+    dz: float
+
+
+def read_measured(path: Path) -> dict[int, Measured]:
+    """Measurements from a CSV file: a row a landmark and action unit (au,x,y,z,dx,dy,dz in metres).
+
+    Landmarks of one side are enough (Wojdel 2005, 4.2.1): the action units are even.
+
+    Raises:
+        FaceError: no such file, a bad row, a number that is not finite, a unit that is not one of her
+            displacements, or too few landmarks.
+    """
+    try:
+        rows = read_csv(path.read_text("utf-8"), Landmark, str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise FaceError(f"{path}: wanted a CSV file au,x,y,z,dx,dy,dz in metres, got {error}") from None
+    except TableError as error:
+        raise FaceError(str(error)) from None
+    by_unit: dict[int, list[list[float]]] = {}
+    for row in rows:
+        if row.au not in units() or units()[row.au].kind != "displacement":
+            known = ", ".join(str(unit.au) for unit in units().values() if unit.kind == "displacement")
+            raise FaceError(f"{path}: wanted action units of {known}, got {row.au}")
+        by_unit.setdefault(row.au, []).append([row.x, row.y, row.z, row.dx, row.dy, row.dz])
+    found = {}
+    for au, values in sorted(by_unit.items()):
+        table = np.array(values, np.float64)
+        if not np.isfinite(table).all():
+            raise FaceError(f"{path}: AU{au}: wanted finite numbers, got NaN or infinity")
+        if len(table) < FEWEST or not table[:, 3:].any():
+            raise FaceError(
+                f"{path}: AU{au}: wanted {FEWEST} landmarks or more of which one moves, got {len(table)}"
+            )
+        found[au] = Measured(au, table[:, :3], table[:, 3:], np.ones(len(table), bool))
+    return found
+
+
+def read_shapes(path: Path) -> dict[int, Measured]:
+    """Measurements from a face's own shapes, as `write_shapes` left them.
+
+    Raises:
+        FaceError: no such file, or arrays that do not fit together.
+    """
+    stored = read_arrays(path, ARRAYS)
+    at, moves = stored["at"].astype(np.float64), stored["moves"]
+    if moves.shape != (len(stored["au"]), *at.shape) or {len(stored["seen"]), len(stored["upper"])} != {
+        len(at)
+    }:
+        raise FaceError(
+            f"{path}: wanted moves of {(len(stored['au']), *at.shape)}, got {moves.shape}; make it again"
+        )
+    seen, upper = stored["seen"].astype(bool), stored["upper"].astype(np.float64)
+    return {
+        int(au): Measured(int(au), at, move.astype(np.float64) * FINE, seen, upper)
+        for au, move in zip(stored["au"], moves, strict=True)
+    }
+
+
+def write_shapes(path: Path, measured: Mapping[int, Measured]) -> None:
+    """Store measurements that share their landmarks."""
+    first = next(iter(measured.values()))
+    if first.upper is None:
+        raise ValueError("wanted shapes whose halves are known, got landmarks")
+    arrays: dict[str, Any] = {
+        "at": first.at.astype(np.float32),
+        "seen": first.seen,
+        "upper": np.asarray(first.upper, np.float32),
+        "au": np.array(list(measured), np.int32),
+        "moves": np.stack([np.rint(one.moves / FINE) for one in measured.values()]).astype(np.int16),
+    }
+    np.savez_compressed(path, **arrays)

@@ -1,0 +1,116 @@
+"""The CC0 expression shapes of the data a face was built from, as measurements of her 22 displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Float64, Int32
+from realizer.core.errors import FaceError
+from realizer.face.au.mouth import fit_mouth, shares
+from realizer.face.au.units import Unit, units
+from realizer.face.model import Face
+from realizer.facebuild.au.measure import Measured
+from realizer.facebuild.patch import Patch, vertex_normals
+from realizer.facebuild.person import hm08
+from realizer.facebuild.person.ground import Ground
+from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.person import person_of
+from realizer.facebuild.person.recipe import read_recipe
+
+__all__ = ["measure_shapes"]
+
+OPEN = 0.3  # baked light: what gets less lies inside the head, or is a lip's inner side
+COLLAR = -0.16  # m; below it no face moves
+EVEN = np.array([-1.0, 1.0, 1.0])
+OFF = 5e-4  # m; the builder puts no vertex further off the base mesh, where it cuts and where it adds some
+AROUND = 32  # triangles looked at, those whose middles are nearest
+
+
+def measure_shapes(
+    face: Face, folder: Path, data: Path, wanted: Iterable[Unit] | None = None
+) -> dict[int, Measured]:
+    """Each displacement unit's shape on the left half (x >= 0) of a face's skin.
+
+    Args:
+        face: built from the data.
+        folder: its folder; the recipe says how it was mixed.
+        data: the unpacked CC0 data, as `face.build.build_face` takes it.
+        wanted: the units, each with its mixture of shapes; None: her 22 displacements.
+
+    Raises:
+        FaceError: no recipe or data, or a skin that is not made from them.
+    """
+    data = hm08.data_folder(data)
+    ground = person_of(data, read_recipe(folder / "recipe.toml", data).targets).ground
+    mesh, at = ground.mesh, ground.at
+    twin = mesh.mirror()
+    first, last = face.parts["skin"]
+    skin = face.vertices[first:last].astype(np.float64)
+    half = (skin[:, 0] > -1e-6) & (skin[:, 1] > COLLAR)
+    corners, share, off = _on_base(ground, face, np.flatnonzero(half))
+    if off.max() > OFF:
+        raise FaceError(
+            f"{folder}: wanted a skin made from its recipe and {data}, got one of which {(off > OFF).sum()} "
+            f"of {len(off)} vertices lie off that, up to {1000 * off.max():.1f} mm: another builder made it; "
+            f"build it again with realizer faces build {folder.name} --data"
+        )
+    skin = skin[half]
+    lips = np.einsum("nk,nk->n", share, Lips(ground).lips[corners])
+    seen = (face.occlusion[first:last][half] > OPEN) | (lips > 0.5)
+    upper = shares(face, fit_mouth(face))[first:last][half]
+    out = {}
+    for unit in units().values() if wanted is None else wanted:
+        if unit.kind == "displacement":
+            shape = np.zeros_like(at)
+            for name, weight in unit.mixture.items():
+                for side in _sides(data, name):
+                    shape += weight * hm08.read_target(data, side, len(at)) * hm08.DECIMETRE
+            shape = (shape + shape[twin] * EVEN) / 2
+            moves = np.einsum("nk,nkc->nc", share, shape[corners])
+            out[unit.au] = Measured(unit.au, skin, moves, seen, upper)
+    return out
+
+
+def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Float64]:
+    """Where vertices of the skin lie on the base mesh.
+
+    Where lips or lids touch, a vertex belongs to the surface that looks the same way as it does.
+
+    Args:
+        index: (n,) places in the skin.
+
+    Returns:
+        (n, 3) base vertices, (n, 3) their shares, and (n,) metres that each vertex is off.
+    """
+    from scipy.spatial import cKDTree
+    from trimesh import triangles
+
+    first, last = face.parts["skin"]
+    skin = face.vertices[first:last].astype(np.float64)
+    mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
+    ups, skin = vertex_normals(skin, mine)[index], skin[index]
+    body = Patch.of_quads(ground.mesh.quads["body"], len(ground.at))
+    base = body.mix.indices[body.triangles]
+    corners = ground.at[base]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    near = np.asarray(cKDTree(corners.mean(axis=1)).query(skin, AROUND)[1])
+    many = np.repeat(skin, AROUND, axis=0)
+    nearest: Any = triangles.closest_point
+    shares: Any = triangles.points_to_barycentric
+    places = nearest(corners[near.ravel()], many).reshape(*near.shape, 3)
+    off = np.linalg.norm(places - skin[:, None], axis=2)
+    same = np.einsum("nkc,nc->nk", faces[near], ups) > 0
+    best = np.where(same, off, off + OFF).argmin(axis=1)
+    each = np.arange(len(skin))
+    hit = near[each, best]
+    share = np.clip(shares(corners[hit], places[each, best]), 0, 1)
+    return base[hit].astype(np.int32), share / share.sum(axis=1)[:, None], off[each, best]
+
+
+def _sides(data: Path, name: str) -> tuple[str, ...]:
+    whole = (data / "faceunits01/targets/faceunits" / f"{name}.target").is_file()
+    return (name,) if whole else (f"{name}Left", f"{name}Right")

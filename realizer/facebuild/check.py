@@ -1,0 +1,245 @@
+"""A face folder in, its faults out: which file, and what to change. One fault does not hide another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from realizer.core.errors import FaceError, TableError
+from realizer.face.archive import read_arrays
+from realizer.face.basis import ARRAYS, ROWS
+from realizer.face.features import INSIDE, Point, fapu_of, read_features
+from realizer.face.load import MESH, folder_of, load_folder, read_head
+from realizer.face.model import Face
+from realizer.face.soundness import NEEDED, range_faults, surface_faults, value_faults
+from realizer.tables import faps
+from realizer.tables.mappings import own_file, read_mapping
+
+__all__ = ["check_face"]
+
+FARTHEST = 20  # FAPU a FAP unit; no skin goes further than its feature point by that much
+OFF = 0.004  # m; a feature point further than this from its vertex is off the mesh
+PARTS = (
+    *NEEDED, "upper_teeth", "lower_teeth", "tongue", "brows", "lashes", "hair", "beard", "shirt", "other",
+)  # fmt: skip
+KEYS = ("name", "source", "licence", "says", "parts", "cameras", "deformer")
+TONGUE = range(43, 48)  # FAPs that move nothing where there is none
+
+Read = TypeVar("Read")
+
+
+def check_face(name: str = "default", directory: Path | str | None = None) -> tuple[str, ...]:
+    """Every fault of a face folder, one sentence each; empty when it is sound."""
+    try:
+        folder = folder_of(name, directory)
+    except FaceError as error:
+        return (str(error),)
+    faults: list[str] = []
+
+    def tried(read: Callable[[], Read]) -> Read | None:
+        try:
+            return read()
+        except (FaceError, TableError) as error:
+            faults.append(str(error))
+            return None
+
+    head = tried(lambda: read_head(folder))
+    mesh = tried(lambda: read_arrays(folder / "mesh.npz", MESH))
+    points = tried(lambda: read_features(folder / "features.csv"))
+    stored = tried(lambda: read_arrays(folder / "fields.npz", ARRAYS))
+    tried(lambda: _read_mapping(folder))
+    n = len(mesh["vertices"]) if mesh else None
+    values = value_faults(mesh) if mesh else []
+    faults += [f"{folder / 'mesh.npz'}: {fault}" for fault in values]
+    parts: list[str] = []
+    if head:
+        parts = _part_faults(folder, head["parts"], n)
+        faults += _key_faults(folder, head) + parts
+    if points:
+        tried(lambda: _fapu(folder, points))
+        if mesh and not values:
+            faults += _point_faults(folder, points, mesh["vertices"], mesh["triangles"])
+    if stored and n is not None:
+        faults += _stored_faults(folder, stored, n)
+    skin = head["parts"]["skin"] if head and not parts else None
+    for check in (lambda: _zone_faults(folder, skin), lambda: _shape_faults(folder)):
+        faults += tried(check) or []
+    for path in sorted(folder.glob("au_*.toml")):
+        faults += tried(lambda path=path: _model_faults(path)) or []  # type: ignore[misc]
+    if mesh and not values and head and not parts:
+        ranges = {key: (int(a), int(b)) for key, (a, b) in head["parts"].items()}
+        mouth = None if not points else (np.array(points["2.2"].place) + np.array(points["2.3"].place)) / 2
+        found = surface_faults(np.asarray(mesh["vertices"], float), mesh["triangles"], ranges, mouth)
+        faults += [f"{folder / 'mesh.npz'}: {fault}" for fault in found]
+    if not faults:
+        face = tried(lambda: load_folder(folder, None))
+        faults += _field_faults(folder, face) if face else []
+    return tuple(dict.fromkeys(faults))
+
+
+def _read_mapping(folder: Path) -> None:
+    """Its own words for action units, if it has any."""
+    if own := own_file(folder):
+        read_mapping(own)
+
+
+def _fapu(folder: Path, points: dict[str, Point]) -> None:
+    fapu_of({key: np.array(p.place, np.float32) for key, p in points.items()}, folder / "features.csv")
+
+
+def _nearest(word: str, words: Any) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, list(words), n=1)
+    return f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(words)}"
+
+
+def _key_faults(folder: Path, head: dict[str, Any]) -> list[str]:
+    return [
+        f"{folder / 'face.toml'}: {key!r}: there is no such key{_nearest(key, KEYS)}"
+        for key in head
+        if key not in KEYS
+    ]
+
+
+def _part_faults(folder: Path, parts: dict[str, Any], n: int | None) -> list[str]:
+    path = folder / "face.toml"
+    faults = [
+        f"parts: {name!r}: there is no such part{_nearest(name, PARTS)}"
+        for name in parts
+        if name not in PARTS
+    ]
+    faults += (wrong := range_faults(parts, n))
+    if not wrong:
+        ordered = sorted(parts, key=lambda name: parts[name])
+        faults += [
+            f"parts: {one} {parts[one]} and {other} {parts[other]} overlap: a vertex is of one part"
+            for one, other in pairwise(ordered)
+            if parts[one][1] > parts[other][0]
+        ]
+    return [f"{path}: {fault}" for fault in faults]
+
+
+def _point_faults(folder: Path, points: dict[str, Point], vertices: Any, triangles: Any) -> list[str]:
+    path, n = folder / "features.csv", len(vertices)
+    on_surface = np.zeros(n, bool)
+    on_surface[triangles] = True
+    faults = []
+    for name, point in points.items():
+        if not 0 <= point.vertex < n:
+            faults.append(f"{path}: {name}: vertex {point.vertex} is out of range 0..{n - 1}")
+        elif not np.isfinite(point.place).all():
+            faults.append(f"{path}: {name}: wanted finite x, y, z, got {point.place}")
+        elif name not in INSIDE:
+            off = float(np.linalg.norm(vertices[point.vertex] - point.place))
+            if off > OFF:
+                faults.append(
+                    f"{path}: {name}: the point is {off * 1000:.1f} mm off its vertex {point.vertex}; "
+                    "put the nearest vertex there, or move the point onto the mesh"
+                )
+            elif not on_surface[point.vertex]:
+                faults.append(
+                    f"{path}: {name}: vertex {point.vertex} lies on no surface, no triangle has it; "
+                    "put the nearest vertex of the surface there"
+                )
+    return faults
+
+
+def _stored_faults(folder: Path, stored: dict[str, Any], n: int) -> list[str]:
+    """Fields made for another mesh, or cut short."""
+    path, faults = folder / "fields.npz", []
+    again = "build or import the face again"
+    if len(stored["head"]) != n:
+        faults.append(f"{path}: head: wanted {n} values, one a vertex, got {len(stored['head'])}; {again}")
+    for name in ("vertex", "lid"):
+        index = stored[name]
+        if len(index) and (index.min() < 0 or index.max() >= n):
+            faults.append(f"{path}: {name}: wanted 0..{n - 1}, got {index.min()}..{index.max()}; {again}")
+    for name in ("move", "lid_radius", "jaw_pivot", "head_pivot", "eye_centre"):
+        if not np.isfinite(stored[name]).all():
+            faults.append(f"{path}: {name}: wanted finite numbers, got NaN or infinity; {again}")
+    sides = stored["lid_eye"]
+    if len(sides) != len(stored["lid"]) or len(stored["lid_radius"]) != len(sides):
+        faults.append(f"{path}: lid, lid_eye, lid_radius: wanted as many of each; {again}")
+    if len(sides) and (sides.min() < 0 or sides.max() > 1):
+        faults.append(f"{path}: lid_eye: wanted 0 or 1, got {sides.min()}..{sides.max()}; {again}")
+    if stored["eye_centre"].shape != (2, 3) or stored["eye_centre"][0, 0] <= stored["eye_centre"][1, 0]:
+        faults.append(f"{path}: eye_centre: wanted the left eye's middle, then the right's; {again}")
+    farthest = np.abs(stored["move"]).max(initial=0)
+    if farthest > FARTHEST:
+        faults.append(
+            f"{path}: move: wanted at most {FARTHEST} times its point's way, got {farthest:g}; {again}"
+        )
+    row, start = stored["row"], stored["start"]
+    if len(row) and (row.min() < 3 or row.max() > ROWS or (np.diff(row) <= 0).any()):
+        faults.append(
+            f"{path}: row: wanted ascending numbers 3..{ROWS}, got {row.min()}..{row.max()}; {again}"
+        )
+    if len(start) != len(row) + 1 or (np.diff(start) < 0).any() or start[-1] != len(stored["vertex"]):
+        faults.append(f"{path}: start: wanted {len(row) + 1} ascending ends of vertex, got others; {again}")
+    if stored["move"].shape != (len(stored["vertex"]), 3):
+        faults.append(f"{path}: move: wanted 3 numbers a vertex, got {stored['move'].shape}; {again}")
+    return faults
+
+
+def _zone_faults(folder: Path, skin: Any) -> list[str]:
+    """Faults of the face's own zones, if it has any."""
+    from realizer.facebuild.mpeg4.parameters import FILE, read_setup
+
+    path = folder / FILE
+    if not path.is_file():
+        return []
+    setup = read_setup(path)
+    return [
+        f"{path}: mask of FAP {fap}: wanted vertices of the skin, {skin[0]}..{skin[1] - 1}, got "
+        f"{mask.min()}..{mask.max()}; take out the others"
+        for fap, mask in setup.masks.items()
+        if skin and len(mask) and (mask.min() < skin[0] or mask.max() >= skin[1])
+    ]
+
+
+def _model_faults(path: Path) -> list[str]:
+    """Faults of a model of action units."""
+    from realizer.face.au.file import read_model
+    from realizer.face.au.units import units
+
+    model = read_model(path)
+    known = ", ".join(map(str, units()))
+    return [
+        f"{path}: [AU{au}]: there is no such unit in the model; wanted one of {known}"
+        for au in (*model.units, *model.degrees)
+        if au not in units()
+    ]
+
+
+def _shape_faults(folder: Path) -> list[str]:
+    """Faults of the face's own shapes, if it has any."""
+    from realizer.facebuild.au.measure import read_shapes
+
+    path = folder / "au_shapes.npz"
+    if path.is_file():
+        read_shapes(path)
+    return []
+
+
+def _field_faults(folder: Path, face: Face) -> list[str]:
+    from realizer.face.deform import deform
+
+    path = folder / "fields.npz"
+    rows = np.zeros((69, 68), np.float32)
+    for row in faps()[2:]:
+        rows[row.fap, row.fap - 1] = 0.1 * row.most
+    moved = np.abs(deform(face, rows) - face.vertices).max(axis=(1, 2))
+    faults = []
+    if moved[0] > 1e-6:
+        faults.append(f"{path}: the neutral face moves by {moved[0]:.6f} m; build the face again")
+    faults += [
+        f"{path}: FAP {row.fap} {row.name} moves nothing; build the face again"
+        for row in faps()[2:]
+        if moved[row.fap] < 1e-6 and ("tongue" in face.parts or row.fap not in TONGUE)
+    ]
+    return faults

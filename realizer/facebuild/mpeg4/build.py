@@ -1,0 +1,238 @@
+"""A face folder and zones in, its fields.npz out: run time multiplies the same basis as for any face."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Float64
+from realizer.core.errors import FaceError
+from realizer.face.archive import read_arrays
+from realizer.face.basis import ARRAYS, pack
+from realizer.face.features import read_features, write_features
+from realizer.face.load import MESH, read_head
+from realizer.facebuild.mpeg4 import rigid
+from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
+from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor
+from realizer.facebuild.mpeg4.fields import zone_fields
+from realizer.facebuild.mpeg4.landmarks import find_points
+from realizer.facebuild.mpeg4.parameters import FILE, read_setup, write_setup
+from realizer.facebuild.mpeg4.zones import Setup, synchronised
+from realizer.tables import faps
+
+__all__ = ["apply_zones", "copy_with_zones", "setup_of"]
+
+FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "LICENSE.md", FILE)
+
+DRESSED = ("brows", "lashes")  # parts that lie on the skin and go along with it
+NEAR = 3  # vertices of the skin that one of theirs follows
+PRECISION = 1e-9
+PUPILS = {"3.5", "3.6"}  # points that lie on no skin
+SOFTENED = 1  # times
+
+
+def copy_with_zones(
+    source: Path, folder: Path, parameters: Path | None = None, only: Collection[int] = ()
+) -> tuple[Setup, tuple[str, ...]]:
+    """Another face of the same head, moved by zones; where it has no features.csv its points are found.
+
+    Args:
+        source: a face folder; folder: the new one, whose name is the face's.
+        parameters: a file of zones, TOML or FaceEditor's XML, which is moved and sized to the face's feature
+            points; None for what `setup_of` says.
+        only: as for `apply_zones`.
+
+    Returns:
+        The parameters, which the new folder's mpeg4.toml holds too, and the feature points that are guesses.
+
+    Raises:
+        FaceError: the source or the parameters are broken.
+    """
+    name = read_head(source)["name"]
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in FILES:
+        if (source / file).is_file() and source.resolve() != folder.resolve():
+            shutil.copy(source / file, folder / file)
+    guesses = () if (folder / "features.csv").is_file() else _mark(folder)
+    head = (folder / "face.toml").read_text("utf-8")
+    (folder / "face.toml").write_text(head.replace(f'name = "{name}"', f'name = "{folder.name}"', 1), "utf-8")
+    if parameters is not None and parameters.suffix.lower() == ".xml":
+        points = _read(folder)[3]
+        write_setup(folder / FILE, fitted(read_faceeditor(parameters), points))
+    elif parameters is not None and parameters.resolve() != (folder / FILE).resolve():
+        shutil.copy(parameters, folder / FILE)
+    setup = setup_of(folder)
+    apply_zones(folder, setup, only)
+    write_setup(folder / FILE, setup)
+    return setup, guesses
+
+
+def _mark(folder: Path) -> tuple[str, ...]:
+    """Find the feature points and write features.csv; which of them are guesses."""
+    at, mesh, parts = _head(folder)
+    points, guesses = find_points(at, np.asarray(mesh["triangles"], np.int32), parts)
+    write_features(folder / "features.csv", points)
+    return guesses
+
+
+def setup_of(folder: Path) -> Setup:
+    """The parameters of a face folder: what its mpeg4.toml says, or else computed from mesh and points.
+
+    Raises:
+        FaceError: a file is missing or broken, or the points are.
+    """
+    at, mesh, parts, points = _read(folder)
+    if (folder / FILE).is_file():
+        setup = read_setup(folder / FILE)
+        return synchronised(replace(setup, points=points | dict(setup.points)), at)
+    return default_setup(at, np.asarray(mesh["triangles"], np.int32), points, parts["skin"])
+
+
+def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
+    """Write fields.npz.
+
+    Args:
+        folder: has face.toml, mesh.npz and features.csv; fields.npz too where only some FAPs are changed.
+        only: FAPs whose fields are replaced; the others keep theirs. Empty: everything is made anew, also
+            the jaw, the tongue, the eyeballs, the pupils and the neck.
+
+    Raises:
+        FaceError: a file or a zone is broken, or a FAP of `only` has no zone.
+    """
+    at, mesh, parts, points = _read(folder)
+    path = folder / "fields.npz"
+    skin = slice(*parts["skin"])
+    chosen = {fap: zone for fap, zone in setup.zones.items() if not only or fap in only}
+    missing = sorted(set(only) - set(chosen))
+    if missing:
+        raise FaceError(
+            f"{folder}: no zone for FAP {', '.join(map(str, missing))}; add one to the parameters"
+        )
+    whole = _with_masks_of_skin(setup, parts["skin"])
+    made = _softened(zone_fields(whole, at[skin]), whole, at[skin], mesh["triangles"], parts["skin"])
+    rows = {fap: _dressed(at, parts, made[fap]) for fap in chosen}
+    if only:
+        stored = read_arrays(path, ARRAYS)
+        rows = _unpacked(stored, len(at)) | rows
+        eyes = [
+            (centre, radius)
+            for (_, radius), centre in zip(rigid.balls(at, parts), stored["eye_centre"], strict=True)
+        ]
+        jaw, pivot, head = stored["jaw_pivot"], stored["head_pivot"], stored["head"]
+    else:
+        triangles = np.asarray(mesh["triangles"], np.int32)
+        lower = split_sides(at, triangles, points, parts["skin"])["lower_lip"]
+        jaw = rigid.jaw_pivot(points)
+        rows |= rigid.jaw_rows(at, points, parts, lower, jaw)
+        rows |= rigid.tongue_rows(at, points, parts)
+        eyes = rigid.balls(at, parts)
+        rows |= rigid.pupil_rows(at, mesh["colours"], parts, eyes)
+        pivot = np.array(points["7.1"])
+        head = np.rint(rigid.head_weight(at, points, parts) * 255).astype(np.uint8)
+    lid, lid_eye, lid_radius = rigid.sliding(rows, at, parts, eyes)
+    np.savez_compressed(
+        path,
+        **pack(rows),
+        head=head,
+        jaw_pivot=jaw,
+        head_pivot=pivot,
+        eye_centre=np.stack([centre for centre, _ in eyes]),
+        lid=lid.astype(np.int32),
+        lid_eye=lid_eye.astype(np.int32),
+        lid_radius=lid_radius.astype(np.float32),
+    )
+
+
+def _read(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]], dict[str, Any]]:
+    points = {name: point.place for name, point in read_features(folder / "features.csv").items()}
+    return *_head(folder), points
+
+
+def _head(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
+    head = read_head(folder)
+    mesh = read_arrays(folder / "mesh.npz", MESH)
+    parts = {name: (int(a), int(b)) for name, (a, b) in head["parts"].items()}
+    for name in ("skin", "left_eye", "right_eye"):
+        if name not in parts:
+            raise FaceError(f"{folder / 'face.toml'}: parts: wanted {name!r}, got {', '.join(parts)}")
+    at = np.asarray(mesh["vertices"], np.float64)
+    if not np.isfinite(at).all():
+        bad = int(np.flatnonzero(~np.isfinite(at).all(axis=1))[0])
+        raise FaceError(f"{folder / 'mesh.npz'}: vertex {bad} is not finite; build the face again")
+    return at, mesh, parts
+
+
+def _softened(
+    fields: Mapping[int, Float64], setup: Setup, at: Float64, triangles: Any, skin: tuple[int, int]
+) -> dict[int, Float64]:
+    """The fields with their kinks taken off: half a vertex's own move, half the mean of its neighbours'.
+
+    Feature points keep theirs, so that they still go as far as they are asked.
+    """
+    import scipy.sparse as sp
+
+    first, last = skin
+    mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
+    i, j = np.concatenate([mine[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]).T
+    near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (last - first,) * 2)
+    near.data[:] = 1
+    mean = sp.diags_array(1 / np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)) @ near
+    ends = {faps()[fap - 1].feature_point for fap in fields} - PUPILS
+    fixed = [int(np.argmin(np.linalg.norm(at - np.array(setup.points[name]), axis=1))) for name in ends]
+    out = {}
+    for fap, field in fields.items():
+        soft = field
+        for _ in range(SOFTENED):
+            soft = 0.5 * soft + 0.5 * np.asarray(mean @ soft)
+            soft[fixed] = field[fixed]
+        out[fap] = soft
+    return out
+
+
+def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:
+    """Masks count a face's vertices, the fields are made on the skin."""
+    first, last = skin
+    masks = {}
+    for fap, mask in setup.masks.items():
+        if len(mask) and (mask.min() < first or mask.max() >= last):
+            raise FaceError(
+                f"mask of FAP {fap}: wanted vertices of the skin, {first}..{last - 1}, got {mask.min()}.."
+                f"{mask.max()}; take out the others"
+            )
+        masks[fap] = mask - first
+    return replace(setup, masks=masks)
+
+
+def _dressed(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64) -> Float64:
+    """A field of the skin on the whole face: brows and lashes go along, the rest stays."""
+    from scipy.spatial import cKDTree
+
+    out = np.zeros_like(at)
+    skin = slice(*parts["skin"])
+    out[skin] = field
+    moving = np.flatnonzero(np.abs(field).max(axis=1) > PRECISION)
+    if not len(moving):
+        return out
+    tree = cKDTree(at[skin])
+    for name in DRESSED:
+        if name in parts:
+            mine = slice(*parts[name])
+            off, near = tree.query(at[mine], NEAR)
+            share = 1 / np.maximum(off, 1e-5)
+            out[mine] = (field[near] * (share / share.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
+    return out
+
+
+def _unpacked(stored: Mapping[str, Any], n: int) -> dict[int, Float64]:
+    """The fields that a fields.npz holds: what `pack` stored."""
+    rows = {}
+    for k, number in enumerate(stored["row"].tolist()):
+        part = slice(int(stored["start"][k]), int(stored["start"][k + 1]))
+        rows[number] = np.zeros((n, 3))
+        rows[number][stored["vertex"][part]] = stored["move"][part]
+    return rows

@@ -1,0 +1,163 @@
+"""Zones in, one displacement field a FAP out: metres for each metre that the feature point is asked to move.
+
+Neighbours whose zones meet share what they both move. At a vertex every one of them gets a part of the
+influence of the line that joins their points, and the parts add up to one: equal FAPs move the skin between
+them as far as themselves, without the w that a plain sum makes (Paul 2010, 7.1). As a neighbour's part is 0
+at the other's feature point, every point goes exactly as far as it is asked, whatever the others do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from realizer.core.arrays import Float64
+from realizer.core.errors import FaceError
+from realizer.facebuild.mpeg4.measure import WAYS
+from realizer.facebuild.mpeg4.zones import Setup, Zone
+from realizer.tables import faps, read_csv
+
+__all__ = ["zone_fields"]
+
+NEAREST = 1e-9  # in radii: at a feature point the share is its own
+POWER = 1.2  # of the distance: 1 bends sharply at a point, 2 makes a step half-way to the next
+
+
+@dataclass(frozen=True)
+class _Pair:
+    one: int
+    other: int
+
+
+@cache
+def _pairs() -> tuple[_Pair, ...]:
+    text = files(__package__).joinpath("neighbours.csv").read_text("utf-8")
+    return read_csv(text, _Pair, "neighbours.csv")
+
+
+def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
+    """FAP -> (n, 3) field of every FAP that has a zone.
+
+    Raises:
+        FaceError: a zone whose feature point is missing, whose mask is out of range, or that moves nothing
+            at its feature point.
+    """
+    at = np.asarray(vertices, np.float64)
+    n = len(at)
+    distance, open_ = {}, {}
+    for fap, zone in setup.zones.items():
+        distance[fap] = np.linalg.norm((at - _middle(setup, zone)) / zone.radii, axis=1)
+        open_[fap] = _unmasked(setup, zone, n)
+    weights = {fap: zone.influence(distance[fap]) * open_[fap] for fap, zone in setup.zones.items()}
+    if setup.joined:
+        weights = _shared(setup, at, distance, open_, weights)
+    return {fap: _directed(setup, zone, at, weights[fap]) for fap, zone in setup.zones.items()}
+
+
+def _middle(setup: Setup, zone: Zone) -> Float64:
+    name = faps()[zone.fap - 1].feature_point
+    if name not in setup.points:
+        raise FaceError(f"zone of FAP {zone.fap}: its feature point {name} is not there; add it")
+    return np.asarray(setup.points[name], np.float64)
+
+
+def _unmasked(setup: Setup, zone: Zone, n: int) -> Float64:
+    if not zone.use_mask:
+        return np.ones(n)
+    mask = setup.masks.get(zone.fap)
+    if mask is None:
+        raise FaceError(f"zone of FAP {zone.fap}: it uses a mask and there is none; add one or do not use it")
+    if len(mask) and (mask.min() < 0 or mask.max() >= n):
+        raise FaceError(
+            f"mask of FAP {zone.fap}: wanted vertices 0..{n - 1}, got {mask.min()}..{mask.max()}; "
+            "take out those that the mesh does not have"
+        )
+    open_ = np.zeros(n)
+    open_[mask] = 1
+    return 1 - open_ if zone.invert_mask else open_
+
+
+def _shared(
+    setup: Setup,
+    at: Float64,
+    distance: Mapping[int, Float64],
+    open_: Mapping[int, Float64],
+    alone: Mapping[int, Float64],
+) -> dict[int, Float64]:
+    """The influence of each zone after neighbours have shared what they both move."""
+    links = [pair for pair in _pairs() if pair.one in setup.zones and pair.other in setup.zones]
+    near: dict[int, set[int]] = {fap: set() for fap in setup.zones}
+    for pair in links:
+        near[pair.one].add(pair.other)
+        near[pair.other].add(pair.one)
+    out = dict(alone)
+    for group in _groups(near):
+        envelope = np.max([alone[fap] for fap in group], axis=0)
+        for pair in links:
+            if pair.one in group:
+                envelope = np.maximum(
+                    envelope, _between(setup, pair, at) * open_[pair.one] * open_[pair.other]
+                )
+        # What is near a point belongs to it; zones farther than twice their radius have no say.
+        say = {
+            fap: open_[fap]
+            * np.clip(2 - distance[fap], 0, None) ** 2
+            / np.maximum(distance[fap], NEAREST) ** POWER
+            for fap in group
+        }
+        whole = np.maximum(np.sum(list(say.values()), axis=0), 1e-30)
+        for fap in group:
+            out[fap] = envelope * say[fap] / whole
+    return out
+
+
+def _between(setup: Setup, pair: _Pair, at: Float64) -> Float64:
+    """Influence around the straight line between two neighbours' points, whose radii blend on the way."""
+    one, other = setup.zones[pair.one], setup.zones[pair.other]
+    a, b = _middle(setup, one), _middle(setup, other)
+    along = b - a
+    t = np.clip((at - a) @ along / max(float(along @ along), 1e-18), 0, 1)
+    radii = one.radii + t[:, None] * (other.radii - one.radii)
+    distance = np.linalg.norm((at - a - t[:, None] * along) / radii, axis=1)
+    return (1 - t) * one.influence(distance) + t * other.influence(distance)
+
+
+def _groups(near: Mapping[int, set[int]]) -> list[list[int]]:
+    """Sets of zones that are joined by neighbours, of two and more."""
+    left, groups = set(near), []
+    while left:
+        group, todo = set(), [min(left)]
+        while todo:
+            fap = todo.pop()
+            if fap not in group:
+                group.add(fap)
+                todo += near[fap]
+        left -= group
+        if len(group) > 1:
+            groups.append(sorted(group))
+    return groups
+
+
+def _directed(setup: Setup, zone: Zone, at: Float64, weight: Float64) -> Float64:
+    """The field: the weight along the FAP's way, bent as the zone says, exactly 1 at the feature point."""
+    row = faps()[zone.fap - 1]
+    way = np.array(WAYS[row.direction])
+    move = np.broadcast_to(way + zone.slide * np.array([0, 0, 1.0]), at.shape)
+    middle = _middle(setup, zone)
+    if zone.radial:
+        away = at - np.array(zone.pivot)
+        away /= max(float(np.linalg.norm(middle - zone.pivot)), 1e-9)
+        move = (1 - zone.radial) * move + zone.radial * away
+    field = np.asarray(move * weight[:, None])
+    nearest = int(np.argmin(np.linalg.norm(at - middle, axis=1)))
+    here = float(field[nearest] @ way)
+    if here < 1e-3:
+        raise FaceError(
+            f"zone of FAP {zone.fap}: it does not move vertex {nearest} at its feature point "
+            f"{row.feature_point}; make it larger, or put the vertex into its mask"
+        )
+    return np.asarray(field / here)

@@ -1,0 +1,173 @@
+"""A head that nobody has marked in, its 84 feature points out, and which of them to look at again.
+
+The template's points are carried over: a smooth map takes the places that the template's shape shows (eyes,
+lids, profile, mouth corners, ears) to where this head shows them, and each point goes to the nearest skin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from realizer.core.arrays import Float64, Int32
+from realizer.core.errors import FaceError
+from realizer.face.features import INSIDE, NAMES, Point
+from realizer.facebuild.mpeg4.evidence import Head, evidence
+from realizer.facebuild.mpeg4.rigid import balls
+from realizer.facebuild.patch import vertex_normals
+from realizer.tables import read_csv
+
+__all__ = ["find_points"]
+
+NEAR = 0.22  # eye distances; a point farther than this from all evidence is a guess
+OFF = 0.06  # eye distances; so is one that had to go this far to the skin
+TEETH = {"9.8": ("upper_teeth", 1), "9.10": ("upper_teeth", -1), "9.11": ("lower_teeth", 1),
+         "9.9": ("lower_teeth", -1)}  # fmt: skip
+PUPILS = {"3.5": "left_eye", "3.6": "right_eye"}
+# The lips touch: on which side of the slit a point lies is told by where the skin looks.
+FACING = {"2.2": -1, "2.6": -1, "2.7": -1, "2.3": 1, "2.8": 1, "2.9": 1}
+ROUND = ("10.", "11.")  # ears, hair and skull have few places of their own: always a guess
+CORNER_POINTS = {"2.4", "2.5", "8.3", "8.4"}
+
+
+@dataclass(frozen=True)
+class _Template:
+    name: str
+    x: float
+    y: float
+    z: float
+
+
+@cache
+def _template() -> tuple[dict[str, Float64], dict[str, Float64]]:
+    """Feature points, and anchors, of the template; eye distances from between the eyes."""
+    text = files(__package__).joinpath("template.csv").read_text("utf-8")
+    rows = {row.name: np.array([row.x, row.y, row.z]) for row in read_csv(text, _Template, "template.csv")}
+    points = {name: place for name, place in rows.items() if name[0].isdigit()}
+    return points, {name: place for name, place in rows.items() if name not in points}
+
+
+def head_of(
+    vertices: Float64, triangles: Int32, parts: Mapping[str, tuple[int, int]]
+) -> tuple[Head, Float64, float]:
+    """The head in its own measure, and its origin (3,) and unit in metres."""
+    at = np.asarray(vertices, np.float64)
+    (left, radius), (right, other) = balls(at, parts)
+    unit = float(left[0] - right[0])
+    if not np.isfinite(unit) or unit <= 0 or abs(left[1] - right[1]) > 0.3 * unit:
+        raise FaceError(
+            f"the eyeballs lie at {np.round(left, 4).tolist()} and {np.round(right, 4).tolist()}: wanted the "
+            "left one at the larger x and both at one height; turn the head: +x its left, +y up, +z forward"
+        )
+    origin = (left + right) / 2
+    first, last = parts["skin"]
+    mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
+    skin = (at[first:last] - origin) / unit
+    head = Head(
+        skin, mine, vertex_normals(skin, mine), (left - origin) / unit, (right - origin) / unit,
+        (radius + other) / 2 / unit,
+    )  # fmt: skip
+    return head, origin, unit
+
+
+def find_points(
+    vertices: Float64, triangles: Int32, parts: Mapping[str, tuple[int, int]]
+) -> tuple[dict[str, Point], tuple[str, ...]]:
+    """The feature points of a head.
+
+    Args:
+        vertices: (n, 3) metres, +x the character's left, +y up, +z forward; triangles: (m, 3).
+        parts: vertex ranges; skin, left_eye and right_eye are needed, teeth and tongue help.
+
+    Returns:
+        The 84 points, and the names of those that are guesses: look at them, and move them.
+
+    Raises:
+        FaceError: a part is missing, or the eyeballs do not stand side by side.
+    """
+    from scipy.interpolate import RBFInterpolator
+    from scipy.spatial import cKDTree
+
+    for name in ("skin", "left_eye", "right_eye"):
+        if name not in parts:
+            raise FaceError(f"parts: wanted {name!r}, got {', '.join(parts) or 'none'}")
+    head, origin, unit = head_of(vertices, triangles, parts)
+    marks, anchors = _template()
+    found = evidence(head)
+    shared = [name for name in anchors if name in found]
+    found |= {name: np.where(np.isfinite(found[name]), found[name], anchors[name]) for name in shared}
+    here = np.array([*(found[name] for name in shared), head.left, head.right])
+    there = np.array([*(anchors[name] for name in shared), [0.5, 0, 0], [-0.5, 0, 0]])
+    carry = RBFInterpolator(there, here - there, kernel="thin_plate_spline", degree=1, smoothing=1e-4)
+    names = [name for name in NAMES if name in marks]
+    places = np.array([marks[name] for name in names])
+    places = places + carry(places)
+    sure = np.array([found[name] for name in shared])
+    far = cKDTree(sure).query(places)[0] if len(sure) else np.full(len(places), np.inf)
+    out: dict[str, Point] = {}
+    guesses = []
+    for name, place, away in zip(names, places, np.atleast_1d(far), strict=True):
+        vertex, at, off = _settled(name, place * unit + origin, vertices, parts, head, origin, unit)
+        out[name] = Point(name, vertex, *at)
+        lost = name in CORNER_POINTS and "l_corner" not in found
+        vague = away > NEAR or off > OFF * unit or lost or name.startswith(ROUND)
+        if vague and name not in PUPILS and name not in TEETH:
+            guesses.append(name)
+    return out, tuple(guesses)
+
+
+def _settled(
+    name: str, place: Float64, vertices: Float64, parts: Mapping[str, tuple[int, int]],
+    head: Head, origin: Float64, unit: float,
+) -> tuple[int, tuple[float, float, float], float]:  # fmt: skip
+    """The vertex of a point, the point itself, and how far it had to go; metres."""
+    at = np.asarray(vertices, np.float64)
+
+    def nearest(part: str) -> int:
+        first, last = parts[part]
+        return first + int(np.argmin(np.linalg.norm(at[first:last] - place, axis=1)))
+
+    if name in INSIDE:
+        return nearest("skin" if name == "7.1" or "hair" not in parts else "hair"), _triple(place), 0.0
+    if name in PUPILS:
+        first, last = parts[PUPILS[name]]
+        vertex = first + int(np.argmax(at[first:last, 2]))
+        return vertex, _triple(at[vertex]), 0.0
+    if name in TEETH and TEETH[name][0] in parts:
+        part, way = TEETH[name]
+        first, last = parts[part]
+        mine = at[first:last]
+        middle = (np.abs(mine[:, 0] - origin[0]) < 0.04 * unit) & (
+            mine[:, 2] > mine[:, 2].max() - 0.06 * unit
+        )
+        chosen = np.flatnonzero(middle) if middle.any() else np.arange(len(mine))
+        vertex = first + int(chosen[np.argmax(way * mine[chosen, 1])])
+        return vertex, _triple(at[vertex]), 0.0
+    if name.startswith("4.") and "brows" in parts:
+        place = _on_brow(at[slice(*parts["brows"])], place, origin, unit)
+    part = "tongue" if name.startswith("6.") and "tongue" in parts else "skin"
+    vertex = nearest(part)
+    if name in FACING:
+        first, last = parts["skin"]
+        right = np.flatnonzero(head.ups[:, 1] * FACING[name] > -0.1)
+        vertex = first + int(right[np.argmin(np.linalg.norm(at[first:last][right] - place, axis=1))])
+    return vertex, _triple(at[vertex]), float(np.linalg.norm(at[vertex] - place))
+
+
+def _on_brow(brows: Float64, place: Float64, origin: Float64, unit: float) -> Float64:
+    """The place moved to the height of the brow, and not beyond its ends."""
+    mine = brows[(brows[:, 0] > origin[0]) == (place[0] > origin[0])]
+    if not len(mine):
+        return place
+    x = float(np.clip(place[0], mine[:, 0].min(), mine[:, 0].max()))
+    near = mine[np.abs(mine[:, 0] - x) < 0.06 * unit]
+    return np.asarray(near.mean(axis=0)) if len(near) else place
+
+
+def _triple(place: Float64) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in place)
+    return x, y, z

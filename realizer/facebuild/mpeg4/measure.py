@@ -1,0 +1,201 @@
+"""A face, a FAP and how it moved in, single measures out: error, mirror, others, flips, roughness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Bool, Float64
+from realizer.core.units import ANGLE_UNIT
+from realizer.face.deform import deform
+from realizer.face.model import Face
+from realizer.tables import Fap
+
+__all__: list[str] = []
+
+WAYS: dict[str, tuple[float, float, float]] = {
+    "up": (0, 1, 0), "down": (0, -1, 0), "left": (1, 0, 0), "right": (-1, 0, 0), "forward": (0, 0, 1),
+}  # fmt: skip
+UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
+LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
+CORNERS = ("2.4", "2.5", "8.3", "8.4")
+LIDS = {"3.1": "3.3", "3.3": "3.1", "3.2": "3.4", "3.4": "3.2"}
+INNER = 0.30  # baked occlusion under which the skin is behind the lips or in a socket
+
+
+@dataclass(frozen=True, eq=False)
+class Measure:
+    face: Face
+    skin: slice
+    triangles: Any  # of the skin
+    seen: Bool  # (vertices of the skin,)
+    average: Any  # (skin, skin) sparse: the mean of the neighbours
+    twin: Any  # (skin,)
+    paired: Bool  # (skin,) the twin is the mirror image
+
+    @classmethod
+    @cache
+    def of(cls, face: Face) -> Measure:
+        import scipy.sparse as sp
+        from scipy.spatial import cKDTree
+
+        first, last = face.parts["skin"]
+        mine = face.triangles[(face.triangles >= first).all(axis=1) & (face.triangles < last).all(axis=1)]
+        mine = mine - first
+        at = face.vertices[first:last].astype(float)
+        off, twin = cKDTree(at).query(at * [-1, 1, 1])
+        n = len(at)
+        i, j = np.concatenate([mine[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]).T
+        near = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n))
+        near.data[:] = 1
+        count = np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)
+        seen: Bool = np.asarray(face.occlusion[first:last] >= INNER)
+        paired: Bool = np.asarray(off < 3e-4)
+        return cls(
+            face, slice(first, last), mine, seen,
+            sp.diags_array(1 / count) @ near, twin, paired,
+        )  # fmt: skip
+
+    def at(self, values: dict[int, float]) -> Float64:
+        """(n_vertices, 3) metres under the FAPs."""
+        row = np.zeros((1, 68), np.float32)
+        for fap, value in values.items():
+            row[0, fap - 1] = value
+        return np.asarray(deform(self.face, row)[0], np.float64)
+
+    def moves(self, values: dict[int, float]) -> Float64:
+        """The same, less the neutral face."""
+        return self.at(values) - self.face.vertices
+
+
+def mirror_of(measure: Measure, row: Fap, moves: Float64, twin: Float64) -> float:
+    """The largest difference of a move from its twin's mirror image, of the largest move."""
+    here = moves[measure.skin]
+    if row.group == 6:  # the tongue is in no skin: its points stand for it
+        points = measure.face.feature_points
+        index = [points[name] for name in ("6.1", "6.2", "6.3", "6.4")]
+        other = [points[name] for name in ("6.1", "6.2", "6.4", "6.3")]
+        apart = moves[index] - twin[other] * [-1, 1, 1]
+        largest = float(np.abs(moves[index]).max())
+    elif row.group == 3 and row.fap >= 23:
+        apart, largest = _ball_apart(measure, row, moves, twin)
+    else:
+        there = twin[measure.skin][measure.twin] * [-1, 1, 1]
+        apart, largest = (here - there)[measure.paired], float(np.abs(here).max())
+    return float(np.abs(apart).max() / max(largest, 1e-9))
+
+
+def _ball_apart(measure: Measure, row: Fap, moves: Float64, twin: Float64) -> tuple[Float64, float]:
+    """Eyeballs have no vertex for vertex twins on every face: their rings are compared by how far they go."""
+    left = row.name.split("_")[1] == "l"
+    parts = measure.face.parts
+    mine, other = (slice(*parts[name]) for name in (("left_eye", "right_eye")[:: 1 if left else -1]))
+    a, b = np.abs(moves[mine]).max(axis=0), np.abs(twin[other]).max(axis=0)
+    return np.asarray(a - b), float(a.max())
+
+
+def error_of(measure: Measure, row: Fap, value: float, moves: Float64) -> float:
+    face = measure.face
+    if row.unit == "angle_unit":
+        turned = _angle(measure, row, moves)
+        return abs(turned / (value * ANGLE_UNIT) - 1)
+    asked = value * face.fapu.metres(row.unit)
+    if row.direction == "growing":
+        return abs(_grown(face, row, moves) / asked - 1)
+    move = moves[face.feature_points[row.feature_point]]
+    return float(abs(move @ np.array(WAYS[row.direction]) / asked - 1))
+
+
+def _angle(measure: Measure, row: Fap, moves: Float64) -> float:
+    """Radians that a part turns, positive in the FAP's direction."""
+    face = measure.face
+    if row.name == "tongue_roll":
+        rises = []
+        for name in ("6.3", "6.4"):
+            vertex = face.feature_points[name]
+            # The borders turn about the tongue's middle line.
+            away = abs(float(face.vertices[vertex, 0]))
+            rises.append(np.arctan2(moves[vertex, 1], away - abs(float(moves[vertex, 0]))))
+        return float(min(rises))
+    if row.name.startswith("head"):
+        vertex, pivot = face.feature_points["9.3"], face.points["7.1"]
+        planes = {"head_pitch": (2, 1, -1), "head_yaw": (2, 0, 1), "head_roll": (1, 0, -1)}
+    else:
+        left = row.name.split("_")[1] == "l"
+        vertex = face.feature_points["3.5" if left else "3.6"]
+        pivot = face.basis["eyes"][0 if left else 1][1]
+        planes = {"yaw_l": (2, 0, 1), "yaw_r": (2, 0, 1), "pitch_l": (2, 1, -1), "pitch_r": (2, 1, -1)}
+    along, across, way = next(plane for name, plane in planes.items() if row.name.startswith(name))
+    before = face.vertices[vertex].astype(float) - pivot
+    after = before + moves[vertex]
+    turned = np.arctan2(after[across], after[along]) - np.arctan2(before[across], before[along])
+    return float(way * ((turned + np.pi) % (2 * np.pi) - np.pi))
+
+
+def _grown(face: Face, row: Fap, moves: Float64) -> float:
+    """Metres that a pupil gets wider: the ring where the black of the eye ends."""
+    eye = 0 if "_l_" in row.name else 1
+    part, centre = face.basis["eyes"][eye]
+    mine = slice(*part)
+    away = face.vertices[mine].astype(float) - centre
+    out = np.hypot(away[:, 0], away[:, 1])
+    dark = np.flatnonzero((face.colours[mine].max(axis=1) < 40) & (away[:, 2] > 0))
+    near = dark[out[dark] < 0.004]
+    if not len(near):
+        return 0.0
+    edge = near[np.isclose(out[near], out[near].max(), atol=1e-4)]
+    now = np.hypot(*(away + moves[mine])[edge, :2].T)
+    return float(2 * (now - out[edge]).mean())
+
+
+def others_of(measure: Measure, row: Fap, asked: list[float], moves: list[Float64]) -> float:
+    """The largest move of points that must stay, of what was asked."""
+    point = row.feature_point
+    if row.name == "open_jaw":
+        still: tuple[str, ...] = (*UPPER, *LOWER, *CORNERS)
+    elif point in UPPER or point in LOWER:
+        still = LOWER if point in UPPER else UPPER
+    elif point in LIDS:
+        still = (LIDS[point],)
+    else:
+        return 0.0
+    index = [measure.face.feature_points[name] for name in still]
+    unit = measure.face.fapu.metres(row.unit)
+    return max(
+        float(np.linalg.norm(m[index], axis=1).max() / abs(v * unit))
+        for v, m in zip(asked, moves, strict=True)
+    )
+
+
+def flips_of(measure: Measure, row: Fap, values: dict[int, float], cosine: float = 0.0) -> float:
+    """Share of the moved skin that turns by more than the angle; turning parts turn theirs rightly."""
+    if row.unit == "angle_unit":
+        return 0.0
+    corners = measure.triangles
+    rest, now = (
+        _ups(at[measure.skin][corners]) for at in (measure.face.vertices.astype(float), measure.at(values))
+    )
+    area = np.linalg.norm(rest, axis=1)
+    moved = np.abs(rest - now).max(axis=1) > 1e-3 * area
+    turned = (rest * now).sum(axis=1) < cosine * area * np.linalg.norm(now, axis=1)
+    return float(area[turned].sum() / max(area[moved].sum(), 1e-12))
+
+
+def _ups(corners: Float64) -> Float64:
+    a, b, c = corners.transpose(1, 0, 2)
+    return np.cross(b - a, c - a)
+
+
+def rough_of(measure: Measure, row: Fap, moves: Float64) -> float:
+    if row.unit == "angle_unit":
+        return 0.0
+    size = np.linalg.norm(moves, axis=1)
+    largest = size.max()
+    if largest < 1e-9:
+        return 0.0
+    off = np.linalg.norm(moves - measure.average @ moves, axis=1) / largest
+    index = measure.seen & (size > 0.05 * largest)
+    return float(np.percentile(off[index], 95)) if index.any() else 0.0

@@ -1,0 +1,185 @@
+"""A face folder's mpeg4.toml in, the deformer's parameters out; and back."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Int32
+from realizer.core.errors import FaceError
+from realizer.facebuild.mpeg4.zones import Setup, Zone
+
+__all__ = ["FILE", "read_setup", "write_setup"]
+
+FILE = "mpeg4.toml"
+HEAD = """\
+# The zones of the MPEG-4 deformer (Paul 2010, 4.3.3). `realizer faces zones NAME` makes fields.npz from them.
+# size and pivot in metres; points override those of features.csv; a mask's vertices as ranges, last included
+"""
+KEYS = ("joined", "synced", "whole", "points", "zone", "masks")
+LISTED = ("scale", "pivot")
+
+
+def read_setup(path: Path) -> Setup:
+    """The parameters that the file says.
+
+    Raises:
+        FaceError: no such file, not TOML, an unknown key, or a value of the wrong kind or out of range.
+    """
+    try:
+        read = tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise FaceError(f"{path}: wanted this file with the deformer's zones, found none") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FaceError(f"{path}: {error}") from None
+    unknown = sorted(set(read) - {"joined", "synced", "whole", "points", "zone", "masks"})
+    if unknown:
+        raise FaceError(
+            f"{path}: wanted joined, synced, whole, points, zone, masks; got {', '.join(unknown)}"
+        )
+    zones: dict[int, Zone] = {}
+    for number, entry in enumerate(_list(path, read, "zone"), 1):
+        zone = _zone(f"{path}: zone {number}", entry)
+        if zone.fap in zones:
+            raise FaceError(f"{path}: zone {number}: FAP {zone.fap} has one already; delete one of them")
+        zones[zone.fap] = zone
+    masks: dict[int, Int32] = {}
+    for key, ranges in _dict(path, read, "masks").items():
+        for word in key.split():
+            masks[_whole(f"{path}: masks: {key!r}", word)] = _expanded(f"{path}: masks: {key!r}", ranges)
+    points = {}
+    for name, place in _dict(path, read, "points").items():
+        points[name] = _triple(f"{path}: points: {name}", place)
+    synced = frozenset(_whole(f"{path}: synced", fap) for fap in _list(path, read, "synced"))
+    whole = frozenset(_whole(f"{path}: whole", fap) for fap in _list(path, read, "whole"))
+    return Setup(points, zones, masks, synced, bool(read.get("joined", True)), whole)
+
+
+def write_setup(path: Path, setup: Setup, points: bool = False) -> None:
+    """Write the file.
+
+    Args:
+        points: write the feature points too; without them the folder's features.csv counts.
+    """
+    lines = [HEAD + f"joined = {str(setup.joined).lower()}"]
+    lines.append(
+        f"synced = [{', '.join(map(str, sorted(setup.synced)))}]  # FAPs whose two sides go together"
+    )
+    if setup.whole:
+        lines.append(f"whole = [{', '.join(map(str, sorted(setup.whole)))}]")
+    if points:
+        lines += ["", "[points]"]
+        lines += [f'"{name}" = {_numbers(place)}' for name, place in setup.points.items()]
+    plain = {f.name: f.default for f in fields(Zone)}
+    for fap in sorted(setup.zones):
+        zone = setup.zones[fap]
+        lines += ["", "[[zone]]"]
+        for name in plain:
+            value = getattr(zone, name)
+            if value != plain[name]:
+                lines.append(f"{name} = {_toml(value)}")
+    if setup.masks:
+        lines += ["", "[masks]  # FAPs that share it = vertices"]
+        shared: dict[str, list[int]] = {}
+        for fap in sorted(setup.masks):
+            shared.setdefault(_ranges(setup.masks[fap]), []).append(fap)
+        lines += [f'"{" ".join(map(str, group))}" = "{ranges}"' for ranges, group in shared.items()]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def _zone(where: str, entry: Any) -> Zone:
+    if not isinstance(entry, dict):
+        raise FaceError(f"{where}: wanted a table, got {entry!r}")
+    kinds = {f.name: str(f.type) for f in fields(Zone)}
+    unknown = sorted(set(entry) - set(kinds))
+    if unknown:
+        raise FaceError(f"{where}: wanted {', '.join(kinds)}; got {', '.join(unknown)}")
+    for name in ("fap", "falloff", "size"):
+        if name not in entry:
+            raise FaceError(f"{where}: {name} is missing")
+    values: dict[str, Any] = {}
+    for name, value in entry.items():
+        at = f"{where}: {name}"
+        if name in LISTED:
+            values[name] = _triple(at, value)
+        elif name == "fap":
+            values[name] = _whole(at, value)
+        elif kinds[name] == "bool":
+            if not isinstance(value, bool):
+                raise FaceError(f"{at}: wanted true or false, got {value!r}")
+            values[name] = value
+        elif kinds[name] == "float":
+            values[name] = _number(at, value)
+        else:
+            values[name] = value
+    return Zone(**values)
+
+
+def _list(path: Path, read: dict[str, Any], key: str) -> list[Any]:
+    value = read.get(key, [])
+    if not isinstance(value, list):
+        raise FaceError(f"{path}: {key}: wanted a list, got {value!r}")
+    return value
+
+
+def _dict(path: Path, read: dict[str, Any], key: str) -> dict[str, Any]:
+    value = read.get(key, {})
+    if not isinstance(value, dict):
+        raise FaceError(f"{path}: {key}: wanted a table, got {value!r}")
+    return value
+
+
+def _number(where: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FaceError(f"{where}: wanted a number, got {value!r}")
+    return float(value)
+
+
+def _whole(where: str, value: Any) -> int:
+    try:
+        return int(value)
+    except (TypeError, ValueError):
+        raise FaceError(f"{where}: wanted a FAP's number, got {value!r}") from None
+
+
+def _triple(where: str, value: Any) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise FaceError(f"{where}: wanted three numbers, got {value!r}")
+    x, y, z = (_number(where, number) for number in value)
+    return x, y, z
+
+
+def _expanded(where: str, ranges: Any) -> Int32:
+    """`"3-5 9"` is 3, 4, 5, 9."""
+    vertices: list[int] = []
+    try:
+        for word in str(ranges).split():
+            first, _, last = word.partition("-")
+            vertices += range(int(first), int(last or first) + 1)
+    except ValueError:
+        raise FaceError(f"{where}: wanted ranges such as '3-5 9', got {word!r}") from None
+    return np.unique(np.array(vertices, np.int32))
+
+
+def _ranges(mask: Int32) -> str:
+    cuts = np.flatnonzero(np.diff(mask) != 1) + 1
+    runs = [run for run in np.split(mask, cuts) if len(run)]
+    return " ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+
+
+def _numbers(values: Any) -> str:
+    return f"[{', '.join(f'{float(value):.7g}' for value in values)}]"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return _numbers(value)
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(value) if isinstance(value, int) else f"{value:.7g}"

@@ -1,0 +1,150 @@
+"""The parameters of the MPEG-4 deformer: a zone a FAP, masks, and which sides go together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from realizer.core.arrays import Float64, Int32
+from realizer.core.errors import FaceError
+from realizer.facebuild.mpeg4 import falloff
+from realizer.tables import faps
+
+__all__ = ["FALLOFFS", "Setup", "Zone", "synchronised"]
+
+Falloff = Literal["ease", "smooth", "cosine", "linear"]
+FALLOFFS: tuple[Falloff, ...] = ("ease", "smooth", "cosine", "linear")
+Triple = tuple[float, float, float]
+MIRROR = np.array([-1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """Where and how much a FAP's feature point takes its surroundings along (Paul 2010, 4.3.3).
+
+    Attributes:
+        fap: its number.
+        falloff: the shape of the influence from the middle to the edge.
+        size: metres, the radius; scale multiplies it along x, y and z.
+        ease: -100..100, for "ease"; smooth_centre, smooth_side: 0..1, for "smooth".
+        use_mask: only vertices of the FAP's mask move; invert_mask: only those outside it.
+        slide: metres forwards for each metre along the FAP's way: skin that slides over what is round.
+        radial: 0..1, how much of the move goes away from `pivot` instead of the FAP's way.
+        pivot: (x, y, z) metres, for radial.
+    """
+
+    fap: int
+    falloff: Falloff
+    size: float
+    scale: Triple = (1.0, 1.0, 1.0)
+    ease: float = 0.0
+    smooth_centre: float = 0.0
+    smooth_side: float = 0.0
+    use_mask: bool = False
+    invert_mask: bool = False
+    slide: float = 0.0
+    radial: float = 0.0
+    pivot: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        where = f"zone of FAP {self.fap}"
+        if not 3 <= self.fap <= 68:
+            raise FaceError(f"{where}: wanted a FAP from 3 to 68")
+        if self.falloff not in FALLOFFS:
+            raise FaceError(f"{where}: falloff: wanted one of {', '.join(FALLOFFS)}, got {self.falloff!r}")
+        numbers = (self.size, *self.scale, self.ease, self.slide, self.radial, *self.pivot)
+        if not np.isfinite(numbers).all():
+            raise FaceError(f"{where}: wanted finite numbers, got {numbers}")
+        if self.size <= 0 or min(self.scale) <= 0:
+            raise FaceError(f"{where}: wanted a size and scales above 0, got {self.size}, {self.scale}")
+        for name, value, least, most in (
+            ("ease", self.ease, -100, 100),
+            ("smooth_centre", self.smooth_centre, 0, 1),
+            ("smooth_side", self.smooth_side, 0, 1),
+            ("radial", self.radial, 0, 1),
+        ):
+            if not least <= value <= most:
+                raise FaceError(f"{where}: {name}: wanted {least}..{most}, got {value}")
+
+    @property
+    def radii(self) -> Float64:
+        """(3,) metres along x, y and z."""
+        return np.asarray(self.size * np.array(self.scale))
+
+    def influence(self, distance: Any) -> Float64:
+        """The influence (n,) at distances (n,), in radii from the middle."""
+        if self.falloff == "ease":
+            return falloff.ease(distance, self.ease)
+        if self.falloff == "smooth":
+            return falloff.smooth_curve(distance, self.smooth_centre, self.smooth_side)
+        return falloff.cosine(distance) if self.falloff == "cosine" else falloff.linear(distance)
+
+    def mirrored(self, fap: int) -> Zone:
+        """The same zone for the FAP of the other side."""
+        x, y, z = self.pivot
+        return replace(self, fap=fap, pivot=(-x if x else x, y, z))
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """All parameters of one head.
+
+    Attributes:
+        points: feature point -> (x, y, z) metres, the middles of the zones.
+        zones: FAP -> zone; a FAP without one is not the deformer's.
+        masks: FAP -> (k,) vertices that move, ascending.
+        synced: FAPs whose zone the other side shares.
+        joined: neighbours whose zones overlap share what they both move, so that equal FAPs make no w.
+        whole: FAPs that are listed without a zone: their part moves as a whole.
+    """
+
+    points: Mapping[str, Triple]
+    zones: Mapping[int, Zone]
+    masks: Mapping[int, Int32] = field(default_factory=dict)
+    synced: frozenset[int] = frozenset()
+    joined: bool = True
+    whole: frozenset[int] = frozenset()
+
+
+def synchronised(setup: Setup, vertices: Float64 | None = None, margin: float = 5e-4) -> Setup:
+    """The setup with each synced FAP's zone, and its mask, copied to the other side.
+
+    Of a pair the FAP with the lower number (the left side) is the one that is copied.
+
+    Args:
+        vertices: (n, 3) metres; needed where masks have to be mirrored.
+        margin: metres; how far a vertex may lie from the mirror image of its twin.
+
+    Raises:
+        FaceError: a mask's vertex has no twin.
+    """
+    zones, masks = dict(setup.zones), dict(setup.masks)
+    for row in faps()[2:]:
+        if row.fap not in setup.synced or row.mirror <= row.fap or row.fap not in zones:
+            continue
+        zones[row.mirror] = zones[row.fap].mirrored(row.mirror)
+        if row.fap in masks and vertices is not None:
+            masks[row.mirror] = mirror_mask(masks[row.fap], vertices, margin, row.fap)
+    return replace(setup, zones=zones, masks=masks)
+
+
+def mirror_mask(mask: Int32, vertices: Float64, margin: float, fap: int) -> Int32:
+    """The vertices on the other side of those in the mask, ascending.
+
+    Raises:
+        FaceError: one has no twin within the margin.
+    """
+    from scipy.spatial import cKDTree
+
+    found = cKDTree(vertices).query(vertices[mask] * MIRROR)
+    off, twin = np.asarray(found[0]), np.asarray(found[1])
+    if len(mask) and off.max() > margin:
+        lost = int(mask[int(np.argmax(off))])
+        raise FaceError(
+            f"mask of FAP {fap}: vertex {lost} has no twin on the other side within {margin * 1000:.1f} mm; "
+            "the mask can be mirrored on a symmetrical mesh only"
+        )
+    return np.unique(twin).astype(np.int32)

@@ -1,0 +1,3 @@
+"""Face folders from a recipe and the CC0 MakeHuman data."""
+
+__all__: list[str] = []

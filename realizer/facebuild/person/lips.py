@@ -1,0 +1,270 @@
+"""The lips: two contours of feature points joined by splines, so that equal FAPs move a lip as one.
+
+A place on the lips has two coordinates: u runs from the right corner (-1) over the middle (0) to the left
+corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP owns a knot.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Bool, Float64
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person.ground import FORWARD, LEFT, UP, Ground, scaled
+
+__all__: list[str] = []
+
+# Two vertices each of the rings around the mouth, from inside out: ring 1 is where the lips meet, ring 7 the
+# border of the red. First the vertex in the middle of the upper lip, then its neighbour.
+RINGS = (
+    (537, 7282), (520, 7267), (474, 7229), (468, 7224), (509, 7257),
+    (467, 7223), (466, 7222), (455, 7214), (362, 7118), (5342, 11945),
+)  # fmt: skip
+MEET, BORDER = 1, 7
+LOWER_MIDDLE = 19  # place in a ring of 38 of the middle of the lower lip
+TENSION = 0.5  # equal FAPs overshoot by less than 4 % between the knots; more tension makes steps
+KNOTS = 5  # right corner, right half, middle, left half, left corner
+APART = 0.00005  # m that is left between closed lips
+ARC = 0.30  # metres forwards for each metre that the lower lip rises: it moves on the jaw's arc
+
+
+def _stretch() -> tuple[Float64, Float64]:
+    # Place along the lip -> place between the knots; the knots at 0, 0.5 and 1 stay where they are.
+    u = np.linspace(0, 1, 201)
+    mixed = 0.5 * u + 0.5 * np.arcsin(u) / (np.pi / 2)
+    half = float(np.interp(0.5, u, mixed))
+    return u, np.where(mixed < half, mixed / half / 2, 0.5 + (mixed - half) / (1 - half) / 2)
+
+
+_STRETCH = _stretch()
+
+
+def hats(u: Any) -> Float64:
+    """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; 1 at their own knot, 0 at the others.
+
+    Their sum being 1 everywhere is what keeps a lip whose FAPs are equal from bending into a w.
+    """
+    u = np.clip(np.asarray(u, float), -1, 1)
+    # Half-way to an ellipse's angle: an open mouth is round at its corners, a smile still runs into them.
+    u = np.sign(u) * np.interp(np.abs(u), *_STRETCH)
+    piece = np.clip(np.floor((u + 1) * 2).astype(int), 0, 3)
+    t = (u + 1) * 2 - piece
+    out = np.zeros((KNOTS, len(u)))
+    basis = (2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2)
+    for knot in range(KNOTS):
+        value = np.eye(KNOTS)[knot]
+        slope = np.gradient(value) * (1 - TENSION)
+        out[knot] = (
+            basis[0] * value[piece]
+            + basis[1] * slope[piece]
+            + basis[2] * value[piece + 1]
+            + basis[3] * slope[piece + 1]
+        )
+    return out
+
+
+class Lips:
+    """Where every vertex of the base mesh stands with respect to the lips.
+
+    Attributes:
+        u, w: (n,) coordinates; inherited from the nearest place of the lips outside and inside them.
+        is_upper: (n,) bool.
+        inside: (n,) bool, in the mouth.
+        away: (n,) metres from the red's border, 0 on the lips and in the mouth.
+        lips: (n,) 1 on the lips and just inside, 0 from a centimetre on: what other FAPs leave alone.
+        upper, corners: (n,) the upper lip's and the corners' part of that.
+        around: (n,) 1 on the lips, falling to 0 towards the chin boss: what FAP 3 leaves to the lip FAPs.
+    """
+
+    def __init__(self, ground: Ground) -> None:
+        at, n = ground.at, len(ground.at)
+        edges = ground.mesh.edges()
+        from realizer.facebuild.person.hm08 import walk
+
+        rings = []
+        for first, second in RINGS:
+            ring = walk(edges, first, second)
+            rings.append(ring if at[ring[1], 0] > 0 else [ring[0], *ring[:0:-1]])
+        self.rings = rings
+        self.u, self.w = np.zeros(n), np.zeros(n)
+        self.is_upper: Bool = np.zeros(n, bool)
+        on_ring = np.full(n, -1)
+        for k, ring in enumerate(rings):
+            corner = max(range(LOWER_MIDDLE), key=lambda i, r=ring: float(at[r[i], 0]))  # type: ignore[misc]
+            reach = at[ring[corner], 0]
+            for place, vertex in enumerate(ring):
+                self.u[vertex] = np.clip(at[vertex, 0] / reach, -1, 1)
+                self.w[vertex] = np.clip((k - MEET) / (BORDER - MEET), 0, 1)
+                self.is_upper[vertex] = min(place, 38 - place) <= corner
+                on_ring[vertex] = k
+        self._put_knots_at_points(ground)
+        self.fade = np.zeros(n)
+        self.fade[on_ring >= 0] = 1
+        inside = self._into_the_mouth(ground, on_ring)
+        self._around(ground, on_ring, inside)
+        ringed = (on_ring >= 0) & (on_ring <= BORDER)
+        self.away[ringed | inside] = 0
+        self.inside = inside
+        near = ground.body & (at[:, 2] > -0.03)
+        self.lips = np.where(ringed, 1.0, np.where(near, smooth(self.away, 0.010, 0.001), 0.0))
+        self.lips[inside] = self.fade[inside]
+        self.upper = self.lips * self.is_upper
+        self.corners = self.lips * smooth(np.abs(self.u), 0.6, 1.0)
+        reach = np.where(self.is_upper, 0.020, 0.021 + 0.006 * smooth(np.abs(self.u), 0.4, 1.0))
+        self.around = np.where(ringed, 1.0, np.where(near, smooth(self.away / reach, 1.0, 0.06), 0.0))
+        self.around[inside] = self.fade[inside]
+
+    def _put_knots_at_points(self, ground: Ground) -> None:
+        """Stretch u so that the points between middle and corner lie at its half, whoever's lips they are."""
+        for is_upper, names in ((True, ("2.6", "8.5")), (False, ("2.8", "8.7"))):
+            inner, outer = (float(self.u[ground.points[name]]) for name in names)
+            for ring in self.rings:
+                mine = np.array([i for i in ring if self.is_upper[i] == is_upper])
+                half = inner + (outer - inner) * self.w[mine[0]]
+                u = np.abs(self.u[mine])
+                self.u[mine] = np.sign(self.u[mine]) * np.interp(u, [0, half, 1], [0, 0.5, 1])
+
+    def _into_the_mouth(self, ground: Ground, on_ring: Any) -> Bool:
+        """Spread the inner ring's coordinates into the mouth, ring by ring, fading out."""
+        n = len(ground.at)
+        inside: Bool = np.zeros(n, bool)
+        known = on_ring >= 0
+        front = np.flatnonzero(on_ring == 0)
+        near = ground.average
+        for step in range(60):
+            found: dict[int, list[int]] = {}
+            for vertex in front:
+                for other in near.indices[near.indptr[vertex] : near.indptr[vertex + 1]]:
+                    if not known[other]:
+                        found.setdefault(int(other), []).append(int(vertex))
+            for other, parents in found.items():
+                self.u[other] = np.mean(self.u[parents])
+                self.is_upper[other] = bool(np.mean(self.is_upper[parents]) > 0.5)
+                self.fade[other] = max(0.0, 1 - 0.12 * (step + 1))
+                self.w[other] = 0
+                inside[other] = True
+            front = np.array(list(found), int)
+            known[front] = True
+            if not len(front):
+                break
+        return inside
+
+    def _around(self, ground: Ground, on_ring: Any, inside: Bool) -> None:
+        """Every other vertex takes after the nearest place on the red's border."""
+        from scipy.spatial import cKDTree
+
+        at = ground.at
+        ring = np.array(self.rings[BORDER] + self.rings[BORDER][:1])
+        # The ring as a fine polyline, so that neighbours do not jump from vertex to vertex.
+        t = np.linspace(0, 38, 38 * 12, endpoint=False)
+        k, part = t.astype(int), (t - t.astype(int))[:, None]
+        line = at[ring[k]] * (1 - part) + at[ring[k + 1]] * part
+        u = self.u[ring[k]] * (1 - part[:, 0]) + self.u[ring[k + 1]] * part[:, 0]
+        upper = self.is_upper[ring[np.where(part[:, 0] < 0.5, k, k + 1)]]
+        away, nearest = (np.asarray(found) for found in cKDTree(line).query(at))
+        self.away: Float64 = away.astype(np.float64)
+        other = ground.body & ~inside & ((on_ring < 0) | (on_ring > BORDER))
+        self.u[other], self.is_upper[other], self.w[other] = u[nearest[other]], upper[nearest[other]], 1
+
+
+def close_lips(ground: Ground) -> Float64:
+    """The base mesh with its lips just closed, (n, 3): each goes half the way to where they meet."""
+    lips = Lips(ground)
+    at = ground.at.copy()
+    for k, share in ((0, 1.0), (1, 1.0), (2, 0.55), (3, 0.25), (4, 0.10)):
+        meet = lips.rings[min(k, MEET)]
+        upper = sorted((i for i in meet if lips.is_upper[i]), key=lambda i: float(ground.at[i, 0]))
+        lower = sorted((i for i in meet if not lips.is_upper[i]), key=lambda i: float(ground.at[i, 0]))
+        for i in lips.rings[k]:
+            x = ground.at[i, 0]
+            high, low = (np.interp(x, ground.at[row, 0], ground.at[row, 1]) for row in (upper, lower))
+            # Some people's overlap: those are parted.
+            apart = high - low - APART
+            at[i, 1] += share * apart / 2 * (-1 if lips.is_upper[i] else 1)
+    return at
+
+
+def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
+    """Fields of FAPs 4-13, 16-18 and 51-60."""
+    at, points = ground.at, ground.points
+    knots = hats(lips.u)
+    in_front = ground.body & (at[:, 2] > -0.03)
+    soft = np.where(lips.is_upper, 0.015, 0.026)
+    # Between a straight line and a curve without corners: gentle where the chin folds.
+    near = 0.5 * np.clip(1 - lips.away / soft, 0, 1) + 0.5 * smooth(lips.away / soft, 1.0, 0.0)
+    fall = np.where(in_front, near, 0) * np.where(lips.fade > 0, lips.fade, 1.0)
+    upper, lower = lips.is_upper * fall, ~lips.is_upper * fall
+    inner, outer = 1 - lips.w, lips.w
+    right, half_right, middle, half_left, left = knots
+    out: dict[int, Float64] = {}
+
+    def put(number: int, name: str, weight: Float64, way: Any, direction: Any) -> None:
+        field = weight[:, None] * np.asarray(way)
+        rough = ground.smoothed(field, 2)
+        # Only what lies off the lips is smoothed: the spline holds on them.
+        mixed = np.where((lips.away > 0.0005)[:, None], rough, field)
+        out[number] = scaled(mixed, points[name], direction)
+
+    down = -UP
+    for share, numbers, names in (
+        (inner, (4, 8, 9, 5, 10, 11), ("2.2", "2.6", "2.7", "2.3", "2.8", "2.9")),
+        (outer, (51, 55, 56, 52, 57, 58), ("8.1", "8.5", "8.6", "8.2", "8.7", "8.8")),
+    ):
+        for number, name, knot in zip(numbers[:3], names[:3], (middle, half_left, half_right), strict=True):
+            put(number, name, upper * share * knot, down, down)
+        for number, name, knot in zip(numbers[3:], names[3:], (middle, half_left, half_right), strict=True):
+            put(number, name, lower * share * knot, UP + ARC * FORWARD, UP)
+    out |= _corners(ground, lips, left, right, inner, outer)
+    bow = (1 + np.cos(np.pi * np.clip(lips.u, -1, 1))) / 2
+    put(17, "2.2", upper * bow, FORWARD, FORWARD)
+    put(16, "2.3", lower * bow, FORWARD, FORWARD)
+    boss = ground.ellipsoid(ground.point("2.10") - [0, 0.002, 0], (0.024, 0.0155, 0.03))
+    field = (boss * (1 - lips.lips))[:, None] * (UP + 0.15 * FORWARD)
+    out[18] = scaled(ground.smoothed(field, 1), points["2.10"], UP)
+    return out
+
+
+def _corners(
+    ground: Ground, lips: Lips, left: Float64, right: Float64, inner: Float64, outer: Float64
+) -> dict[int, Float64]:
+    """FAPs 6, 7, 12, 13 (inner) and 53, 54, 59, 60 (outer): splines on the lips, CC0 shapes in the cheeks."""
+    at, points, out = ground.at, ground.points, {}
+    in_front = ground.body & (at[:, 2] > -0.06)
+    # From the lips outwards the spline hands over to the shape of the cheek.
+    cheek = np.where(in_front, smooth(lips.away, 0.001, 0.014), 0)
+    cheek[lips.fade > 0] = np.where(lips.away[lips.fade > 0] > 0, cheek[lips.fade > 0], 0)
+    mouth = np.where(in_front, smooth(lips.away, 0.030, 0.0), 0) * np.where(lips.fade > 0, lips.fade, 1.0)
+    for side, knot, numbers, names, word in (
+        (1, left, ((6, 12), (53, 59)), ("2.4", "8.3"), "Left"),
+        (-1, right, ((7, 13), (54, 60)), ("2.5", "8.4"), "Right"),
+    ):
+        corner = points[names[1]]
+        smile, stretch = (
+            np.where(ground.body[:, None], ground.shape(f"mouth{k}{word}"), 0) for k in ("Smile", "Stretch")
+        )
+        # Two shapes, mixed so that the corner goes straight up, or straight out.
+        pull = np.array(
+            [[smile[corner, 0] * side, stretch[corner, 0] * side], [smile[corner, 1], stretch[corner, 1]]]
+        )
+        mixes = np.linalg.solve(pull, np.eye(2))
+        out_shape = smile * mixes[0, 0] + stretch * mixes[1, 0]
+        up_shape = smile * mixes[0, 1] + stretch * mixes[1, 1]
+        u = np.clip(lips.u * side, 0, 1)
+        ramp = u**1.4
+        # Sliding outwards the lip follows the arch of the teeth: back as it goes out.
+        slope = np.interp(u, [0, 0.5, 1], [0, -0.30, -0.62])
+        draw = np.stack([side * ramp, np.zeros_like(ramp), slope * ramp], 1)
+        lift = np.stack([np.zeros_like(knot), knot, -0.12 * knot], 1)
+        for (across, upward), name, share in zip(numbers, names, (inner, outer), strict=True):
+            for number, on_lips, shape, way in (
+                (across, draw, out_shape, side * LEFT),
+                (upward, lift, up_shape, UP),
+            ):
+                field = (1 - cheek)[:, None] * on_lips * mouth[:, None] + cheek[:, None] * shape
+                field = field * share[:, None]
+                rough = ground.smoothed(field, 3)
+                field = np.where((lips.away > 0.0005)[:, None], rough, field)
+                out[number] = scaled(field, points[name], way)
+    return out

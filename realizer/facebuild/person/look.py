@@ -1,0 +1,47 @@
+"""A recipe's [look] in, figures of brows, lips, skin and collar out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from realizer.core.errors import FaceError
+
+__all__ = ["Look", "look_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Figures of how a person looks, as `realizer/tables/look.toml` explains them."""
+
+    brow_thick: float
+    brow_low: float
+    brow_grey: float
+    brow_cover: float
+    lash: float
+    lips: float
+    flush: float
+    stubble: float
+    freckles: float
+    age: float
+    collar_low: float
+    collar_point: float
+
+
+def look_of(table: Mapping[str, Any]) -> Look:
+    """The plain look with the figures that a recipe's [look] changes.
+
+    Raises:
+        FaceError: no such figure, or not a number.
+    """
+    from realizer.tables import read_toml, text_of
+
+    names = [field.name for field in fields(Look)]
+    for key, value in table.items():
+        if key not in names:
+            raise FaceError(f"look: wanted one of {', '.join(names)}, got {key!r}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise FaceError(f"look: {key}: wanted a number, got {value!r}")
+    plain = read_toml(text_of("look.toml"), "look.toml")
+    return Look(**{name: float(table.get(name, plain[name])) for name in names})

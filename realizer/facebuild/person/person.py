@@ -1,0 +1,151 @@
+"""A recipe and the CC0 data in, a `Person` out: the base mesh mixed to them, and what is measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from realizer.core.arrays import Float64
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person import hm08
+from realizer.facebuild.person.ground import Ground
+from realizer.facebuild.person.lips import close_lips
+from realizer.tables import read_csv
+
+__all__: list[str] = []
+
+MIRROR = np.array([-1.0, 1.0, 1.0])
+EYE_INSET = 0.00015  # m; the ball lies that much inside the socket's fit
+# Lengths of the bust, in faces (from the hairline 11.1 to the chin 2.1: 15 to 18 cm).
+FLOOR = 0.61  # the bust ends that far below the collarbones
+NECK_TOP, NECK_LENGTH = 0.092, 0.433  # below the chin the head's turn fades out, over that length,
+NECK_TILT = 0.30  # along a plane that falls with the jaw by that much
+NOD = np.array([0.0, -0.082, -0.012])  # the head nods about a point below and behind the head's joint
+CORNER = (0.007, 0.006, 0.009)  # m; half axes of what is smoothed at a corner of the mouth,
+RELAXED = 5  # and how many times
+ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of the data's arches
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """The base mesh as one person.
+
+    Attributes:
+        ground: its vertices (metres, origin between the eyes, lips closed), landmarks and expression shapes.
+        balls: centre (3,) and radius of the left and the right eyeball.
+        face: metres from hairline to chin.
+        jaw_pivot, head_pivot: (3,) what the jaw bone turns about, and the head.
+        floor: y of the plane that the bust ends in.
+        arch: half width and depth of the upper teeth's arch, metres.
+    """
+
+    ground: Ground
+    balls: tuple[tuple[Float64, float], ...]
+    face: float
+    jaw_pivot: Float64
+    head_pivot: Float64
+    floor: float
+    arch: tuple[float, float]
+
+    def turns(self) -> Float64:
+        """(n,) how far each base vertex turns with the head: 1 above jaw and nape, 0 below the neck."""
+        at, chin = self.ground.at, self.ground.point("2.1")
+        top = chin[1] + NECK_TILT * chin[2] - NECK_TOP * self.face
+        level = at[:, 1] + NECK_TILT * at[:, 2]
+        return np.asarray(smooth(level, top - NECK_LENGTH * self.face, top))
+
+
+def person_of(data: Path, targets: Mapping[str, float]) -> Person:
+    """The person that weighted shape targets make of the base mesh."""
+    mesh = hm08.read_base(data)
+    at = identity(mesh, data, targets)
+    points = _landmarks(mesh, at)
+    twin = mesh.mirror()
+
+    @cache
+    def shape(unit: str) -> Float64:
+        # The data are rounded to a tenth of a millimetre, each side on its own: take the mean of both.
+        sides = [hm08.read_target(data, name, len(at)) for name in (unit, _other_side(unit))]
+        return np.asarray((sides[0] + sides[1][twin] * MIRROR) / 2 * hm08.DECIMETRE)
+
+    at = _relaxed(Ground(mesh, at, points, shape))
+    ground = Ground(mesh, close_lips(Ground(mesh, at, points, shape)), points, shape)
+    face = float(ground.point("11.1")[1] - ground.point("2.1")[1])
+    arch = np.ptp(at[np.unique(mesh.quads["helper-upper-teeth"])], axis=0)
+    return Person(
+        ground=ground,
+        balls=tuple(_ball(at[np.unique(mesh.quads[f"helper-{side}-eye"])]) for side in "lr"),
+        face=face,
+        jaw_pivot=_joint(mesh, at, "joint-mouth") + np.array([0, 0.002, 0.006]),
+        head_pivot=_joint(mesh, at, "joint-head") + NOD * face,
+        floor=float(_joint(mesh, at, "joint-l-clavicle")[1]) - FLOOR * face,
+        arch=(ARCH[0] * float(arch[0]) / 2, ARCH[1] * float(arch[2])),
+    )
+
+
+def identity(mesh: hm08.BaseMesh, data: Path, targets: Mapping[str, float]) -> Float64:
+    """The base mesh mixed to a person, (n, 3) metres: origin between the eyes, both sides alike."""
+    at = mesh.vertices.copy()
+    for target, weight in targets.items():
+        for side in ("l-", "r-") if "*" in target else ("",):
+            at += weight * hm08.read_target(data, target.replace("*", side), len(at))
+    at = (at + at[mesh.mirror()] * MIRROR) / 2
+    eyes = [at[np.unique(mesh.quads[f"helper-{side}-eye"])].mean(axis=0) for side in "lr"]
+    return np.asarray((at - (eyes[0] + eyes[1]) / 2) * hm08.DECIMETRE)
+
+
+def _relaxed(ground: Ground) -> Float64:
+    """The base mesh with smooth corners of the mouth, (n, 3): shape targets bunch vertices there."""
+    at = ground.at
+    near = np.maximum(*(ground.ellipsoid(ground.point(name), CORNER) for name in ("2.4", "2.5")))[:, None]
+    for _ in range(RELAXED):
+        at = at + near * (ground.smoothed(at) - at)
+    return at
+
+
+def _other_side(unit: str) -> str:
+    """`eyeBlinkLeft` for `eyeBlinkRight` and the other way; names without a side stay."""
+    for one, other in (("Left", "Right"), ("Right", "Left")):
+        if unit.endswith(one):
+            return unit.removesuffix(one) + other
+    return unit
+
+
+def _ball(shell: Float64) -> tuple[Float64, float]:
+    """Centre and radius of the ball that fits an eye best."""
+    rows = np.c_[2 * shell, np.ones(len(shell))]
+    fit = np.linalg.lstsq(rows, (shell**2).sum(axis=1), rcond=None)[0]
+    return fit[:3], float(np.sqrt(fit[3] + fit[:3] @ fit[:3])) - EYE_INSET
+
+
+def _joint(mesh: hm08.BaseMesh, at: Float64, name: str) -> Float64:
+    return np.asarray(at[np.unique(mesh.quads[name])].mean(axis=0))
+
+
+def _landmarks(mesh: hm08.BaseMesh, at: Float64) -> dict[str, int]:
+    """Feature point -> base vertex; those on the tongue are found."""
+    path = Path(__file__).with_name("hm08_landmarks.csv")
+    points = {
+        row.feature_point: row.vertex for row in read_csv(path.read_text("utf-8"), _Landmark, path.name)
+    }
+    mine = np.unique(mesh.quads["helper-tongue"])
+    tongue = at[mine]
+    top = mine[tongue[:, 1] > np.median(tongue[:, 1])]
+    points["6.1"] = int(mine[np.argmax(tongue[:, 2] - np.abs(tongue[:, 0]))])
+    back, front = tongue[:, 2].min(), tongue[:, 2].max()
+    middle = np.array([0, tongue[:, 1].max(), back + 0.60 * (front - back)])
+    points["6.2"] = int(top[np.argmin(np.linalg.norm((at[top] - middle) * [3, 0.3, 1], axis=1))])
+    band = np.abs(tongue[:, 2] - (back + 0.72 * (front - back))) < 0.09 * (front - back)
+    points["6.3"] = int(mine[band][np.argmax(tongue[band, 0])])
+    points["6.4"] = int(mine[band][np.argmin(tongue[band, 0])])
+    return points
+
+
+@dataclass(frozen=True, slots=True)
+class _Landmark:
+    feature_point: str
+    vertex: int

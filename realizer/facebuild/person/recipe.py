@@ -1,0 +1,113 @@
+"""A recipe.toml in, a checked `Recipe` out: which shape targets make a person, and their colours."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from realizer.core.errors import FaceError
+from realizer.facebuild.person import hm08
+from realizer.facebuild.person.hair import style_of
+
+__all__: list[str] = []
+
+COLOURS = (
+    "skin", "blush", "lips", "mouth", "brows", "lashes", "hair", "shirt", "tongue", "tooth", "root", "gum",
+    "pupil", "iris_inner", "iris_middle", "iris_outer", "ring", "white", "corner",
+)  # fmt: skip
+TABLES = ("targets", "colours", "hair", "look")
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """What makes a person.
+
+    Attributes:
+        says: a sentence about them, for lists of faces.
+        targets: shape target -> weight 0..1; `*` in a name stands for both sides.
+        colours: what for -> sRGB 0..255.
+        hair: the style of the hair, and the figures it changes.
+        look: figures of `realizer.facebuild.person.look.Look` that differ from the plain ones.
+    """
+
+    says: str
+    targets: dict[str, float]
+    colours: dict[str, list[float]]
+    hair: dict[str, Any] = field(default_factory=dict)
+    look: dict[str, Any] = field(default_factory=dict)
+
+
+def read_recipe(path: Path, data: Path) -> Recipe:
+    """The recipe in a file.
+
+    Args:
+        data: the folder of shape targets that its names are looked up in.
+
+    Raises:
+        FaceError: no such file, not TOML, or faults: all at once, each with its key and what was wanted.
+    """
+    try:
+        raw = tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise FaceError(f"{path}: wanted a recipe; copy the one of another face and change it") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FaceError(f"{path}: {error}") from None
+    known = ("says", *TABLES)
+    faults = [f"wanted one of {', '.join(known)}, got {key!r}" for key in raw if key not in known]
+    if not isinstance(raw.get("says"), str) or not raw["says"].strip():
+        faults.append(f"says: wanted a sentence about the person, got {raw.get('says')!r}")
+    tables: dict[str, dict[str, Any]] = {}
+    for name in TABLES:
+        tables[name] = raw.get(name, {})
+        if not isinstance(tables[name], dict):
+            faults.append(f"{name}: wanted a table, got {tables[name]!r}")
+            tables[name] = {}
+    faults += _target_faults(tables["targets"], data)
+    faults += _colour_faults(tables["colours"])
+    try:
+        style_of(tables["hair"])
+    except FaceError as error:
+        faults.append(str(error))
+    if faults:
+        raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
+    return Recipe(raw["says"], tables["targets"], tables["colours"], tables["hair"], tables["look"])
+
+
+def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:
+    known = hm08.target_names(data)
+    faults = []
+    if not any(str(name).startswith("macrodetails/") for name in targets):
+        faults.append("targets: wanted at least one of macrodetails/..., got none")
+    for name, weight in targets.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1, 0.4)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            faults.append(f"targets: {name}: no such shape target{hint}")
+        if not _number(weight) or not 0 <= weight <= 1:
+            faults.append(f"targets: {name}: wanted a weight 0..1, got {weight!r}")
+    return faults
+
+
+def _colour_faults(colours: Mapping[str, Any]) -> list[str]:
+    faults = [
+        f"colours: {name}: wanted three numbers 0..255, got none" for name in COLOURS if name not in colours
+    ]
+    for name, colour in colours.items():
+        if name not in COLOURS:
+            faults.append(f"colours: {name}: wanted one of {', '.join(COLOURS)}")
+        elif (
+            not isinstance(colour, list)
+            or len(colour) != 3
+            or not all(_number(part) and 0 <= part <= 255 for part in colour)
+        ):
+            faults.append(f"colours: {name}: wanted three numbers 0..255, got {colour!r}")
+    return faults
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

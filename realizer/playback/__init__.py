@@ -1,0 +1,3 @@
+"""Blocks that live in time: planned, composed, started, moved, sampled and reported."""
+
+__all__: list[str] = []

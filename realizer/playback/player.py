@@ -1,0 +1,378 @@
+"""Which blocks are alive: documents are composed here, their feedback comes due and their faces are sampled.
+
+Knows no clock and no I/O: every call is told `now`, in seconds on the session clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bml_schema import Block, Feedback
+from realizer.animation.blend import blend
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.frames import AUFrames
+from realizer.animation.idle.idle import Idle, idle_face
+from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
+from realizer.animation.targets import AU_NAMES, axis
+from realizer.behaviours import KINDS
+from realizer.behaviours.kind import Kind, Position, World
+from realizer.core.arrays import Float64
+from realizer.expressions import library_of
+from realizer.playback.cast import Cast
+from realizer.playback.character import RELAX, Character
+from realizer.playback.ensemble import Ensemble
+from realizer.playback.playing import Speaking
+from realizer.playback.reporting import State
+from realizer.scheduling.timing import Schedule, Warning
+from realizer.speech.utterance import Recording, Say, Utterance
+from realizer.tables.cooccurrence import chosen
+
+__all__ = ["Player", "Speaking"]
+
+# Frames up to this long before `now` can still be asked for.
+HISTORY = 1.0  # s
+# What goes with speech comes no farther from it.
+NEAR = 5.0  # s
+
+
+class Player:
+    """The blocks of one session and what they show.
+
+    Args:
+        kinds: tag -> Kind, what behaviours there are.
+        scene: target name -> (x, y, z) metres; None while no scene was declared.
+        seed: for idle motion and anything else random.
+        idle: blinks and small head motion between and under the behaviours.
+        language: BCP-47 of speech that does not name its own.
+        media: the folder of the files that documents may name; None: they may name none.
+        clips: id -> sound that documents may name as `clip:ID`; it may change while the player plays.
+        expressions: a folder of expressions of the user's own, before those that ship; None: there are none.
+        history: seconds before the last `due` for which frames can still be asked for.
+        cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
+        prosody: nods, brows, blinks and looks that go with what is said; part of what is idle.
+        takes: index of a character -> what moves its face (`Face.takes`); None: that is not known.
+        refuses: (block, what was planned) -> why it is not to be played; None where it is.
+
+    Attributes:
+        revision: rises whenever frames change that were already computed.
+    """
+
+    def __init__(
+        self,
+        *,
+        kinds: Mapping[str, Kind] = KINDS,
+        scene: Mapping[str, Position] | None = None,
+        seed: int = 0,
+        idle: bool = True,
+        language: str = "en-US",
+        media: Path | None = None,
+        clips: Mapping[str, Recording] | None = None,
+        expressions: Path | None = None,
+        history: float = HISTORY,
+        cooccurrence: str = "on",
+        prosody: bool = True,
+        takes: Callable[[int], Sequence[str]] | None = None,
+        refuses: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
+    ) -> None:
+        self.kinds = kinds
+        self._takes = takes
+        library = library_of(expressions)
+        self.world = World(
+            scene=scene,
+            seed=seed,
+            language=language,
+            media=media,
+            clips={} if clips is None else clips,
+            library=library,
+        )
+        self.idle = idle
+        self.prosody = prosody
+        self.history = history
+        self.rules = chosen(cooccurrence)
+        self._characters: list[Character] = [Character(None)]
+        self._blocks = Ensemble(kinds, self._characters, refuses)
+
+    @property
+    def revision(self) -> int:
+        return self._blocks.course.revision
+
+    # documents in -------------------------------------------------------------------------------
+
+    def wants(self, block: Block) -> dict[str, Say]:
+        """{behaviour id: what a voice has to say} before the block can be submitted."""
+        says: dict[str, Say] = {}
+        for node in block.behaviours:
+            kind = self.kinds.get(node.tag)
+            if kind is not None and kind.say is not None and (say := kind.say(node, self.world)) is not None:
+                says[node.id] = say
+        return says
+
+    def announce(self, block: Block, now: float) -> None:
+        """Acknowledge a block: planning has begun. `submit` does it where it was not done before."""
+        self._blocks.announce(block, self._character(block.character_id), now)
+
+    def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
+        """Plan a block and let it play as its composition says.
+
+        Args:
+            block: as parsed; its own problems are reported with it.
+            now: seconds on the session clock.
+            utterances: what the voice made of `wants(block)`.
+
+        Returns:
+            The schedule; `schedule.failed` when the whole block was refused. Where it has `lengths`, more of
+            the block fits with other utterances: submit it again with such as last so long
+            (`speech.fitting`), or with the same ones whose `stretch` is (1, 1).
+        """
+        character = self._character(block.character_id)
+        takes = self.world.takes if self._takes is None else partial(self._takes, character)
+        world = replace(self.world, utterances=dict(utterances or {}), takes=takes)
+        return self._blocks.submit(block, character, world, now)
+
+    def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
+        """Report a document, block or behaviour that cannot be played."""
+        self._blocks.reports.warn(warning, character)
+
+    def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
+        """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
+
+        Args:
+            block_ids: which; None for all that play or wait.
+
+        Returns:
+            The ids of the blocks that were stopped.
+        """
+        return self._blocks.stop_all(now, None if block_ids is None else set(block_ids))
+
+    def withdraw(self, block: Block, now: float) -> None:
+        """Give up a block that was announced and will not be submitted; its end is reported."""
+        self._blocks.withdraw(block, now)
+
+    @property
+    def cast(self) -> Cast:
+        """The blocks themselves, to look at: only the player changes them."""
+        return self._blocks.cast
+
+    @property
+    def alive(self) -> int:
+        """How many blocks play or wait for their start."""
+        return len(self._blocks.cast.alive())
+
+    def set_scene(self, scene: Mapping[str, Position] | None) -> None:
+        """Declare where targets are; documents planned from now on look there."""
+        self.world = replace(self.world, scene=scene)
+
+    def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
+        """Expect the points `anticipators:id:sync` at these times; what is tied to them follows.
+
+        Args:
+            syncs: sync -> seconds on the session clock. A point that has passed stays where it was.
+        """
+        self._blocks.anticipate(id, syncs, now)
+
+    def lapse(self, id: str) -> None:
+        """Expect no point of an anticipator any more: nothing alive is tied to it."""
+        self._blocks.cast.lapse([id])
+
+    def respeak(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
+        """Take what a voice says of its real timing while it speaks: the rest of the block follows.
+
+        Args:
+            utterance: the whole of it, as it turned out. What has passed stays where it was.
+
+        Returns:
+            False where that speech does not play and does not wait.
+        """
+        return self._blocks.respeak(block, behaviour, utterance, now)
+
+    def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
+        """Hold AUs (0..1) and FAPs (FAPU) by name until told otherwise; None lets go of one.
+
+        Raises:
+            KeyError: no such AU or FAP.
+        """
+        self._characters[character].set_direct(values, now)
+        self._blocks.course.changed()
+
+    def held(self, character: int = 0) -> tuple[str, ...]:
+        """The names of the AUs and FAPs that are held directly, or have just been let go of."""
+        return tuple(self._characters[character].direct)
+
+    def set_feeling(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
+        """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the one held before; {}: none.
+
+        It lies among the expressions, below speech, gaze and what is set directly, whatever is set first.
+
+        Raises:
+            KeyError: no such AU or FAP.
+        """
+        self._characters[character].set_feeling(values, now)
+        self._blocks.course.changed()
+
+    # feedback out -------------------------------------------------------------------------------
+
+    def due(self, now: float) -> list[Feedback]:
+        """Feedback whose time has come, in the order of report, each once."""
+        forgettable = now - self.history - RELAX - AFTERMATH
+        if not self._blocks.stirs(now, forgettable):
+            return []
+        out = self._blocks.due(now)
+        forgotten = self._blocks.forget(forgettable)
+        if forgotten:
+            for character in self._characters:
+                character.forget(now - self.history)
+        return out
+
+    def next_deadline(self) -> float | None:
+        """When `due` will next have something; None when nothing plays or waits. In the past: at once."""
+        return self._blocks.next_deadline()
+
+    def next_change(self) -> float:
+        """When `due` will next do something: tell, or forget what is past; infinite where neither."""
+        first = self._blocks.next_deadline()
+        forgets = self._blocks.cast.first_gone + self.history + RELAX + AFTERMATH
+        return forgets if first is None else min(first, forgets)
+
+    # at rest ------------------------------------------------------------------------------------
+
+    def resting(self, now: float = float("-inf")) -> bool:
+        """Nothing plays, waits or is still to be seen: what is held, the scene and `cast.known` are all.
+
+        Args:
+            now: what has ended by then does not count, though what is idle goes by it for some seconds.
+        """
+        return self._blocks.resting(now)
+
+    @property
+    def held_by(self) -> tuple[Character, ...]:
+        """The characters themselves, to look at: only the player changes them."""
+        return tuple(self._characters)
+
+    def restore(self, characters: Iterable[Character], past: Iterable[Schedule], expected: Schedule) -> None:
+        """Let a new player be as another one was when it was `resting`.
+
+        Args:
+            characters: its own from now on.
+            past, expected: as `cast.known`.
+        """
+        self._characters[:] = characters
+        self._blocks.cast.restore(past, expected)
+        self._blocks.course.changed()
+
+    # faces out ----------------------------------------------------------------------------------
+
+    @property
+    def characters(self) -> list[str | None]:
+        """Ids of the characters; the first is the one that documents without characterId move."""
+        return [c.id for c in self._characters]
+
+    def character_index(self, character: str | None) -> int:
+        """Where a character stands in `characters`; it is added where it is new."""
+        return self._character(character)
+
+    def frames(self, times: Float64, character: int = 0) -> AUFrames:
+        """The face at any times: a pure function of what was submitted, so live and offline agree.
+
+        Args:
+            times: (n,) float64 seconds on the session clock, rising; not earlier than `history` before the
+                last `due`.
+        """
+        times = np.asarray(times, np.float64)
+        if not len(times):
+            return blend([], times, self.rules)
+        channels, idle = self._moving(float(times[0]), float(times[-1]), character)
+        return blend(channels, times, self.rules, idle)
+
+    def _moving(self, first: float, last: float, character: int) -> tuple[list[Channel], Idle | None]:
+        """All that moves a face between two times, and perhaps some more."""
+        blocks = self._blocks.cast.of(character)
+        own = self._characters[character].channels()
+        channels = [c for p in blocks for c in p.moving()] + own
+        if not self.idle:
+            return channels, None
+        seed = self.world.seed + 7919 * character
+        said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
+        talks = [
+            Talk(s.start + at, s.until, part)
+            for s in said
+            for at, part in s.utterance.parts or [(0.0, s.utterance)]
+        ]
+        near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
+        if near:
+            asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
+            asked += [Asked(c.span[0], c) for c in own]
+            channels += prosody_channels(near, first, last, seed, asked)
+        return channels, idle_face(first, last, seed, phrase_ends(talks))
+
+    @property
+    def end(self) -> float:
+        """When the last block has ended, and relaxed where it was cut off; 0 where there was none."""
+        return max((p.gone for p in self._blocks.cast.all() if p.end < float("inf")), default=0.0)
+
+    def speech(self) -> tuple[Speaking, ...]:
+        """What sounds or will sound, in order of its start."""
+        return tuple(
+            sorted((s for p in self._blocks.cast.all() for s in p.speech.values()), key=lambda s: s.start)
+        )
+
+    def latest(self, schedule: Schedule) -> Schedule:
+        """What became of a schedule that `submit` gave, where other blocks moved or interrupted its block."""
+        return self._blocks.cast.latest(schedule)
+
+    def state(self, now: float) -> dict[str, Any]:
+        """What is playing, which AUs are up and what each layer asks for, as plain data."""
+        blocks: list[dict[str, Any]] = []
+        for p in self._blocks.cast.alive():
+            if p.end <= now:
+                continue
+            status = State.IN_EXEC if p.state is State.LURKING and p.start <= now else p.state
+            blocks.append({"id": p.block.id, "character": p.block.character_id, "status": status.value})
+            if p.start < float("inf"):
+                blocks[-1] |= {"start": p.start, "end": p.end}
+                spans = ((b, t + p.start) for b, t in p.schedule.times.items() if len(t))
+                blocks[-1]["behaviours"] = [b for b, t in spans if t[0] <= now < t[-1]]
+        faces = [self._face_state(now, index) for index in range(len(self._characters))]
+        return {"time": now, "blocks": blocks, "characters": faces}
+
+    def _face_state(self, now: float, character: int) -> dict[str, Any]:
+        times = np.array([now])
+        channels, idle = self._moving(now, now, character)
+        fap_names = list(axis())[len(AU_NAMES()) : len(AU_NAMES()) + 68]
+        layers = {}
+        for layer in Layer:
+            alone = idle if layer is Layer.IDLE else None
+            own = blend([c for c in channels if c.layer is layer], times, idle=alone)
+            # Below 0.005 nothing is seen of an AU, and of a FAP below half a unit.
+            values = zip(fap_names, own.faps[0].tolist(), strict=True)
+            faps = {name: round(value) for name, value in values if abs(value) >= 0.5}
+            if (aus := _up(own)) or faps:
+                layers[layer.name.lower()] = {"aus": aus, "faps": faps}
+        shown = _up(blend(channels, times, self.rules, idle))
+        return {"character": self._characters[character].id, "aus": shown, "layers": layers}
+
+    # inside -------------------------------------------------------------------------------------
+
+    def _character(self, wanted: str | None) -> int:
+        if wanted is None:
+            return 0
+        for index, character in enumerate(self._characters):
+            if character.id == wanted:
+                return index
+        if self._characters[0].id is None:
+            # The first name that a session hears is the name of its first face.
+            self._characters[0].id = wanted
+            return 0
+        self._characters.append(Character(wanted))
+        return len(self._characters) - 1
+
+
+def _up(frames: AUFrames) -> dict[str, float]:
+    """The AUs of the first frame that are not 0."""
+    shown = zip(AU_NAMES(), frames.aus[0].tolist(), strict=True)
+    return {name: round(value, 3) for name, value in shown if value > 0.005}

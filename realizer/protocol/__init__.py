@@ -1,0 +1,3 @@
+"""Messages and frames of the wire, which client and server share."""
+
+__all__: list[str] = []

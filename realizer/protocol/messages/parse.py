@@ -1,0 +1,165 @@
+"""JSON text in, a control message out, or the error to answer with."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from realizer.protocol.messages.common import MAX_CONTROL, STREAMS
+from realizer.protocol.messages.replies import ErrorMessage
+from realizer.protocol.messages.requests import (
+    Anticipate,
+    CharacterMessage,
+    Hello,
+    Ping,
+    SceneMessage,
+    SetMessage,
+    StateQuery,
+    Stop,
+    Subscribe,
+    Unsubscribe,
+)
+from realizer.protocol.messages.speech import SpeechMessage
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+__all__ = ["SUPPORTED", "Control", "parse_control"]
+
+Control = (
+    Hello
+    | Subscribe
+    | Unsubscribe
+    | SceneMessage
+    | CharacterMessage
+    | SetMessage
+    | Anticipate
+    | SpeechMessage
+    | Stop
+    | StateQuery
+    | Ping
+)
+SUPPORTED: tuple[str, ...] = (
+    "hello",
+    "subscribe",
+    "unsubscribe",
+    "scene",
+    "character",
+    "set",
+    "anticipate",
+    "speech",
+    "stop",
+    "state",
+    "ping",
+)
+# Kind of a pydantic error -> what was wanted, in the words of our other messages.
+_WANTED = {
+    "missing": "a value",
+    "extra_forbidden": "no field of that name",
+    "greater_than": "more than {gt:g}",
+    "greater_than_equal": "at least {ge:g}",
+    "less_than_equal": "at most {le:g}",
+    "multiple_of": "a multiple of {multiple_of:g}",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number of a usual size",
+    "int_from_float": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "literal_error": "{expected}",
+    "string_type": "a string",
+    "string_pattern_mismatch": "a string that matches {pattern}",
+    "string_too_short": "a string of at least {min_length} characters",
+    "string_too_long": "a string of at most {max_length} characters",
+    "too_long": "at most {max_length} of them",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+}
+# JSON can say what is no character: half of one that takes two.
+_SURROGATE = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
+_ADAPTER: TypeAdapter[Control] = TypeAdapter(Annotated[Control, Field(discriminator="type")])
+
+
+def parse_control(text: str) -> Control | ErrorMessage:
+    """A control message, or the error to answer with: code bad-json, too-large, unsupported or invalid."""
+    if len(text) > MAX_CONTROL:
+        return ErrorMessage(
+            code="too-large",
+            message=f"wanted a control message of at most {MAX_CONTROL} bytes, got {len(text)}",
+        )
+    try:
+        message = json.loads(text)
+    except RecursionError:
+        return ErrorMessage(code="bad-json", message="wanted a flat JSON object, got one nested too deeply")
+    except ValueError as error:
+        return ErrorMessage(code="bad-json", message=f"wanted a JSON object with a type: {error}")
+    if _SURROGATE.search(text) and not _is_text(message):
+        words = r"wanted text, got half a character: a lone \ud800..\udfff in a string"
+        return ErrorMessage(code="bad-json", message=words)
+    kind = message.get("type")
+    if kind not in SUPPORTED:
+        return ErrorMessage(
+            code="unsupported",
+            message=f"wanted a type of {', '.join(SUPPORTED)}; got {_short(kind)}",
+            where="type",
+        )
+    if kind == "subscribe" and message.get("stream") not in tuple(STREAMS):
+        return ErrorMessage(
+            code="unsupported",
+            message=f"wanted a stream of {', '.join(STREAMS)}; got {_short(message.get('stream'))}",
+            where="subscribe.stream",
+        )
+    try:
+        return _ADAPTER.validate_python(message)
+    except ValidationError as error:
+        errors = error.errors(include_url=False)
+        where = _where(errors[0], message)
+        same = [other for other in errors if _where(other, message) == where]
+        return ErrorMessage(code="invalid", message=_said(same), where=where)
+
+
+def _where(error: ErrorDetails, message: object) -> str:
+    """The path to what is wrong, without the names of the types that it could have had."""
+    kind, *parts = error["loc"]
+    path, value = [str(kind)], message
+    for part in parts:
+        if isinstance(value, list) and isinstance(part, int):
+            value = value[part] if part < len(value) else None
+        elif isinstance(value, dict) and part in value:
+            value = value[part]
+        elif error["type"] != "missing" or part != parts[-1]:
+            continue
+        path.append(str(part))
+    return ".".join(path)
+
+
+def _is_text(message: object) -> bool:
+    """Whether what was read of JSON can be written as UTF-8."""
+    try:
+        json.dumps(message, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _said(errors: list[ErrorDetails]) -> str:
+    """What was wanted, one or the other, and what came."""
+    first = errors[0]
+    got = "nothing" if first["type"] == "missing" else _short(first["input"])
+    if first["type"] not in _WANTED:
+        return f"{first['msg'].removeprefix('Value error, ')}; got {got}"
+    wanted = [_WANTED[e["type"]].format(**e.get("ctx", {})) for e in errors if e["type"] in _WANTED]
+    return f"wanted {' or '.join(dict.fromkeys(wanted))}; got {got}"
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,255 @@
+"""Control messages in, but `speech`: one class each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AliasChoices, ConfigDict, Field, field_validator
+
+from realizer.protocol.messages.common import (
+    MAX_FPS,
+    PROTOCOL,
+    WHOLE,
+    Encoding,
+    Message,
+    Picture,
+    Stream,
+    Whole,
+)
+
+__all__ = [
+    "Anticipate",
+    "CharacterMessage",
+    "Feeling",
+    "Hello",
+    "Ping",
+    "SceneMessage",
+    "SetMessage",
+    "StateQuery",
+    "Stop",
+    "Subscribe",
+    "Unsubscribe",
+]
+
+FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
+Side = Annotated[int, Field(ge=16), WHOLE]
+Numbered = Annotated[int, Field(ge=0), WHOLE]
+
+
+class Hello(Message):
+    """Says who is there; asks for `welcome`, and for the feedback after `seen` of a named session.
+
+    Another version is answered by an error with code `version`, which names ours, and by nothing else: the
+    connection goes on as it was.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"type": "hello", "version": 1, "session": "show", "seen": 12}]}
+    )
+
+    type: Literal["hello"]
+    version: Whole = Field(PROTOCOL, description="of the protocol that the client speaks")
+    session: str | None = Field(None, pattern=r"^[A-Za-z0-9._~-]{1,64}$")
+    seen: Numbered | None = Field(None, description="seq of the last feedback that arrived")
+    token: str | None = Field(
+        None, max_length=4096, description="of the service, where it asks for one and none came before"
+    )
+
+
+class Subscribe(Message):
+    """Asks for a stream; answered by `subscribed`. The same stream of the same character is replaced.
+
+    Any number of streams run side by side, of one character also several videos, each with a `view` of its
+    own. Every connection gets all feedback until it asks for some of it.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
+                {
+                    "type": "subscribe",
+                    "stream": "video",
+                    "size": [640, 480],
+                    "format": "webp",
+                    "light": "evening",
+                },
+                {
+                    "type": "subscribe",
+                    "stream": "feedback",
+                    "elements": ["blockProgress"],
+                    "character": "Ada",
+                },
+            ]
+        }
+    )
+
+    type: Literal["subscribe"]
+    stream: Stream
+    encoding: Encoding | None = Field(None, description="None: the stream's first")
+    fps: float | None = Field(None, gt=0, le=MAX_FPS, description="None: the service's own rate")
+    character: str | None = Field(None, max_length=256, description="None: the first")
+    size: tuple[Side, Side] = Field((512, 512), strict=False, description="video: width, height in pixels")
+    camera: str | None = Field(None, max_length=64, description="video: None: the service's own")
+    light: str | None = Field(None, max_length=64, description="video: None: the service's own")
+    background: str | None = Field(
+        None,
+        pattern="^(#[0-9a-fA-F]{6}|transparent)$",
+        description="video: a colour, or of PNG and WebP transparent; None: the service's, or the light's",
+    )
+    format: Picture = Field("jpeg", description="video: what the pictures are")
+    view: str | None = Field(
+        None, max_length=64, description="video: a name; those of different names run side by side"
+    )
+    quality: Whole = Field(85, ge=1, le=100, description="video: of JPEG and WebP")
+    asked: bool = Field(False, description="au: as asked for, before the rules of co-occurrence")
+    elements: list[FeedbackElement] | None = Field(None, description="feedback: which; none named is all")
+    rate: Whole = Field(22050, ge=8000, le=48000, multiple_of=50, description="audio: samples a second")
+
+
+class Unsubscribe(Message):
+    """Ends a stream."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "unsubscribe", "stream": "fap"}]})
+
+    type: Literal["unsubscribe"]
+    stream: Stream
+    character: str | None = Field(None, max_length=256)
+    view: str | None = Field(None, max_length=64, description="of a video that was given one")
+
+
+class Point(Message):
+    """Metres: origin between the eyes, +x the character's left, +y up, +z forward."""
+
+    x: float = Field(ge=-1e4, le=1e4)
+    y: float = Field(ge=-1e4, le=1e4)
+    z: float = Field(ge=-1e4, le=1e4)
+
+
+class SceneMessage(Message):
+    """Declares where targets are; null forgets them.
+
+    Objects come as {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}]
+        }
+    )
+
+    type: Literal["scene"]
+    objects: dict[str, Point] | None = Field(max_length=10_000)
+
+    @field_validator("objects", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        if isinstance(value, list) and all(isinstance(o, dict) and ("id" in o or "name" in o) for o in value):
+            value = {
+                str(o.get("id", o.get("name"))): {k: v for k, v in o.items() if k not in ("id", "name")}
+                for o in value
+            }
+        if isinstance(value, dict):
+            return {
+                name: dict(zip("xyz", point, strict=True))
+                if isinstance(point, list) and len(point) == 3
+                else point
+                for name, point in value.items()
+            }
+        return value
+
+
+class CharacterMessage(Message):
+    """Gives a character its face and its voice."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"type": "character", "id": "Ada", "face": "ada", "voice": "silent"}]}
+    )
+
+    type: Literal["character"]
+    id: str | None = Field(None, min_length=1, max_length=256, description="none: the first")
+    face: str | None = Field(None, max_length=64)
+    voice: str | None = Field(None, max_length=64)
+
+
+class Feeling(Message):
+    """An emotion: its word, its place on the wheel, or its place in the plane of valence and arousal."""
+
+    name: str | None = Field(None, min_length=1, max_length=64, description="a word, such as guilty")
+    angle: float | None = Field(None, description="degrees on the wheel; turns do not count")
+    activation: float | None = Field(None, description="0..7, with an angle; none: the rim's")
+    valence: float | None = Field(None, description="-1..1, with arousal")
+    arousal: float | None = Field(None, description="-1..1")
+    intensity: float = Field(1.0, ge=0, le=1)
+
+
+class SetMessage(Message):
+    """Holds an emotion, AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go, of one or of all.
+
+    The emotion lies below, AUs refine it, FAPs come on top, whatever is sent first (Paul 2010, 7.4): an AU
+    that is set is what it is set to, and so is a FAP, whatever AUs and speech ask of it.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"type": "set", "emotion": {"name": "joy"}, "aus": {"12L": 0.5}, "faps": {"open_jaw": 200}}
+            ]
+        }
+    )
+
+    type: Literal["set"]
+    emotion: Feeling | None = None
+    aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] | None = Field(
+        {}, validation_alias=AliasChoices("aus", "au"), description='"12" or "12L"'
+    )
+    faps: dict[str, Annotated[float, Field(ge=-1e6, le=1e6)] | None] | None = Field(
+        {}, validation_alias=AliasChoices("faps", "fap"), description="name or number"
+    )
+    character: str | None = Field(None, max_length=256)
+
+
+SyncName = Annotated[str, Field(pattern=r"^[^\s:]{1,256}$")]
+
+
+class Anticipate(Message):
+    """Says when points in time are expected that behaviours are tied to, as `anticipators:id:sync`.
+
+    It may be sent again and again while the estimate moves; what has not passed follows.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"type": "anticipate", "id": "clock", "syncs": {"beat": 12.5}}]}
+    )
+
+    type: Literal["anticipate"]
+    id: str = Field(min_length=1, max_length=256, pattern=r"^[^\s:]+$")
+    syncs: dict[SyncName, Annotated[float, Field(ge=0, le=1e9)]] = Field(
+        max_length=1000, description="name -> seconds on the session clock"
+    )
+
+
+class Stop(Message):
+    """Ends blocks gracefully: those named, or all."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "stop", "blocks": ["b"]}]})
+
+    type: Literal["stop"]
+    blocks: list[str] | None = None
+
+
+class StateQuery(Message):
+    """Asks for `state`."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "state"}]})
+
+    type: Literal["state"]
+
+
+class Ping(Message):
+    """Asks for `pong`, which carries the session's time."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"type": "ping", "id": 1}]})
+
+    type: Literal["ping"]
+    id: Whole | str | None = None

@@ -1,0 +1,84 @@
+"""The message `speech`: text piece by piece, or what is said in a sound clip."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import AliasChoices, ConfigDict, Field, field_validator, model_validator
+
+from realizer.protocol.messages.common import Message
+
+__all__ = ["MAX_APPEND", "SpeechMessage", "Timed"]
+
+# Longest text of one `speech` message; a speech may have any number of them.
+MAX_APPEND = 20_000  # characters
+
+
+class Timed(Message):
+    """A word, a phoneme or a viseme of a clip, and when it is said."""
+
+    start: float = Field(ge=0, le=1e5, description="seconds from the start of the clip")
+    end: float | None = Field(None, ge=0, le=1e5, description="none: up to the next one")
+    text: str = Field(
+        max_length=256,
+        validation_alias=AliasChoices("text", "word", "ipa", "phoneme", "viseme"),
+        description='the word, the IPA, or the viseme\'s name in its set; a phoneme "" is a pause',
+    )
+
+    @field_validator("text", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+class SpeechMessage(Message):
+    """Says something piece by piece, as text or clips come; or, without `id`, tells what is in a clip.
+
+    Text may have <sync id="m"/>, SSML and behaviours in it; a sentence is spoken when it is whole. The speech
+    is block `id`, from its first sound to its last; its pieces are the blocks `id.1`, `id.2`, ..., each with
+    the behaviour `id`, whose syncs are those of the text: documents name them `id:id:m`, before and after
+    they have come. Without `close` the block goes on for ever.
+
+    A clip comes as binary messages, little-endian: u8 kind 4, u8 version 1, u16 flags (0x200: the last
+    piece), u32 number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a WAV,
+    FLAC, Ogg, MP3 or WebM file), u8 length of the id, the id, sound. Documents name it as a file: `clip:ID`.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"type": "speech", "id": "turn", "append": 'Hello <sync id="m"/>there. '},
+                {"type": "speech", "id": "turn", "close": True},
+                {"type": "speech", "clip": "c", "words": [{"start": 0.1, "end": 0.4, "text": "Hello"}]},
+            ]
+        }
+    )
+
+    type: Literal["speech"]
+    id: str | None = Field(None, pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")
+    append: str | None = Field(None, max_length=MAX_APPEND, description="text, with what may be in it")
+    close: bool = Field(False, description="nothing follows: what is left is said, then the block ends")
+    composition: Literal["MERGE", "APPEND", "REPLACE"] = Field(
+        "APPEND", description="of the block, with its first message"
+    )
+    character: str | None = Field(None, max_length=256, description="with its first message")
+    language: str | None = Field(None, max_length=64, description="BCP-47 of the text; none: the service's")
+    clip: str | None = Field(None, min_length=1, max_length=64, description="of which the rest tells")
+    text: str | None = Field(None, max_length=MAX_APPEND, description="plain: what is said in the clip")
+    words: list[Timed] = Field([], max_length=MAX_APPEND)
+    phonemes: list[Timed] = Field([], max_length=MAX_APPEND, description="in IPA")
+    visemes: list[Timed] = Field([], max_length=MAX_APPEND, description="instead of phonemes")
+    viseme_set: str = Field("oculus", max_length=64, description="of visemes: mpeg4, oculus, sapi or polly")
+    final: bool = Field(True, description="all of the clip's times are told")
+
+    @model_validator(mode="after")
+    def _whole(self) -> SpeechMessage:
+        if self.id is None and self.clip is None:
+            raise ValueError("wanted the id of a speech, or a clip")
+        if self.id is None and (self.append is not None or self.close):
+            raise ValueError("wanted the id of the speech that is appended to or closed")
+        if self.clip is None and (self.text is not None or self.words or self.phonemes or self.visemes):
+            raise ValueError("wanted the clip that this is said in")
+        if self.phonemes and self.visemes:
+            raise ValueError("wanted phonemes or visemes, got both")
+        return self

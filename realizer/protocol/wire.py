@@ -1,0 +1,235 @@
+"""Frames to bytes and back: the binary header and payloads of the streams, and their JSON form."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from realizer.core.arrays import Float32, Float64, Int16, Int32
+from realizer.core.errors import RealizerError
+
+__all__ = [
+    "FINAL",
+    "FORGET",
+    "PAYLOADS",
+    "VERSION",
+    "ClipPiece",
+    "FrameKind",
+    "WireError",
+    "WireFrame",
+    "json_frame",
+    "pack",
+    "pack_clip",
+    "pack_frames",
+    "unpack",
+    "unpack_clip",
+]
+
+VERSION = 1
+# u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
+# for a Float32Array or an Int32Array over the message.
+HEADER = struct.Struct("<BBHId")
+# On a sound packet: forget every sample from this packet's time on; what follows replaces it.
+FORGET = 0x100
+# On a piece of a sound clip that comes in: it is the last one.
+FINAL = 0x200
+# Behind the header of such a piece: u32 rate, u8 length of the id, the id (UTF-8), then sound.
+CLIP = struct.Struct("<IB")
+
+
+class WireError(RealizerError):
+    """A binary message that is no frame of ours; the text says what was wanted and what came."""
+
+
+class FrameKind(IntEnum):
+    """The first byte of a binary message."""
+
+    FAP = 1
+    AU = 2
+    PICTURE = 3
+    SOUND = 4
+    MESH = 5
+    ARKIT = 6
+
+
+# kind -> stream, and what follows the header.
+PAYLOADS: Mapping[FrameKind, tuple[str, str]] = {
+    FrameKind.FAP: ("fap", "68 int32 in FAPU, column = FAP - 1"),
+    FrameKind.AU: ("au", "float32, 0..1, as `names` of `subscribed` has them"),
+    FrameKind.PICTURE: ("video", "a JPEG, PNG or WebP file"),
+    FrameKind.SOUND: ("audio", "20 ms of mono int16 PCM, at most 100 ms ahead; none in silence"),
+    FrameKind.MESH: ("mesh", "three int16 a vertex; metres = int16 x `scale` + `offset` of `subscribed`"),
+    FrameKind.ARKIT: (
+        "arkit",
+        "59 float32: ARKit's 52 weights, 0..1, then turns of head and eyes in radians",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class WireFrame:
+    """One binary message taken apart.
+
+    Attributes:
+        character: the index that `subscribed` told.
+        told: what `subscribed`, or `changed` since, told of its stream, where a client has put it here.
+    """
+
+    kind: FrameKind
+    frame: int
+    time: float
+    payload: bytes
+    character: int = 0
+    forget: bool = False
+    told: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def values(self) -> Int32 | Float32 | Int16:
+        """The payload as numbers: (68,) int32, (n,) or (59,) float32, (samples,) int16 or (n, 3) int16.
+
+        Raises:
+            WireError: a picture has none.
+        """
+        match self.kind:
+            case FrameKind.FAP:
+                return np.frombuffer(self.payload, "<i4")
+            case FrameKind.AU | FrameKind.ARKIT:
+                return np.frombuffer(self.payload, "<f4")
+            case FrameKind.SOUND:
+                return np.frombuffer(self.payload, "<i2")
+            case FrameKind.MESH:
+                return np.frombuffer(self.payload, "<i2").reshape(-1, 3)
+        raise WireError("a picture has no values: wanted a frame of numbers")
+
+    @property
+    def vertices(self) -> Float32:
+        """(n, 3) float32, metres.
+
+        Raises:
+            WireError: it is no mesh, or nobody has told its scale.
+        """
+        if self.kind is not FrameKind.MESH or self.told is None:
+            raise WireError(f"wanted a mesh whose stream was told of, got {self.kind.name}")
+        scale, offset = self.told["scale"], self.told["offset"]
+        return (self.values * np.float32(scale) + np.array(offset, np.float32)).astype(np.float32)
+
+
+def pack(
+    kind: FrameKind,
+    frame: int,
+    time: float,
+    payload: bytes,
+    *,
+    character: int = 0,
+    forget: bool = False,
+) -> bytes:
+    """One binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
+    return HEADER.pack(kind, VERSION, (character & 0xFF) | (FORGET if forget else 0), frame, time) + payload
+
+
+def pack_frames(
+    kind: FrameKind, first: int, times: Float64, rows: Int32 | Float32, *, character: int = 0
+) -> tuple[bytes, int]:
+    """What `pack` says of each of many frames, one behind the other, and the length of one.
+
+    Args:
+        first: number of the first; the others follow it.
+        times: (n,) seconds.
+        rows: (n, k) their payloads.
+    """
+    whole = np.empty(
+        len(rows),
+        [
+            ("kind", "u1"),
+            ("version", "u1"),
+            ("flags", "<u2"),
+            ("frame", "<u4"),
+            ("time", "<f8"),
+            ("payload", rows.dtype.newbyteorder("<"), rows.shape[1:]),
+        ],
+    )
+    whole["kind"], whole["version"], whole["flags"] = kind, VERSION, character & 0xFF
+    whole["frame"] = np.arange(first, first + len(rows))
+    whole["time"], whole["payload"] = times, rows
+    return whole.tobytes(), whole.dtype.itemsize
+
+
+def unpack(message: bytes) -> WireFrame:
+    """A binary message taken apart.
+
+    Raises:
+        WireError: too short, another version, or a kind that is not known.
+    """
+    if len(message) < HEADER.size:
+        raise WireError(f"wanted a header of {HEADER.size} bytes, got {len(message)} bytes")
+    kind, version, flags, frame, time = HEADER.unpack_from(message)
+    if version != VERSION:
+        raise WireError(f"wanted version {VERSION} of the frame header, got {version}")
+    if kind not in FrameKind.__members__.values():
+        raise WireError(f"wanted a kind in {[int(k) for k in FrameKind]}, got {kind}")
+    return WireFrame(FrameKind(kind), frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FORGET))
+
+
+@dataclass(frozen=True, slots=True)
+class ClipPiece:
+    """A piece of a sound clip that a client sends: kind 4, as sound that goes out.
+
+    Attributes:
+        id: of the clip.
+        number: 0, 1, 2, ...: the header's `frame`; a 0 begins the clip anew.
+        rate: Hz of raw mono int16 PCM; 0 where the pieces together are a sound file.
+        sound: the bytes.
+        final: it is the last one.
+    """
+
+    id: str
+    number: int
+    rate: int
+    sound: bytes
+    final: bool = True
+
+
+def pack_clip(piece: ClipPiece) -> bytes:
+    """One binary message; the header's time is 0 and not looked at."""
+    flags, id = FINAL if piece.final else 0, piece.id.encode()
+    head = HEADER.pack(FrameKind.SOUND, VERSION, flags, piece.number, 0.0)
+    return head + CLIP.pack(piece.rate, len(id)) + id + piece.sound
+
+
+def unpack_clip(message: bytes) -> ClipPiece:
+    """A binary message from a client taken apart.
+
+    Raises:
+        WireError: it is no piece of a sound clip.
+    """
+    frame = unpack(message)
+    if frame.kind is not FrameKind.SOUND:
+        raise WireError(f"wanted a sound clip (kind {FrameKind.SOUND:d}), got kind {frame.kind:d}")
+    if len(frame.payload) < CLIP.size:
+        raise WireError(f"wanted a rate and an id behind the header, got {len(frame.payload)} bytes")
+    rate, length = CLIP.unpack_from(frame.payload)
+    id, sound = frame.payload[CLIP.size : CLIP.size + length], frame.payload[CLIP.size + length :]
+    if not 0 < length == len(id):
+        raise WireError(f"wanted an id of {max(1, length)} bytes, got {len(id)}")
+    try:
+        name = id.decode()
+    except UnicodeDecodeError:
+        raise WireError(f"wanted an id in UTF-8, got {id!r}") from None
+    final = bool(struct.unpack_from("<H", message, 2)[0] & FINAL)
+    return ClipPiece(name, frame.frame, rate, sound, final)
+
+
+def json_frame(
+    stream: str, frame: int, time: float, values: list[int] | list[float], character: str | None = None
+) -> str:
+    """One frame as a text message, such as `{"type":"fap","frame":3,"time":0.12,"values":[...]}`."""
+    message = {"type": stream, "frame": frame, "time": round(time, 6), "values": values}
+    if character is not None:
+        message["character"] = character
+    return json.dumps(message, separators=(",", ":"))

@@ -1,0 +1,3 @@
+"""Documents between their arrival and their planning."""
+
+__all__: list[str] = []

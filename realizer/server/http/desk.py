@@ -1,0 +1,144 @@
+"""What the page's tools ask of the service: faults of a text, the face of a feeling, a pose as a FAP file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
+
+if TYPE_CHECKING:
+    from realizer.checking import Finding
+
+__all__ = ["DeskError", "faults", "feeling", "pose"]
+
+# A text of this length is checked in a tenth of a second; longer ones have `realizer check`.
+MOST_TEXT = 50_000  # characters
+MOST_FINDINGS = 100
+# By then whatever was set has settled; 25 frames a second.
+SETTLED = 10.0  # s
+FPS = 25.0
+
+
+class DeskError(RealizerError):
+    """What was asked cannot be answered; the text says what was wanted."""
+
+
+def faults(text: str, settings: Settings) -> str:
+    """Faults and advice of BML as JSON: {"faults": [{type, id, text, notes, spots}]}.
+
+    A spot is {line, column, length, text, primary}, from 1, in characters; the first primary one is where the
+    fault is. Faults are what `realizer check` tells, advice has the type "ADVICE".
+    """
+    from bml_schema.source import Source
+    from realizer.checking import advice, checked
+    from realizer.playback.player import Player
+
+    if len(text) > MOST_TEXT:
+        said = f"wanted at most {MOST_TEXT} characters, got {len(text)}: `realizer check` reads more"
+        return json.dumps({"faults": [], "skipped": said})
+    source = Source(text)
+    found: list[Finding] = []
+    player = Player(idle=False, media=settings.media, expressions=settings.expressions)
+    for part in checked("document", source, text, player):
+        found += part.findings
+        if part.block is not None and part.schedule is not None:
+            found += islice(advice("document", source, part.block, part.schedule, player), MOST_FINDINGS)
+    return json.dumps({"faults": [_told(finding) for finding in found[:MOST_FINDINGS]]}, ensure_ascii=False)
+
+
+def _told(finding: Finding) -> dict[str, Any]:
+    spots = [
+        {**label.spot._asdict(), "text": label.text, "primary": label.primary} for label in finding.labels
+    ]
+    return {
+        "type": finding.type,
+        "id": finding.id,
+        "text": finding.head,
+        "notes": list(finding.notes),
+        "spots": spots,
+    }
+
+
+def feeling(asked: str) -> str:
+    """A place on the wheel, or a profile, as what it moves.
+
+    Args:
+        asked: JSON with the fields of <emotion>: angle and activation, or name; profile.
+
+    Returns:
+        JSON {"values": {"12L": 0..1, or a FAP's name: in its FAPU}, "shares": {archetype: 0..1}}.
+
+    Raises:
+        DeskError: not a feeling.
+    """
+    from bml_schema import Emotion
+    from realizer.behaviours import emotion
+    from realizer.behaviours.kind import World
+    from realizer.emotions.wheel import shares
+
+    fields = {k: v for k, v in _object(asked).items() if k in ("name", "angle", "activation", "profile")}
+    node = Emotion(id="asked", **fields)
+    try:
+        wrong = node.fault() or next((fault.text for fault in emotion.check(node, World())), "")
+        if wrong:
+            raise DeskError(wrong)
+        values = emotion.values_of(node)
+        mixed = shares(node.angle, node.profile or "own") if node.angle is not None else {}
+    except (TypeError, ValueError) as error:
+        raise DeskError(f"feeling: {error}") from None
+    return json.dumps(
+        {
+            "values": {target.name: round(float(value), 4) for target, value in values.items()},
+            "shares": {name: round(share, 4) for name, share in mixed.items()},
+        }
+    )
+
+
+def pose(asked: str, face: str | None, settings: Settings) -> str:
+    """The face that a `set` message holds, as a FAP file of one frame.
+
+    Args:
+        asked: the message; face: whose mapping of AUs to FAPs holds, None the service's.
+
+    Raises:
+        DeskError: not a `set` message, or no such face.
+    """
+    import numpy as np
+
+    from realizer.animation.fap.fap_clip import FAPClip
+    from realizer.outputs.fap_text import encode
+    from realizer.server.session.session import Session
+
+    if _object(asked).get("type") != "set":
+        raise DeskError("wanted a message of the type set")
+    # The session itself answers, so that the file holds what the page shows, less what moves by itself.
+    session = Session("pose", replace(settings, idle=False), 0.0)
+    session.connect(1, 0.0)
+    if face is not None:
+        session.receive(1, json.dumps({"type": "character", "face": face}), 0.0)
+    session.receive(1, asked, 0.0)
+    for effect in session.outgoing():
+        data = getattr(effect, "data", None)
+        if isinstance(data, str) and data.startswith("{"):
+            told = json.loads(data)
+            if told["type"] == "error":
+                raise DeskError(f"{told.get('where', 'set')}: {told['message']}")
+    timeline = session.broadcast.timeline(0, FPS)
+    frame = round(SETTLED * FPS)
+    frames = timeline.window(frame, frame).faps
+    clip = FAPClip.of(replace(frames, times=np.zeros(1), values=frames.values[:1]), FPS, "pose")
+    return encode(clip)
+
+
+def _object(text: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise DeskError(f"wanted a JSON object: {error}") from None
+    if not isinstance(found, dict):
+        raise DeskError(f"wanted a JSON object, got {type(found).__name__}")
+    return found

@@ -1,0 +1,121 @@
+"""A JSON Web Token (RFC 7519) in, what its bearer may do out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from realizer.core.errors import RealizerError
+
+__all__ = ["Pass", "PassError", "Passes"]
+
+LEEWAY = 10.0  # s; clocks of machines differ
+BITS = 2048  # of RSA; shorter keys are broken
+# Elliptic curve -> the one algorithm that signs with it (RFC 7518, 3.4).
+CURVES = {"secp256r1": "ES256", "secp384r1": "ES384", "secp521r1": "ES512"}
+
+
+class PassError(RealizerError):
+    """A token that lets nobody in; the text says why, and nothing of what is in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """What somebody may do who has come in.
+
+    Attributes:
+        sessions: those it may be in; None: any.
+        until: POSIX seconds; None: for ever.
+    """
+
+    sessions: frozenset[str] | None = None
+    until: float | None = None
+
+    @property
+    def left(self) -> float | None:
+        """Seconds until it ends; None where it does not."""
+        return None if self.until is None else max(0.0, self.until + LEEWAY - time.time())
+
+
+class Passes:
+    """Reads tokens that are signed with one key, by the algorithm of that key and no other.
+
+    Args:
+        key: a public key in PEM (RSA, an elliptic curve, Ed25519), or a secret (HS256).
+        audience: who they must be for; None: they must name nobody.
+
+    Raises:
+        RealizerError: no such key, or PyJWT is not installed.
+    """
+
+    def __init__(self, key: str, audience: str | None = None) -> None:
+        try:
+            import jwt
+        except ImportError:
+            raise _missing() from None
+        self._jwt = jwt
+        self._audience = audience
+        read: tuple[Any, Sequence[str]] = _public(key) if "-----BEGIN" in key else (key, ["HS256"])
+        self._key, self._algorithms = read
+
+    def read(self, token: str) -> Pass:
+        """What a token lets its bearer do.
+
+        Raises:
+            PassError: nothing.
+        """
+        jwt = self._jwt
+        try:
+            claims = jwt.decode(
+                token, self._key, algorithms=self._algorithms, audience=self._audience, leeway=LEEWAY
+            )
+            until = claims.get("exp")
+            return Pass(_sessions(claims), None if until is None else float(until))
+        except jwt.ExpiredSignatureError:
+            raise PassError("one that has expired") from None
+        except (jwt.ImmatureSignatureError, jwt.InvalidIssuedAtError):
+            raise PassError("one that is not valid yet") from None
+        except (jwt.InvalidAudienceError, jwt.MissingRequiredClaimError):
+            raise PassError("one for somebody else (REALIZER_JWT_AUDIENCE)") from None
+        except (jwt.InvalidSignatureError, jwt.InvalidAlgorithmError):
+            raise PassError("one that is not signed with it") from None
+        except (jwt.InvalidTokenError, ValueError, TypeError, OverflowError):
+            raise PassError("another one") from None
+
+
+def _sessions(claims: dict[str, Any]) -> frozenset[str] | None:
+    """What the claim `session` binds a token to: a name, or several."""
+    if "session" not in claims:
+        return None
+    named = claims["session"]
+    names = [named] if isinstance(named, str) else named
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise PassError("one whose claim session is no name, and no list of names")
+    return frozenset(names)
+
+
+def _public(text: str) -> tuple[Any, Sequence[str]]:
+    """A public key, and the algorithms that may sign with it."""
+    try:
+        from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
+        from cryptography.hazmat.primitives.serialization import load_pem_public_key
+    except ImportError:
+        raise _missing() from None
+    try:
+        key = load_pem_public_key(text.encode())
+    except ValueError:
+        key = None
+    if isinstance(key, rsa.RSAPublicKey) and key.key_size >= BITS:
+        return key, ["RS256", "RS384", "RS512"]
+    if isinstance(key, ec.EllipticCurvePublicKey) and key.curve.name in CURVES:
+        return key, [CURVES[key.curve.name]]
+    if isinstance(key, ed25519.Ed25519PublicKey):
+        return key, ["EdDSA"]
+    wanted = f"of RSA ({BITS} bits or more), of an elliptic curve ({', '.join(CURVES)}) or of Ed25519"
+    raise RealizerError(f"setting jwt_key: wanted a public key in PEM (BEGIN PUBLIC KEY), {wanted}")
+
+
+def _missing() -> RealizerError:
+    return RealizerError("--jwt-key needs PyJWT: pip install 'bml-realizer[jwt]'")

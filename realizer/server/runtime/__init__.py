@@ -1,0 +1,3 @@
+"""Sessions inside event loops and processes."""
+
+__all__: list[str] = []

@@ -1,0 +1,3 @@
+"""Frames, sound, pictures and schedules for subscribers."""
+
+__all__: list[str] = []

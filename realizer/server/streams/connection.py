@@ -1,0 +1,126 @@
+"""What a session keeps of one connection: its streams, its place in the feedback log, how far it lags."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from bml_schema import parse_feedback
+from realizer.server.session.effects import Look
+from realizer.server.streams.sound import Sound
+from realizer.server.streams.streams import Timeline
+
+__all__: list[str] = []
+
+# Bytes that wait to be sent above which a connection loses frames: two thirds of a second of a mesh.
+SLOW = 512 * 1024
+# And above which it has stopped reading: it is closed, and can come back with `seen`.
+STUCK = 32 * 2**20
+
+
+@dataclass(eq=False)
+class FrameSubscription:
+    """fap, au or mesh frames: `next` is the frame to send; `asked`: AUs before the rules of co-occurrence."""
+
+    stream: str
+    encoding: str
+    timeline: Timeline
+    index: int
+    name: str | None
+    next: int
+    asked: bool = False
+
+
+@dataclass(eq=False)
+class SoundSubscription:
+    """Sound packets: `next` is the one to send, `sent` the last few that went out."""
+
+    sound: Sound
+    index: int
+    next: int
+    revision: int
+    sent: deque[tuple[int, bytes | None]] = field(default_factory=lambda: deque(maxlen=8))
+
+
+@dataclass(eq=False)
+class View:
+    """A picture that is drawn once for everybody who looks at it; `busy` while it is being drawn."""
+
+    timeline: Timeline
+    index: int
+    face: str
+    look: Look
+    next: int
+    busy: int | None = None
+    drawing: int = 0  # the frame that is being drawn
+    begun: float = 0.0
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What two subscriptions must share to see the same picture."""
+        return (self.index, self.timeline.fps, self.face, self.look)
+
+
+@dataclass(eq=False)
+class PictureSubscription:
+    """Pictures of a view; `next` is the oldest frame that is still of use, `index` what tells them apart."""
+
+    view: View
+    next: int
+    index: int
+
+
+@dataclass(eq=False)
+class PlanSubscription:
+    """What blocks are planned as: `behind` until it has been sent all of them, `again` when to try that."""
+
+    index: int | None  # of the character; None: all
+    name: str | None
+    behind: bool = True
+    again: float = 0.0
+
+
+Subscription = FrameSubscription | SoundSubscription | PictureSubscription | PlanSubscription
+
+
+@dataclass(frozen=True)
+class FeedbackFilter:
+    """Which feedback a connection gets; the numbers of what it does not get are missing in what it gets.
+
+    Attributes:
+        elements: names of feedback elements; None takes all.
+        character: of whom; None takes all. What is of no character comes always.
+    """
+
+    elements: frozenset[str] | None = None
+    character: str | None = None
+
+    def takes(self, text: str) -> bool:
+        """Whether a message is to be sent."""
+        if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
+            return False
+        return self.character is None or parse_feedback(text).character_id in (None, self.character)
+
+
+@dataclass(eq=False)
+class Connection:
+    """One client of a session.
+
+    Attributes:
+        place: seq of the next feedback to send.
+        feedback: which of it; None for none.
+        backlog: bytes that wait to be sent, as the shell told.
+        dropped: frames, pictures and sound packets it did not get because it was slow.
+        subscriptions: (stream, character, view) -> what it gets.
+    """
+
+    id: int
+    place: int
+    feedback: FeedbackFilter | None = FeedbackFilter()
+    backlog: int = 0
+    dropped: int = 0
+    subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
+
+    @property
+    def slow(self) -> bool:
+        return self.backlog > SLOW

@@ -1,0 +1,108 @@
+"""A TCP port in, a conversation for each client that comes out, until the door closes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import socket
+from collections import Counter
+from collections.abc import Awaitable, Callable
+
+from realizer.core.settings import raises
+
+__all__ = ["Listener", "session_of"]
+
+log = logging.getLogger(__name__)
+
+LONGEST_NAME = 64  # characters of a session's name
+
+
+def session_of(door: str, host: str) -> str:
+    """The name of the session that the clients of an address share."""
+    return (f"{door}-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host))[:LONGEST_NAME]
+
+
+class Listener:
+    """Listens on a host and a port; `port` is the one that is open after `start`.
+
+    Args:
+        name: of the door, for the log.
+        talk: (address, reader, writer) -> serves one client to its end.
+        most: connections that may be open from one address.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        host: str,
+        port: int,
+        talk: Callable[[str, asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
+        most: int,
+    ) -> None:
+        self.port = port
+        self._name = name
+        self._host = host
+        self._talk = talk
+        self._most = most
+        self._from: Counter[str] = Counter()  # address -> connections that are open
+        self._server: asyncio.Server | None = None
+        self._clients: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
+
+    def __len__(self) -> int:
+        """How many clients are connected."""
+        return len(self._clients)
+
+    @property
+    def where(self) -> str:
+        """HOST:PORT."""
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return f"{host}:{self.port}"
+
+    async def start(self) -> None:
+        """Open.
+
+        Raises:
+            OSError: the address cannot be had.
+        """
+        self._server = await asyncio.start_server(self._serve, self._host, self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    def shut(self) -> None:
+        """Take no new clients."""
+        if self._server is not None:
+            self._server.close()
+
+    async def close(self) -> None:
+        """Let everybody go."""
+        self.shut()
+        for writer in self._clients.values():
+            writer.transport.abort()
+        await asyncio.gather(*self._clients, return_exceptions=True)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One client, from its opening to its end."""
+        task = asyncio.current_task()
+        assert task is not None
+        self._clients[task] = writer
+        peer = writer.get_extra_info("peername")
+        host = "" if peer is None else peer[0].removeprefix("::ffff:")
+        self._from[host] += 1
+        try:
+            if self._from[host] > self._most:
+                words = f"{self._most} connections from it are open: wanted fewer {raises('max_connections')}"
+                log.warning("%s: %s is not let in: %s", self._name, host, words)
+            elif peer is not None:  # otherwise it has gone again
+                # Nobody says good-bye, least of all a machine that loses its power.
+                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+                await self._talk(host, reader, writer)
+        except OSError:
+            pass  # it is gone
+        except Exception:
+            log.exception("%s: %s is let go of: its connection failed", self._name, host)
+        finally:
+            writer.transport.abort()
+            self._from[host] -= 1
+            if not self._from[host]:
+                del self._from[host]
+            del self._clients[task]

@@ -1,0 +1,265 @@
+"""The STOMP door: we are a client of somebody's message broker and talk all dialects there at once."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from bml_schema import WarningFeedback
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings, raises
+from realizer.server.http.guard import Pace
+from realizer.server.runtime.hub import HubError
+from realizer.server.runtime.shell import Shell
+from realizer.server.transports.broker import Link, check_installed
+from realizer.server.transports.dialect import Dialect, Leave, Message, ToSession
+from realizer.server.transports.dialects import DIALECTS
+
+__all__ = ["StompDoor"]
+
+log = logging.getLogger(__name__)
+
+FIRST_RETRY = 0.2  # s
+LAST_RETRY = 10.0  # s
+ATTEMPT = 5.0  # s; to connect, and to part
+# Messages that wait for the broker; of more the oldest go.
+KEPT = 4 * 2**20  # characters
+
+
+class StompDoor:
+    """A client of the broker at `settings.stomp` that comes back whenever the broker does.
+
+    Each dialect has a session of its own, by its name in DIALECTS, made when the first message comes and kept
+    while the broker is away. What is said meanwhile is said when it is back.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings) -> None:
+        assert settings.stomp is not None
+        host, _, port = settings.stomp.rpartition(":")
+        self._address = (host.strip("[]"), int(port))
+        self._shell = shell
+        self._settings = settings
+        made = {name: make(settings) for name, make in DIALECTS.items()}
+        self._seats = [_Seat(self, name, dialect) for name, dialect in made.items() if dialect is not None]
+        self._pace = Pace(settings.max_rate)
+        self._thread = ThreadPoolExecutor(1, "stomp")
+        self._link: Link | None = None
+        self._out: deque[Message] = deque()
+        self._size = 0  # characters in _out
+        self._news = asyncio.Event()
+        self._up = asyncio.Event()
+        self._keeper: asyncio.Task[None] | None = None
+        self._leaving: asyncio.Task[None] | None = None
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        names = ", ".join(f"{seat.dialect.topic} in session {seat.name}" for seat in self._seats)
+        return (f"stomp: {self._settings.stomp} reads {names}",)
+
+    async def start(self) -> None:
+        check_installed()
+        self._loop = asyncio.get_running_loop()
+        self._keeper = asyncio.create_task(self._keep())
+
+    async def ready(self) -> None:
+        await self._up.wait()
+
+    def shut(self) -> None:
+        """Sessions refuse what comes from now on, with words; so messages are still read."""
+
+    async def close(self) -> None:
+        if self._leaving is None:
+            self._leaving = asyncio.create_task(self._leave())
+        await self._leaving
+
+    async def _leave(self) -> None:
+        """Say good-bye where somebody listens, and part."""
+        for seat in self._seats:
+            seat.leave()
+        if self._link is not None:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(ATTEMPT):
+                    while self._out and self._link is not None:
+                        await asyncio.sleep(0.01)
+        if self._keeper is not None:
+            self._keeper.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._keeper
+        self._thread.shutdown(wait=False)
+
+    # what comes and goes ------------------------------------------------------------------------
+
+    def put(self, message: Message) -> None:
+        """Send it, when the broker is there."""
+        self._out.append(message)
+        self._size += len(message.body)
+        while self._size > KEPT:
+            self._size -= len(self._out.popleft().body)
+        self._news.set()
+
+    @property
+    def waiting(self) -> int:
+        return self._size
+
+    def _take(self, link: Link, seat: int, body: bytes) -> None:
+        """A message has come in; in the event loop. The next one is read when it may be."""
+        pause = self._pace.wait(self._loop.time())
+        if self._pace.news is not None:
+            log.warning("stomp: %s", self._pace.news)
+        if pause:
+            self._loop.call_later(pause, link.handled)
+        else:
+            link.handled()
+        if link is not self._link or self._leaving is not None:
+            return
+        if len(body) > self._settings.max_message:
+            words = f"wanted at most {self._settings.max_message} bytes in a message, got {len(body)}"
+            log.warning("stomp: %s: %s", self._seats[seat].name, words)
+            refusal = WarningFeedback(
+                id="<no id>", type="PARSING_FAILURE", text=f"{words} {raises('max_message')}"
+            )
+            self._seats[seat].send(refusal.to_xml())
+            return
+        for action in self._seats[seat].dialect.incoming(body):
+            match action:
+                case Message():
+                    self.put(action)
+                case ToSession(text):
+                    self._seats[seat].receive(text)
+                case Leave():
+                    log.warning("stomp: vrKillComponent: the door closes")
+                    self._leaving = asyncio.create_task(self._leave())
+                    return
+
+    # the connection -----------------------------------------------------------------------------
+
+    async def _keep(self) -> None:
+        """Be connected, until cancelled."""
+        pause = FIRST_RETRY
+        told = False
+        while True:
+            link = Link(self._loop, self._take, ATTEMPT)
+            try:
+                await self._connect(link)
+                log.log(
+                    logging.WARNING if told else logging.INFO, "stomp: connected to %s", self._settings.stomp
+                )
+                pause, told = FIRST_RETRY, False
+                await self._talk(link)
+                words = "the broker at %s is gone%s; looking for it"
+            except (OSError, RealizerError) as error:
+                link.fault = link.fault or str(error)
+                words = "no broker at %s%s; looking for it"
+            finally:
+                self._link = None
+                await asyncio.shield(self._part(link))
+            if not told:
+                log.warning("stomp: " + words, self._settings.stomp, link.fault and f" ({link.fault})")
+                told = True
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LAST_RETRY)
+
+    async def _connect(self, link: Link) -> None:
+        settings = self._settings
+        async with asyncio.timeout(ATTEMPT):
+            await self._call(
+                link.connect,
+                self._address,
+                settings.stomp_host,
+                settings.stomp_login,
+                settings.stomp_password,
+            )
+            await link.settled.wait()
+            if link.connected:
+                await self._call(link.subscribe, [seat.dialect.topic for seat in self._seats])
+                await link.reading.wait()
+        if not link.connected or link.lost.is_set():
+            raise RealizerError(link.fault or "it closes the connection")
+        self._link = link
+        for seat in self._seats:
+            for message in reversed(seat.dialect.hello()):
+                self._out.appendleft(message)
+                self._size += len(message.body)
+        self._news.set()
+        self._up.set()
+
+    async def _talk(self, link: Link) -> None:
+        """Send what there is to send, until the connection is lost."""
+        lost = asyncio.create_task(link.lost.wait())
+        try:
+            while not lost.done():
+                news = asyncio.create_task(self._news.wait())
+                await asyncio.wait((news, lost), return_when=asyncio.FIRST_COMPLETED)
+                news.cancel()
+                self._news.clear()
+                while self._out and not lost.done():
+                    message = self._out[0]
+                    try:
+                        await self._call(link.send, message)
+                    except (OSError, RealizerError):
+                        return  # it is said again to the next connection
+                    if self._out and self._out[0] is message:
+                        self._out.popleft()
+                        self._size -= len(message.body)
+        finally:
+            lost.cancel()
+
+    async def _part(self, link: Link) -> None:
+        with contextlib.suppress(OSError, RealizerError):
+            async with asyncio.timeout(ATTEMPT):
+                if link.connected and not link.lost.is_set():
+                    await self._call(link.disconnect)
+                    await link.lost.wait()
+        link.drop()
+
+    async def _call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Something that blocks, in the door's own thread, one after the other."""
+        await self._loop.run_in_executor(self._thread, function, *arguments)
+
+
+class _Seat:
+    """One dialect's connection to its session; a Client."""
+
+    def __init__(self, door: StompDoor, name: str, dialect: Dialect) -> None:
+        self.name = name
+        self.dialect = dialect
+        self._door = door
+        self._number: int | None = None
+
+    def receive(self, text: str) -> None:
+        """To the session, which is made where there is none."""
+        shell = self._door._shell
+        try:
+            if self._number is None:
+                self._number = shell.join(self, self.name)
+            if not shell.receive(self._number, text):
+                shell.leave(self._number)
+                self._number = shell.join(self, self.name)
+                shell.receive(self._number, text)
+        except HubError as error:
+            log.warning("stomp: %s: %s", self.name, error)
+
+    @property
+    def waiting(self) -> int:
+        return self._door.waiting
+
+    def send(self, data: str | bytes) -> None:
+        if isinstance(data, str) and data.startswith("<"):
+            for message in self.dialect.outgoing(data):
+                self._door.put(message)
+
+    def end(self, code: int, reason: str) -> None:
+        log.warning("stomp: session %s ends: %s", self.name, reason)
+        self.leave()
+
+    def leave(self) -> None:
+        for message in self.dialect.farewell():
+            self._door.put(message)
+        if self._number is not None:
+            self._door._shell.leave(self._number)
+            self._number = None

@@ -1,0 +1,3 @@
+"""The espeak-ng voice, whose engine runs in a process of its own."""
+
+__all__: list[str] = []

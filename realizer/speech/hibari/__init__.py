@@ -1,0 +1,3 @@
+"""The hibari voice, whose model runs in a process of its own."""
+
+__all__: list[str] = []

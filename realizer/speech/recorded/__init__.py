@@ -1,0 +1,3 @@
+"""Speech from recordings and clips."""
+
+__all__: list[str] = []

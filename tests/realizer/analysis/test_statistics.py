@@ -1,0 +1,57 @@
+"""Profiles from statistics and from observed faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.analysis.statistics import from_faces, from_statistics, published_statistics
+from realizer.emotions.archetypes import archetypes
+
+
+@pytest.mark.parametrize(("profiles", "raw"), [("raw", True), ("published", False)])
+@pytest.mark.parametrize("emotion", ["anger", "sadness", "joy", "disgust", "fear", "surprise"])
+def test_the_statistics_give_the_first_published_profile(emotion: str, profiles: str, raw: bool) -> None:
+    made = from_statistics(emotion, published_statistics(emotion, raw))
+    printed = archetypes(profiles)[emotion][0]
+    assert made.ranges.keys() == printed.ranges.keys()
+    for fap, ends in printed.ranges.items():
+        # Anger's F31 and disgust's F33 and F34 are misprinted by 10.
+        assert made.ranges[fap] == pytest.approx(ends, abs=10 if raw else 2), fap
+
+
+def test_a_fap_of_one_direction_keeps_to_it() -> None:
+    made = from_statistics("sigh", {3: (100, 150), 41: (-10, 5), 4: (100, 150)})
+    assert dict(made.ranges) == {3: (0, 250), 4: (-50, 250), 41: (0, 0)}
+
+
+def test_faces_that_were_drawn_from_a_profile_give_ranges_within_it() -> None:
+    joy = archetypes("own")["joy"][0]
+    chance = np.random.default_rng(0)
+    made = from_faces("joy", np.stack([joy.draw(chance) for _ in range(400)]))
+    assert made.ranges.keys() == joy.ranges.keys()
+    for fap, (low, high) in joy.ranges.items():
+        # A uniform draw deviates by its width / sqrt(12).
+        deviation = (high - low) / 12**0.5
+        middle = (low + high) / 2
+        assert made.ranges[fap] == pytest.approx(
+            (middle - deviation, middle + deviation), abs=0.1 * (high - low)
+        )
+
+
+@pytest.mark.parametrize(
+    ("frames", "said"),
+    [
+        (np.zeros((1, 68)), r"at least two faces \(n, 68\), got \(1, 68\)"),
+        (np.zeros((4, 15)), r"at least two faces \(n, 68\), got \(4, 15\)"),
+        (np.full((4, 68), np.nan), "finite values"),
+    ],
+)
+def test_bad_faces_are_refused(frames: np.ndarray, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        from_faces("x", frames)
+
+
+def test_a_bad_deviation_is_refused() -> None:
+    with pytest.raises(ValueError, match="x, FAP 4: wanted a deviation of 0 or more, got -1"):
+        from_statistics("x", {4: (3, -1)})

@@ -1,0 +1,60 @@
+"""Blinks are a function of seed, time and what is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.animation.idle.blinks import Blinks, blinks_between
+from realizer.core.arrays import Float64
+
+
+def blinks(seed: int, until: float) -> Float64:
+    return blinks_between(0.0, until, seed).onsets
+
+
+@given(st.integers(0, 2**40))
+def test_blinks_come_every_two_and_a_half_to_six_seconds(seed: int) -> None:
+    gaps = np.diff(blinks(seed, 600.0))
+    assert gaps.min() >= 2.5 - 1e-9
+    assert gaps.max() <= 6.0 + 1e-9
+    assert 3.3 < gaps.mean() < 4.6
+    assert gaps.std() > 0.4
+
+
+def test_a_blink_closes_faster_than_it_opens_and_takes_three_tenths_of_a_second() -> None:
+    onset = blinks(3, 10.0)[0]
+    lids = blinks_between(0.0, 10.0, 3).at(onset + np.array([-0.001, 0.08, 0.13, 0.15, 0.301]))
+    assert lids[[0, 1, 2, 4]] == pytest.approx([0, 1, 1, 0])
+    assert 0.8 < lids[3] < 1
+
+
+def test_every_blink_shuts_the_eyes_on_a_frame_at_25_fps() -> None:
+    times = np.arange(0, 60, 0.04)
+    lids = blinks_between(0.0, 60.0, 5).at(times)
+    for onset in blinks(5, 59.0):
+        assert lids[(times >= onset) & (times <= onset + 0.3)].max() == 1
+
+
+def draws(begin: float, end: float, seed: int) -> dict[float, float]:
+    """Onset -> draw of every blink."""
+    seen = blinks_between(begin, end, seed)
+    return dict(zip(seen.onsets.tolist(), seen.draws.tolist(), strict=True))
+
+
+@given(st.integers(0, 2**40))
+def test_each_blink_has_a_draw_of_its_own_in_any_window_evenly_spread(seed: int) -> None:
+    whole = draws(0, 600, seed)
+    assert draws(290, 310, seed).items() <= whole.items()
+    assert min(whole.values()) >= 0
+    assert max(whole.values()) < 1
+    assert 0.35 < np.mean(list(whole.values())) < 0.65
+
+
+def test_blinks_that_speech_brings_together_shut_the_lids_as_the_one_that_is_further() -> None:
+    times = np.arange(0, 1, 0.01)
+    one, other = (Blinks(np.array([onset]), np.zeros(1)).at(times) for onset in (0.2, 0.3))
+    both = Blinks(np.array([0.3, 0.2]), np.zeros(2)).at(times)
+    np.testing.assert_array_equal(both, np.maximum(one, other))

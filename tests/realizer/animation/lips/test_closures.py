@@ -1,0 +1,117 @@
+"""Closures: how long sounds hold the lips, whatever stands beside them, and when speech has them at all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
+from realizer.animation.lips.dominance import key_times, track_of
+from realizer.animation.lips.visemes import coarticulation, sounds
+from realizer.core.arrays import Bool, Float64
+from realizer.speech.utterance import Phoneme
+
+FRAME = 0.04  # s
+PAUSE = ("", 0.5)
+
+
+def phonemes(*said: tuple[str, float]) -> tuple[Phoneme, ...]:
+    """(IPA, seconds) one after another."""
+    ends = np.cumsum([length for _, length in said])
+    return tuple(
+        Phoneme(float(end - length), float(end), ipa) for (ipa, length), end in zip(said, ends, strict=True)
+    )
+
+
+def holds(*said: tuple[str, float]) -> tuple[Float64, Bool, Bool]:
+    """Keys; whether the lips are closed, and whether the lower one is bitten."""
+    found = phonemes(*said)
+    track, times = track_of(found), key_times(found)
+    assert track is not None
+    return (times, *held(track, times))
+
+
+def taken(*said: tuple[str, float]) -> tuple[Float64, Float64]:
+    found = phonemes(*said)
+    track, times = track_of(found), key_times(found)
+    assert track is not None
+    return times, lips_taken(track, times)
+
+
+def longest(times: Float64, mine: Bool) -> float:
+    """Seconds from the first to the last key that is held."""
+    return float(np.ptp(times[mine])) if mine.any() else 0.0
+
+
+def test_the_visemes_that_hold_are_those_of_p_and_f() -> None:
+    assert sounds("p")[0].mix == ((BILABIAL, 1.0),)
+    assert sounds("f")[0].mix == ((LABIODENTAL, 1.0),)
+    assert coarticulation()["closure"]["visemes"] == [BILABIAL, LABIODENTAL]
+
+
+@pytest.mark.parametrize("length", [0.02, 0.04, 0.08, 0.15])
+@pytest.mark.parametrize(("ipa", "row"), [("p", 0), ("v", 1)])
+def test_a_hold_is_longer_than_a_frame_and_around_its_sound(ipa: str, row: int, length: float) -> None:
+    times, *rows = holds(PAUSE, ("a", 0.1), (ipa, length), ("a", 0.1), PAUSE)
+    assert longest(times, rows[row]) > FRAME
+    middle = 0.6 + length / 2
+    assert times[rows[row]].mean() == pytest.approx(middle, abs=0.01)
+    assert not rows[1 - row].any()
+
+
+def test_vowels_hold_nothing() -> None:
+    _, closed, bitten = holds(PAUSE, ("a", 0.1), ("t", 0.1), ("u", 0.1), PAUSE)
+    assert not closed.any()
+    assert not bitten.any()
+
+
+@pytest.mark.parametrize("pair", [("m", "f"), ("f", "p"), ("v", "m")])
+@given(st.floats(0.02, 0.1), st.floats(0.02, 0.1))
+def test_a_closure_beside_a_bite_leaves_it_time(pair: tuple[str, str], one: float, other: float) -> None:
+    """Whatever their lengths, each is there, in its order, and no key is both but where they meet."""
+    times, closed, bitten = holds(PAUSE, ("a", 0.1), (pair[0], one), (pair[1], other), ("a", 0.1), PAUSE)
+    assert closed.any()
+    assert bitten.any()
+    assert (closed & bitten).sum() <= 1
+    first, second = (closed, bitten) if pair[0] in "pbm" else (bitten, closed)
+    assert times[first].mean() < times[second].mean()
+
+
+def test_speech_has_the_lips_from_the_first_sound_to_the_last() -> None:
+    times, lips = taken(PAUSE, ("a", 0.1), ("t", 0.1), ("a", 0.1), PAUSE)
+    assert lips[0] == lips[-1] == 0
+    assert (lips[(times > 0.5) & (times < 0.8)] > 0.5).all()
+    assert lips.max() == pytest.approx(1)
+    assert (lips[times < 0.35] == 0).all()
+
+
+@pytest.mark.parametrize("ipa", ["p", "f", "m"])
+def test_speech_has_them_whole_while_the_first_and_the_last_sound_hold_them(ipa: str) -> None:
+    times, lips = taken(PAUSE, (ipa, 0.07), ("a", 0.1), (ipa, 0.07), PAUSE)
+    inside = (times > 0.5) & (times < 0.74)
+    assert lips[inside].min() == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize(("length", "free"), [(0.3, False), (0.9, True)])
+def test_a_long_pause_gives_the_lips_back(length: float, free: bool) -> None:
+    times, lips = taken(PAUSE, ("a", 0.1), ("", length), ("a", 0.1), PAUSE)
+    inside = (times > 0.6) & (times < 0.6 + length)
+    assert (lips[inside].min() == 0) == free
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(["", "p", "f", "m", "a", "u", "t"]), st.floats(0.01, 0.6)), min_size=1)
+)
+def test_they_are_never_taken_by_jumps(said: list[tuple[str, float]]) -> None:
+    found = phonemes(*said)
+    track, times = track_of(found), key_times(found)
+    if track is None:
+        return
+    lips = lips_taken(track, times)
+    assert lips.min() >= 0
+    assert lips.max() <= 1
+    least = coarticulation()["pauses"]["least"]
+    inner = np.abs(np.diff(lips) / np.diff(times))
+    assert inner.max() <= 1.6 / min(least, np.ptp(times) / 2)

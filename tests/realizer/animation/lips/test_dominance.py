@@ -1,0 +1,102 @@
+"""Dominance: each sound has most to say in its middle, and all of them together not more than everything."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
+from realizer.animation.lips.visemes import SHAPE, coarticulation
+from realizer.speech.utterance import Phoneme
+
+
+def track(*sounds: tuple[str, float]) -> Track:
+    found = track_of(phonemes(*sounds))
+    assert found is not None
+    return found
+
+
+def phonemes(*sounds: tuple[str, float]) -> tuple[Phoneme, ...]:
+    """(IPA, seconds) one after another."""
+    ends = np.cumsum([length for _, length in sounds])
+    return tuple(
+        Phoneme(float(end - length), float(end), ipa) for (ipa, length), end in zip(sounds, ends, strict=True)
+    )
+
+
+def test_a_track_is_none_where_nothing_is_said() -> None:
+    assert track_of(()) is None
+    assert track_of(phonemes(("", 0.3), ("", 0.2))) is None
+
+
+def test_pauses_that_touch_are_one_and_sounds_touch() -> None:
+    found = track(("", 0.3), ("", 0.2), ("a", 0.1), ("t", 0.1), ("", 0.3))
+    assert found.rest.tolist() == [True, False, False, True]
+    assert found.end[0] == pytest.approx(0.5)
+    assert np.array_equal(found.begin[1:], found.end[:-1])
+
+
+def test_a_short_pause_between_sounds_is_none_and_a_long_one_stays() -> None:
+    short = coarticulation()["pauses"]["absorbed"] - 0.01
+    assert not track(("a", 0.1), ("", short), ("a", 0.1)).rest.any()
+    assert track(("a", 0.1), ("", short + 0.02), ("a", 0.1)).rest.tolist() == [False, True, False]
+    # What was absorbed is shared by the sounds on either side.
+    assert track(("a", 0.1), ("", 0.2), ("a", 0.1)).end[0] == pytest.approx(0.2)
+
+
+def test_a_diphthong_is_two_vowels_in_its_time() -> None:
+    found = track(("aɪ", 0.2))
+    assert found.vowel.tolist() == [True, True]
+    assert found.end[0] == pytest.approx(0.2 * coarticulation()["diphthong"]["first"])
+
+
+def test_keys_reach_from_the_first_sound_to_the_last_at_their_rate() -> None:
+    times = key_times(phonemes(("a", 0.1), ("t", 0.23)))
+    assert times[0] == 0
+    assert times[-1] == pytest.approx(0.33)
+    assert np.diff(times) == pytest.approx(1 / coarticulation()["rate"], rel=0.05)
+    assert len(key_times(phonemes(("a", 0.0)))) >= 2
+
+
+def test_every_column_of_a_mouth_belongs_to_one_class() -> None:
+    assert [name for members in CLASSES.values() for name in members] == list(SHAPE)
+
+
+def test_the_parts_of_all_sounds_add_to_a_little_less_than_everything() -> None:
+    said = phonemes(*[(ipa, 0.09) for ipa in "ˈpatəkifumoʃ"])
+    found = track_of(said)
+    assert found is not None
+    for near, parts, _ in dominances(found, key_times(said)):
+        assert near.shape == parts.shape
+        assert (parts >= 0).all()
+        assert (parts.sum(axis=0) < 1).all()
+        assert (parts.sum(axis=0) > 0.75).all()
+
+
+def test_in_its_middle_a_sound_has_more_to_say_than_at_its_edges() -> None:
+    found = track(("t", 0.1), ("a", 0.1), ("t", 0.1))
+    times = np.array([0.1, 0.15, 0.2])
+    for near, parts, members in dominances(found, times):
+        own = np.where(near == 1, parts, 0).sum(axis=0)
+        assert own[1] > own[0], members
+        assert own[1] > own[2], members
+
+
+def test_rounding_reaches_further_ahead_than_the_opening() -> None:
+    found = track(("t", 0.1), ("s", 0.1), ("u", 0.1))
+    ahead = {
+        members: np.where(near == 2, parts, 0).sum()
+        for near, parts, members in dominances(found, np.array([0.12]))
+    }
+    assert ahead[CLASSES["shape"]] > 2 * ahead[CLASSES["lips"]]
+
+
+def test_a_long_sound_lets_go_more_slowly_than_a_short_one() -> None:
+    """At the same distance before its core, with nothing beside it."""
+
+    def before(length: float) -> float:
+        core = length * (1 - coarticulation()["dominance"]["core"]) / 2
+        _, parts, _ = next(iter(dominances(track(("a", length)), np.array([core - 0.2]))))
+        return float(parts.sum())
+
+    assert before(0.3) > before(0.1) > before(0.04) > 0

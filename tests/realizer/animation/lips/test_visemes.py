@@ -1,0 +1,69 @@
+"""IPA to visemes: every sound of the tables has a mouth, and any text is taken."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.animation.lips.visemes import lip_shapes, phoneme_features, sounds
+
+
+def test_every_symbol_has_a_mouth_or_none_on_purpose() -> None:
+    for ipa, features in phoneme_features().items():
+        (sound,) = sounds(ipa)
+        parts = sum(part for _, part in sound.mix)
+        quiet = features.place in ("glottal", "pharyngeal", "epiglottal")
+        assert parts == pytest.approx(0 if quiet else 1)
+        assert all(0 < viseme <= 14 for viseme, _ in sound.mix)
+
+
+def test_all_visemes_of_the_standard_are_used() -> None:
+    used = {viseme for ipa in phoneme_features() for viseme, _ in sounds(ipa)[0].mix}
+    assert used == set(range(1, 15))
+    assert [row.viseme for row in lip_shapes()] == list(range(15))
+
+
+@pytest.mark.parametrize(
+    ("phonemes", "viseme"),
+    [("p b m", 1), ("f v", 2), ("θ ð", 3), ("t d", 4), ("k g", 5), ("tʃ dʒ ʃ", 6),
+     ("s z", 7), ("n l", 8), ("ɹ", 9),
+     ("ɑː", 10), ("ɛ", 11), ("ɪ", 12), ("ɒ", 13), ("ʊ", 14)],
+)  # fmt: skip
+def test_the_examples_of_the_standard_have_their_viseme(phonemes: str, viseme: int) -> None:
+    for ipa in phonemes.split():
+        mix = dict(sounds(ipa)[0].mix)
+        assert max(mix, key=lambda v: mix[v]) == viseme
+
+
+@pytest.mark.parametrize(
+    ("written", "plain"),
+    [
+        ("t͡ʃ", "tʃ"),
+        ("t̪", "t"),
+        ("õ", "o"),
+        ("aː", "a"),
+        ("n̩", "n"),
+        ("pʰ", "p"),
+        ("tʲ", "t"),
+        ("˥a", "a"),
+        ("ç", "ç"),
+        ("ɔ˞", "ɔ"),
+    ],
+)
+def test_diacritics_do_not_change_the_mouth(written: str, plain: str) -> None:
+    assert sounds(written) == sounds(plain)
+
+
+def test_strings_of_several_sounds_share_their_time() -> None:
+    assert [s.share for s in sounds("oʊ")] == pytest.approx([0.55, 0.45])
+    assert [s.vowel for s in sounds("ɔːɹ")] == [True, False]
+    assert sum(s.share for s in sounds("aɪəɹ")) == pytest.approx(1)
+    assert len(sounds("tʃ")) == 1
+    assert sounds("kʷ")[0].mix != sounds("k")[0].mix
+
+
+@given(st.text(max_size=8))
+def test_any_string_is_taken_for_ipa(text: str) -> None:
+    found = sounds(text)
+    assert not found or sum(s.share for s in found) == pytest.approx(1)

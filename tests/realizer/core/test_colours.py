@@ -1,0 +1,22 @@
+"""The sRGB curve by its published values, and there and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.core.colours import linear, srgb
+
+
+def test_every_byte_survives_the_way_to_linear_light_and_back():
+    bytes_ = np.arange(256).astype(np.uint8)
+    assert np.array_equal(np.rint(srgb(linear(bytes_)) * 255), bytes_)
+
+
+def test_the_curve_is_straight_near_black_and_a_power_above():
+    assert linear(np.uint8(5)) == pytest.approx(5 / 255 / 12.92)
+    assert linear(np.uint8(188)) == pytest.approx(0.5029, abs=1e-4)
+
+
+def test_more_light_than_white_is_white_and_less_than_none_is_black():
+    assert srgb(np.float32([-1, 0, 1, 7])) == pytest.approx(np.array([0, 0, 1, 1]))

@@ -1,0 +1,87 @@
+"""Words for emotions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.emotions.archetypes import archetypes
+from realizer.emotions.wheel import wheel
+from realizer.emotions.words import UnknownWordError, WordPlace, emotion, known_words, place_of, strength_of
+
+
+@pytest.mark.parametrize("profiles", ["own", "published", "raw"])
+def test_every_known_word_has_a_profile_of_its_name(profiles: str) -> None:
+    for word in known_words():
+        made = emotion(word, profiles)
+        assert made.name == word
+        assert made.source == profiles
+        assert made.frame().any() != (word == "neutral")
+
+
+def test_words_tell_where_they_come_from() -> None:
+    sources = known_words()
+    assert (sources["remorse"], sources["guilty"], sources["scared"]) == ("wheel", "whissell", "own")
+    assert "accepting" not in sources
+    assert emotion("scared").ranges == emotion("afraid").ranges
+
+
+def test_an_emotion_of_the_wheel_is_its_archetype_and_so_is_a_word_that_was_rated_as_it_was() -> None:
+    anger = archetypes("own")["anger"][0]
+    assert emotion("Anger").ranges == anger.ranges
+    assert emotion(" ANGRY ").ranges[31] == pytest.approx(anger.ranges[31])
+    assert emotion("anger", "published").ranges == archetypes("published")["anger"][3].ranges
+    assert emotion("angry", "published").ranges == archetypes("published")["anger"][3].ranges
+
+
+def test_a_word_of_a_category_goes_by_activation_and_not_by_angle() -> None:
+    afraid, worried, terrified = (emotion(word).frame() for word in ("afraid", "worried", "terrified"))
+    assert np.allclose(worried * 4.9, afraid * 3.9, atol=1e-2)
+    assert np.allclose(terrified * 4.9, afraid * 6.3, atol=1e-2)
+
+
+@pytest.mark.parametrize("word", ["terrified", "sad", "guilty", "delighted", "bashful", "anger", "remorse"])
+def test_our_own_word_is_its_place_on_the_ring_at_the_strength_that_documents_use(word: str) -> None:
+    place = place_of(word)
+    assert place is not None
+    wanted = wheel(place.angle, None, "own", place.ring).scaled(strength_of(place))
+    assert np.allclose(emotion(word).frame(), wanted.frame())
+    assert strength_of(place) == pytest.approx(1.0, abs=0.6)
+    assert strength_of(WordPlace("paul", 45.0)) == 1.0
+
+
+def test_terrified_is_more_than_fear_and_worried_less() -> None:
+    fear = emotion("fear").frame()
+    assert np.allclose(emotion("terrified").frame(), fear * 6.3 / 4.9, atol=1e-2)
+    assert np.allclose(emotion("worried").frame(), fear * 3.9 / 4.9, atol=1e-2)
+
+
+def test_an_archetype_and_a_number_is_that_profile() -> None:
+    assert emotion("fear 3", "raw") is archetypes("raw")["fear"][3]
+    with pytest.raises(UnknownWordError):
+        emotion("fear 33", "raw")
+
+
+def test_a_word_between_archetypes_is_on_plutchiks_ring() -> None:
+    guilty, place = emotion("guilty").ranges, wheel(102.3, None, "own", "plutchik").ranges
+    near_sad = (102.3 - 70.3) / (108.5 - 70.3)
+    strength = 4 / (near_sad * 3.9 + (1 - near_sad) * 4.9)
+    assert guilty[31] == pytest.approx([end * strength for end in place[31]])
+    assert set(emotion("guilty", "published").ranges) < {3, 5, *range(19, 23), *range(31, 37)}
+
+
+def test_an_unknown_word_gets_those_near_it() -> None:
+    with pytest.raises(UnknownWordError, match="got 'gilty', did you mean guilty"):
+        emotion("Gilty")
+    with pytest.raises(UnknownWordError, match=r"wanted one of .*afraid.*; got 'радость'"):
+        emotion("радость")
+    with pytest.raises(UnknownWordError, match="got ''"):
+        emotion("  ")
+    with pytest.raises(UnknownWordError) as caught:
+        emotion("x" * 10_000)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_word_that_nobody_rated_says_so() -> None:
+    with pytest.raises(ValueError, match="accepting: nobody rated how activated it is"):
+        emotion("accepting")

@@ -1,0 +1,108 @@
+"""A shipped face goes out as GLB with ARKit's shapes and comes back: it measures and moves the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.model import Face
+from realizer.facebuild.arkit.folder import Report, import_head
+from realizer.facebuild.au.measure import read_shapes
+from realizer.facebuild.check import check_face
+from realizer.tables import Fap, faps
+
+
+@pytest.fixture(scope="module")
+def brought(ada_glb: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Face, Report]:
+    place = tmp_path_factory.mktemp("faces")
+    report = import_head(ada_glb, place / "again")
+    assert check_face("again", place) == ()
+    return load_face("again", place), report
+
+
+def test_a_head_comes_back_with_its_size_and_parts(brought: tuple[Face, Report]) -> None:
+    face, report = brought
+    first = load_face("ada")
+    assert set(face.parts) == set(first.parts)
+    for unit in ("es0", "ens0", "mns0", "mw0", "irisd0"):
+        assert getattr(face.fapu, unit) == pytest.approx(getattr(first.fapu, unit), rel=0.05)
+    assert any("in metres" in line for line in report.found)
+    assert report.missing == ()
+
+
+def test_its_action_units_can_be_fitted(brought: tuple[Face, Report], ada_glb: Path, tmp_path: Path) -> None:
+    import_head(ada_glb, tmp_path / "fit")
+    measured = read_shapes(tmp_path / "fit" / "au_shapes.npz")
+    assert {1, 2, 4, 5, 6, 9, 12, 15, 16, 17, 20, 26, 43} <= set(measured)
+    assert all(one.moves.any() and (one.at[:, 0] > -1e-6).all() for one in measured.values())
+    assert brought[1].found[-1].startswith(f"{len(measured)} action units")
+
+
+LINEAR = [row for row in faps()[2:] if row.direction in ("up", "down", "left", "right")]
+
+
+@pytest.mark.parametrize(
+    "row", [row for row in LINEAR if row.unit != "angle_unit"], ids=lambda row: str(row.fap)
+)
+def test_every_point_goes_as_far_as_before(brought: tuple[Face, Report], row: Fap) -> None:
+    asked = np.zeros((1, 68), np.float32)
+    asked[0, row.fap - 1] = 150
+    axis = 1 if row.direction in ("up", "down") else 0
+    again, before = (
+        (deform(face, asked)[0] - face.vertices)[face.feature_points[row.feature_point], axis]
+        for face in (brought[0], load_face("ada"))
+    )
+    assert again == pytest.approx(before, rel=0.05)
+
+
+def egg_with_painted_eyes(new_glb: type) -> bytes:
+    """An egg whose mouth and eyes are part of its skin, with seven shapes; no part has a telling name."""
+    rows, columns = 90, 120
+    polar = np.linspace(0.01, np.pi - 0.01, rows)[:, None]
+    turn = np.linspace(0, 2 * np.pi, columns, endpoint=False)[None]
+    at = np.stack(
+        [
+            0.075 * np.sin(polar) * np.sin(turn),
+            0.11 * np.cos(polar) + 0 * turn,
+            0.09 * np.sin(polar) * np.cos(turn),
+        ],
+        -1,
+    ).reshape(-1, 3)
+    front = at[:, 2] > 0
+    blob = lambda x, y, r: front * np.exp(-(((at[:, 0] - x) / r) ** 2) - ((at[:, 1] - y) / r) ** 2)  # noqa: E731
+    at[:, 2] += 0.02 * blob(0, -0.012, 0.012) + 0.006 * blob(0, -0.045, 0.012)
+    moves = {
+        "jawOpen": -0.02 * blob(0, -0.075, 0.03)[:, None] * [0, 1, 0.3],
+        "mouthSmileLeft": 0.01 * blob(0.022, -0.045, 0.012)[:, None] * [1, 1, 0],
+        "mouthSmileRight": 0.01 * blob(-0.022, -0.045, 0.012)[:, None] * [-1, 1, 0],
+        "eyeBlinkLeft": -0.01 * blob(0.03, 0.028, 0.009)[:, None] * [0, 1, 0],
+        "eyeBlinkRight": -0.01 * blob(-0.03, 0.028, 0.009)[:, None] * [0, 1, 0],
+        "eyeLookOutLeft": 0.004 * blob(0.03, 0.02, 0.006)[:, None] * [1, 0, 0],
+        "eyeLookOutRight": 0.004 * blob(-0.03, 0.02, 0.006)[:, None] * [-1, 0, 0],
+    }
+    glb = new_glb()
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    a, b = (r * columns + c).ravel(), (r * columns + (c + 1) % columns).ravel()
+    triangles = np.concatenate([np.stack([a, a + columns, b], 1), np.stack([b, a + columns, b + columns], 1)])
+    glb.mesh("Object_1", at, triangles, np.full(at.shape, 200), moves)
+    return bytes(glb.bytes())
+
+
+def test_an_egg_with_few_shapes_and_painted_eyes_becomes_a_face(new_glb: type, tmp_path: Path) -> None:
+    path = tmp_path / "egg.glb"
+    path.write_bytes(egg_with_painted_eyes(new_glb))
+    report = import_head(path, tmp_path / "egg")
+    assert any("the eyes are no balls" in line for line in report.found)
+    assert any(line.startswith("tongue") for line in report.missing)
+    face = load_face("egg", tmp_path)
+    row = np.zeros((2, 68), np.float32)
+    row[:, 22] = 0, 20000
+    rest, looking = deform(face, row)
+    moved = looking - rest
+    assert moved[:, 0].max() > 0.001
+    # By its shape: as far as the shape reaches, and the rest of the head stays.
+    assert np.abs(moved[face.vertices[:, 0] < 0]).max() < 1e-6

@@ -1,0 +1,180 @@
+"""Fitting: a model that is known is found again from landmarks, and bad measurements get a message."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.core.errors import FaceError
+from realizer.face.au.file import read_model
+from realizer.face.au.model import Model
+from realizer.face.au.units import units
+from realizer.face.load import list_faces, load_face
+from realizer.facebuild.au.fit import fit_models, table, table_text
+from realizer.facebuild.au.measure import read_measured, read_shapes, write_shapes
+
+HEAD = "# source: made for tests\n# units: metres\n# licence: MIT\nau,x,y,z,dx,dy,dz\n"
+
+
+@pytest.fixture(scope="module")
+def known() -> Model:
+    path = next(info.path for info in list_faces() if info.name == load_face().name)
+    return read_model(path / "au_published.toml")
+
+
+def landmarks(model: Model, aus: tuple[int, ...], count: int = 120) -> str:
+    """A measurements file: what the model does to landmarks on the left half of the face, as hers were."""
+    first, last = load_face().parts["skin"]
+    skin = load_face().vertices[first:last].astype(np.float64)
+    front = skin[(skin[:, 0] >= 0) & (skin[:, 2] > -0.03) & (skin[:, 1] > -0.11)]
+    lines = []
+    for au in aus:
+        moves = model.displacement(au, front)
+        long = np.linalg.norm(moves, axis=1)
+        order = np.argsort(-long)
+        some = np.r_[order[: 4 * count : 4], order[4 * count :: 12]]
+        lines += [f"{au}," + ",".join(f"{v:.6f}" for v in (*front[i], *moves[i])) for i in some]
+    return HEAD + "\n".join(lines) + "\n"
+
+
+def test_a_unit_that_her_form_can_show_is_found_again_from_landmarks(known: Model, tmp_path: Path) -> None:
+    path = tmp_path / "landmarks.csv"
+    path.write_text(landmarks(known, (1, 15)))
+    measured = read_measured(path)
+    told: list[str] = []
+    model = fit_models(load_face(), measured, ("published",), told.append)["published"]
+    rows = table(model, measured)
+    assert [row.au for row in rows] == [1, 15]
+    assert max(row.ratio for row in rows) < 0.02, table_text(rows)
+    assert [line.split(":")[0] for line in told] == ["AU1", "AU15"]
+    # Only one side was measured; the other follows.
+    corner = np.asarray(load_face().points["8.4"], np.float64)[None]
+    assert model.displacement(15, corner) == pytest.approx(known.displacement(15, corner), abs=5e-4)
+
+
+def test_the_table_is_hers(known: Model) -> None:
+    measured = read_shapes(next(i.path for i in list_faces() if i.name == load_face().name) / "au_shapes.npz")
+    rows = table(known, measured)
+    text = table_text(rows)
+    assert text.splitlines()[0].split() == ["AU", "n", "d", "d_max", "e", "e_max", "e/d_max", "e_max/d_max"]
+    assert len(text.splitlines()) == 24
+    for row in rows:
+        assert row.e <= row.e_max
+        assert row.d <= row.d_max
+        assert row.n > 100
+
+
+def test_more_gaussians_come_nearer() -> None:
+    folder = next(info.path for info in list_faces() if info.name == load_face().name)
+    shapes = read_shapes(folder / "au_shapes.npz")
+    models = fit_models(load_face(), {1: shapes[1]})
+    (few,), (many,) = (table(models[form], {1: shapes[1]}) for form in ("published", "extended"))
+    assert many.ratio < 0.95 * few.ratio
+    assert len(models["extended"].units[1].motions["whole"].gaussians) <= 4
+
+
+def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
+    (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,)))
+    command = [sys.executable, "-m", "realizer", "faces", "fit", "default", "--from", "landmarks.csv"]
+    done = subprocess.run(
+        [*command, "--form", "published", "-o", "mine.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "AU2" in done.stdout
+    assert "e/d_max" in done.stdout
+    assert "1/1 AU2" in done.stderr
+    assert set(read_model(tmp_path / "mine.toml").units) == {2}
+
+
+@pytest.mark.parametrize(
+    ("words", "files"),
+    [
+        ([], ["au_published.toml", "au_extended.toml"]),
+        (["--form", "extended"], ["au_extended.toml"]),
+        (["--form", "both"], ["au_published.toml", "au_extended.toml"]),
+    ],
+)
+def test_the_command_writes_a_file_for_each_form(
+    known: Model, tmp_path: Path, words: list[str], files: list[str]
+) -> None:
+    from click.testing import CliRunner
+
+    from realizer.cli.fit import fit
+
+    (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,), 30))
+    given = ["default", "--from", str(tmp_path / "landmarks.csv"), "-o", str(tmp_path)]
+    done = CliRunner().invoke(fit, [*given, *words], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in tmp_path.glob("*.toml")) == sorted(files)
+
+
+@pytest.mark.parametrize("output", ["mine.toml", "nowhere"])
+def test_two_forms_want_a_folder_that_is_there(tmp_path: Path, output: str) -> None:
+    from click.testing import CliRunner
+
+    from realizer.cli.fit import fit
+
+    done = CliRunner().invoke(fit, ["default", "--form", "both", "-o", str(tmp_path / output)])
+    assert done.exit_code == 2
+    assert "wanted a folder" in done.output
+
+
+def test_a_face_without_shapes_says_what_to_give(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from realizer.cli.fit import fit
+
+    folder = next(info.path for info in list_faces() if info.name == load_face().name)
+    copy = Path(shutil.copytree(folder, tmp_path / "bare"))
+    (copy / "au_shapes.npz").unlink()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("REALIZER_FACES", str(tmp_path))
+        done = CliRunner().invoke(fit, ["bare", "-o", str(tmp_path / "model.toml")])
+    assert isinstance(done.exception, FaceError)
+    assert "--from" in str(done.exception)
+    assert not (tmp_path / "model.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HEAD + "12,0,0,0,0,0,nan\n" * 9, "AU12: wanted finite numbers"),
+        (HEAD + "12,0,0,0,0,0,0.1\n" * 3, "AU12: wanted 8 landmarks"),
+        (HEAD + "12,0,0,0,0,0,0\n" * 9, "AU12: wanted 8 landmarks or more of which one moves"),
+        (HEAD + "51,0,0,0,0,0,0.1\n" * 9, "wanted action units of 1, 2, 4"),
+        (HEAD + "12,0,0,0,0,0\n", "wanted 7 cells"),
+        (HEAD.replace("dz", "d") + "12,0,0,0,0,0,1\n", "wanted columns au,x,y,z,dx,dy,dz"),
+        ("au,x,y,z,dx,dy,dz\n", "source"),
+    ],
+)
+def test_bad_measurements_are_refused_with_their_place(text: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "landmarks.csv"
+    path.write_text(text)
+    with pytest.raises(FaceError, match=words) as caught:
+        read_measured(path)
+    assert "landmarks.csv" in str(caught.value)
+
+
+def test_an_unknown_form_is_refused() -> None:
+    with pytest.raises(FaceError, match="published, extended"):
+        fit_models(load_face(), {}, ("secret",))
+
+
+def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
+    folder = next(info.path for info in list_faces() if info.name == load_face().name)
+    measured = read_shapes(folder / "au_shapes.npz")
+    write_shapes(tmp_path / "again.npz", measured)
+    again = read_shapes(tmp_path / "again.npz")
+    assert set(again) == {unit.au for unit in units().values() if unit.kind == "displacement"}
+    for au, one in measured.items():
+        assert again[au].moves == pytest.approx(one.moves, abs=1e-9)
+        assert (again[au].seen == one.seen).all()
+    with pytest.raises(FaceError, match=r"none\.npz"):
+        read_shapes(tmp_path / "none.npz")

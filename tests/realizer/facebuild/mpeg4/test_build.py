@@ -1,0 +1,155 @@
+"""A head that brings no shapes gets a face from its zones, and a face may take some FAPs from zones."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from realizer.cli.faces import faces
+from realizer.core.errors import FaceError
+from realizer.face.deform import deform
+from realizer.face.load import folder_of, load_face
+from realizer.face.model import Face
+from realizer.facebuild.check import check_face
+from realizer.facebuild.mpeg4.build import apply_zones, setup_of
+from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
+from realizer.facebuild.mpeg4.truth import face_truth, mean_score
+
+
+def copy(to: Path, fields: bool = False) -> Path:
+    """The default face without what its shapes made."""
+    source, folder = folder_of("default"), to / "plain"
+    folder.mkdir()
+    for name in ("face.toml", "mesh.npz", "features.csv", *(("fields.npz",) if fields else ())):
+        shutil.copy(source / name, folder / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = copy(tmp_path_factory.mktemp("faces"))
+    apply_zones(folder, setup_of(folder))
+    return folder
+
+
+def face_of(folder: Path) -> Face:
+    return load_face(folder.name, folder.parent)
+
+
+def test_a_head_without_shapes_becomes_a_sound_face(plain: Path) -> None:
+    assert check_face(plain.name, plain.parent) == ()
+
+
+def test_its_faps_are_true(plain: Path) -> None:
+    truths = face_truth(face_of(plain))
+    assert mean_score(truths) > 2.8
+    assert min(t.score for t in truths) >= 2
+    assert all(t.error < 0.02 and t.mirror < 0.01 and t.others < 0.05 for t in truths)
+
+
+def test_equal_lip_faps_move_a_lip_as_one_without_a_w(plain: Path) -> None:
+    face = face_of(plain)
+    row = np.zeros((1, 68), np.float32)
+    row[0, [fap - 1 for fap in (5, 10, 11, 52, 57, 58)]] = -300
+    move = (deform(face, row)[0] - face.vertices)[:, 1]
+    points = [move[face.feature_points[name]] for name in ("2.8", "2.3", "2.9", "8.7", "8.2", "8.8")]
+    assert np.ptp(points) < 0.02 * abs(points[1])
+    assert move[slice(*face.parts["skin"])].min() > 1.04 * points[1]
+
+
+def test_lids_close_over_the_eyes(plain: Path) -> None:
+    face = face_of(plain)
+    row = np.zeros((1, 68), np.float32)
+    row[0, [18, 19, 20, 21]] = [700, 700, 324, 324]
+    at = deform(face, row)[0]
+    for high, low in (("3.1", "3.3"), ("3.2", "3.4")):
+        assert abs(at[face.feature_points[high], 1] - at[face.feature_points[low], 1]) < 0.0003
+    for eye, (ball, centre) in enumerate(face.basis["eyes"]):
+        lids = face.basis["lid"][face.basis["lid_eye"] == eye]
+        radius = np.linalg.norm(face.vertices[slice(*ball)] - centre, axis=1).max()
+        assert np.linalg.norm(at[lids] - centre, axis=1).min() > radius - 0.0003
+
+
+def test_two_builds_give_the_same_bytes(plain: Path, tmp_path: Path) -> None:
+    again = copy(tmp_path)
+    apply_zones(again, setup_of(again))
+    assert (again / "fields.npz").read_bytes() == (plain / "fields.npz").read_bytes()
+
+
+def test_a_face_may_take_some_faps_from_zones_and_keep_its_own(tmp_path: Path) -> None:
+    folder = copy(tmp_path, fields=True)
+    own = load_face()
+    apply_zones(folder, setup_of(folder), only={31, 32})
+    mixed = face_of(folder)
+    before, after = own.basis["fields"].toarray(), mixed.basis["fields"].toarray()
+    changed = np.flatnonzero(np.abs(before - after).max(axis=0) > 1e-6) + 1
+    assert changed.tolist() == [31, 32]
+    assert check_face(folder.name, folder.parent) == ()
+
+
+def test_the_folder_s_own_parameters_count(tmp_path: Path) -> None:
+    folder = copy(tmp_path)
+    setup = setup_of(folder)
+    write_setup(folder / "mpeg4.toml", setup)
+    text = (folder / "mpeg4.toml").read_text("utf-8")
+    (folder / "mpeg4.toml").write_text(
+        text.replace('fap = 31\nfalloff = "cosine"', 'fap = 31\nfalloff = "linear"')
+    )
+    changed = setup_of(folder)
+    assert changed.zones[31].falloff == "linear"
+    assert changed.zones[32].falloff == "linear"  # the sides go together
+    assert changed.zones[33].falloff == "cosine"
+
+
+def test_parameters_survive_the_file(tmp_path: Path) -> None:
+    setup = setup_of(folder_of("default"))
+    write_setup(tmp_path / "one.toml", setup, points=True)
+    again = read_setup(tmp_path / "one.toml")
+    write_setup(tmp_path / "two.toml", again, points=True)
+    assert (tmp_path / "one.toml").read_text() == (tmp_path / "two.toml").read_text()
+    assert again.synced == setup.synced
+    assert {fap: mask.tolist() for fap, mask in again.masks.items()} == {
+        fap: mask.tolist() for fap, mask in setup.masks.items()
+    }
+    for fap, zone in setup.zones.items():
+        assert again.zones[fap].radii == pytest.approx(zone.radii, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("zone = 3", "zone: wanted a list, got 3"),
+        ("zones = []", "wanted joined, synced, whole, points, zone, masks; got zones"),
+        ('[[zone]]\nfap = 31\nfalloff = "cosine"', "zone 1: size is missing"),
+        ('[[zone]]\nfap = 31\nfalloff = "cosine"\nsize = "x"', "zone 1: size: wanted a number, got 'x'"),
+        ('[[zone]]\nfap = 31\nfalloff = "cosine"\nsize = 1\nscale = [1]', "scale: wanted three numbers"),
+        ('[[zone]]\nfap = 2\nfalloff = "cosine"\nsize = 1', "wanted a FAP from 3 to 68"),
+        ('[masks]\n"4 x" = "1-3"', "wanted a FAP's number, got 'x'"),
+        ('[masks]\n"4" = "1-b"', "wanted ranges such as '3-5 9', got '1-b'"),
+        ("a = ", "Invalid value"),
+    ],
+)
+def test_a_bad_file_says_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mpeg4.toml"
+    path.write_text(text)
+    with pytest.raises(FaceError) as raised:
+        read_setup(path)
+    assert message in str(raised.value)
+    assert str(path) in str(raised.value) or "zone of FAP" in str(raised.value)
+
+
+def test_a_fap_without_a_zone_is_refused(tmp_path: Path) -> None:
+    folder = copy(tmp_path, fields=True)
+    with pytest.raises(FaceError, match="no zone for FAP 3; add one"):
+        apply_zones(folder, setup_of(folder), only={3})
+
+
+def test_the_command_makes_another_face_of_a_head(tmp_path: Path) -> None:
+    folder = tmp_path / "zoe"
+    ran = CliRunner().invoke(faces, ["zones", "default", "-o", str(folder), "--fap", "31", "--fap", "32"])
+    assert ran.exit_code == 0, ran.output
+    assert face_of(folder).name == "zoe"
+    assert (folder / "mpeg4.toml").is_file()
+    assert check_face("zoe", tmp_path) == ()

@@ -1,0 +1,107 @@
+"""Hair: styles are figures, lie on the scalp, leave the face free and hang where they should."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from realizer.core.errors import FaceError
+from realizer.face.load import load_face
+from realizer.facebuild.patch import Patch, vertex_normals
+from realizer.facebuild.person.hair import Style, hair, scalp_of, shadow, style_of
+from realizer.facebuild.person.scalp import Scalp
+from realizer.tables import read_toml, text_of
+
+STYLES = list(read_toml(text_of("hair.toml"), "hair.toml")["styles"])
+LOOK = {"hair": [70, 48, 36], "skin": [226, 178, 152]}
+CLOSE = ("bun", "short", "buzz", "receding", "rim")  # styles that hang nowhere
+
+
+@pytest.fixture(scope="module")
+def head() -> tuple[Patch, np.ndarray, dict[str, np.ndarray]]:
+    face = load_face()
+    first, last = face.parts["skin"]
+    base = face.vertices[first:last].astype(float)
+    mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
+    patch = Patch(sp.eye_array(len(base), format="csr"), np.zeros_like(base), mine)
+    return patch, base, {name: np.array(at, float) for name, at in face.points.items()}
+
+
+def scalp(head: tuple, style: Style) -> Scalp:
+    return scalp_of(*head, style)
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_every_style_grows_on_a_head(head: tuple, name: str) -> None:
+    style = style_of({"style": name})
+    for part in hair(scalp(head, style), style, LOOK):
+        assert part.name == "hair"
+        assert len(part.vertices) < 1400
+        assert np.isfinite(part.vertices).all()
+        assert np.allclose(
+            np.linalg.norm(vertex_normals(part.vertices, part.triangles), axis=1), 1, atol=1e-6
+        )
+        assert part.colours.min() >= 0
+        assert part.colours.max() <= 255
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_brows_eyes_and_mouth_stay_free(head: tuple, name: str) -> None:
+    style = style_of({"style": name})
+    at = np.concatenate([part.vertices for part in hair(scalp(head, style), style, LOOK)])
+    before = at[(at[:, 2] > 0) & (at[:, 1] < head[2]["11.1"][1] - 0.02)]
+    assert not len(before) or np.abs(before[:, 0]).min() > 0.045
+
+
+@pytest.mark.parametrize("name", CLOSE)
+def test_hair_lies_on_the_skull_and_hides_it(head: tuple, name: str) -> None:
+    style = style_of({"style": name})
+    mine = scalp(head, style)
+    part = hair(mine, style, LOOK)[0]
+    lift, _ = mine.lift(part.vertices)
+    assert lift.min() > -0.002
+    # The hairline itself lies in the skin, all else above it.
+    assert np.mean(lift > 0) > 0.8
+    assert vertex_normals(part.vertices, part.triangles)[np.argmax(part.vertices[:, 1]), 1] > 0.3
+
+
+def test_hanging_hair_reaches_as_far_down_as_its_style_says(head: tuple) -> None:
+    low = {}
+    for name in ("short", "bob", "long"):
+        style = style_of({"style": name})
+        low[name] = min(part.vertices[:, 1].min() for part in hair(scalp(head, style), style, LOOK))
+    assert low["short"] > low["bob"] + 0.02 > low["long"] + 0.05
+
+
+def test_a_recipe_changes_single_figures(head: tuple) -> None:
+    style = style_of({"style": "short", "grey": 0.9, "sides": 0.2})
+    assert (style.grey, style.sides) == (0.9, 0.2)
+    plain = style_of({"style": "short"})
+    assert replace(style, grey=plain.grey, sides=plain.sides) == plain
+    mine = scalp(head, style)
+    grey, brown = (hair(mine, one, LOOK)[0].colours.mean(axis=0) for one in (style, plain))
+    assert np.ptp(grey) < 0.7 * np.ptp(brown)
+
+
+@pytest.mark.parametrize(
+    ("table", "says"), [({"style": "mohican"}, "wanted one of bun"), ({"styl": "bun"}, "got 'styl'")]
+)
+def test_an_unknown_style_or_figure_is_refused(table: dict[str, str], says: str) -> None:
+    with pytest.raises(FaceError, match=says):
+        style_of(table)
+
+
+def test_the_skin_has_the_roots_shadow_under_hair_alone(head: tuple) -> None:
+    style = style_of({"style": "short"})
+    mine = scalp(head, style)
+    places = np.array([head[2][name] for name in ("11.4", "9.3", "4.1", "2.1")])
+    dark = shadow(mine, style, places)
+    assert dark[0] > 0.5
+    assert (dark[1:] == 0).all()
+    assert (shadow(mine, style_of({"style": "rim"}), places[:1]) == 0).all()
+
+
+def test_every_figure_is_in_the_table_of_plain_hair() -> None:
+    table = read_toml(text_of("hair.toml"), "hair.toml")
+    assert {field.name for field in fields(Style)} == {*table["plain"], "line"}

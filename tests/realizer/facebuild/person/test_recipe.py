@@ -1,0 +1,97 @@
+"""Recipes: what is wrong with one is said with file and key, all at once."""
+
+from pathlib import Path
+
+import pytest
+
+from realizer.core.errors import FaceError
+from realizer.face.load import list_faces
+from realizer.facebuild.person.recipe import COLOURS, read_recipe
+
+GOOD = "\n".join(
+    [
+        "says = 'Eve'",
+        "[targets]",
+        "'macrodetails/asian-female-old' = 1.0",
+        "'eyes/*eye-scale-incr' = 0.5",
+        "[colours]",
+        *(f"{name} = [1, 2.5, 255]" for name in COLOURS),
+    ]
+)
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A folder of data with two shape targets, one of them for either eye."""
+    names = ("macrodetails/asian-female-old.target.gz", "eyes/l-eye-scale-incr.target.gz")
+    for name in (*names, "eyes/r-eye-scale-incr.target.gz"):
+        path = tmp_path / "mpfb2/targets" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    return tmp_path
+
+
+def faults(text: str, data: Path) -> list[str]:
+    path = data / "recipe.toml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(FaceError) as caught:
+        read_recipe(path, data)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
+
+
+def test_a_recipe_is_read_as_it_is_written(data: Path) -> None:
+    path = data / "recipe.toml"
+    path.write_text(GOOD, "utf-8")
+    recipe = read_recipe(path, data)
+    assert recipe.says == "Eve"
+    assert recipe.targets == {"macrodetails/asian-female-old": 1.0, "eyes/*eye-scale-incr": 0.5}
+    assert recipe.colours["skin"] == [1, 2.5, 255]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("says = 'Eve'", "", "says: wanted a sentence about the person, got None"),
+        ("says = 'Eve'", "says = 'Eve'\nsings = 1", "wanted one of says, "),
+        ("*eye-scale-incr", "*eye-scale-inc", "did you mean 'eyes/*eye-scale-incr'?"),
+        ("*eye-scale-incr", "l-eye-scale-incr", "targets: eyes/l-eye-scale-incr: no such shape target"),
+        ("= 0.5", "= 1.5", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got 1.5"),
+        ("= 0.5", "= nan", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got nan"),
+        ("= 0.5", "= true", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got True"),
+        ("'macrodetails/asian-female-old' = 1.0", "", "wanted at least one of macrodetails/..., got none"),
+        ("skin = [1, 2.5, 255]", "", "colours: skin: wanted three numbers 0..255, got none"),
+        ("skin = [1, 2.5, 255]", "skin = [1, 2, 256]", "colours: skin: wanted three numbers 0..255, got [1"),
+        ("skin = [1, 2.5, 255]", "skin = 'pink'", "colours: skin: wanted three numbers 0..255, got 'pink'"),
+        ("[colours]", "[colours]\nnose = [1, 2, 3]", "colours: nose: wanted one of skin, "),
+        ("says = 'Eve'", "says = 'Eve'\nhair = 3", "hair: wanted a table, got 3"),
+        ("says = 'Eve'", "says = 'Eve'\nhair = {style = 'mohawk'}", "hair: style: wanted one of bun, "),
+        ("says = 'Eve'", "says = 'Eve'\nhair = {colour = 3}", "got 'colour'"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_said_with_its_key_and_what_was_wanted(old: str, new: str, fault: str, data: Path) -> None:
+    (line,) = faults(GOOD.replace(old, new, 1), data)
+    assert fault in line
+
+
+def test_all_faults_are_said_at_once(data: Path) -> None:
+    lines = faults(GOOD.replace("= 0.5", "= -1").replace("lips = [1, 2.5, 255]", ""), data)
+    assert len(lines) == 2
+
+
+def test_a_file_that_is_not_toml_is_named(data: Path) -> None:
+    (line,) = faults("says", data)
+    assert "Expected" in line
+
+
+@pytest.mark.parametrize("info", list_faces(), ids=lambda info: info.name)
+def test_every_recipe_that_ships_names_all_that_it_must(info: object, data: Path) -> None:
+    # Its targets are in the data, which do not ship; all else is sound.
+    path = info.path / "recipe.toml"  # type: ignore[attr-defined]
+    for name in (line.split('"')[1] for line in path.read_text("utf-8").splitlines() if line.startswith('"')):
+        for side in ("l-", "r-") if "*" in name else ("",):
+            target = data / "mpfb2/targets" / f"{name.replace('*', side)}.target"
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.touch()
+    assert read_recipe(path, data).says

@@ -1,0 +1,78 @@
+"""What an open mouth shows: teeth from both sides, a tongue, and a lining that is red, not black."""
+
+import numpy as np
+import pytest
+
+from realizer.face.deform import deform
+from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
+from realizer.face.surface import normals
+from realizer.facebuild.parts import SHADES, teeth
+from realizer.facebuild.person.paint import LIT, paint_mouth
+from realizer.render.cameras import camera_for
+from realizer.render.light import preset
+from realizer.render.onboard import OnboardCanvas
+
+COLOURS = {"tooth": [240.0, 232, 214], "root": [228.0, 206, 180], "gum": [196.0, 112, 106]}
+WIDE = {3: 1100, 4: -80, 5: -1535, 10: -1245, 11: -1245, 52: -1525, 57: -1315, 58: -1315, 12: -480, 13: -480}
+
+
+def opened(face: Face) -> np.ndarray:
+    """(n_vertices, 3): a mouth as wide as AU27 and AU25 open it."""
+    pose = np.zeros((1, 68), np.float32)
+    for fap, value in WIDE.items():
+        pose[0, fap - 1] = value
+    shape: np.ndarray = deform(face, pose)[0]
+    return shape
+
+
+@pytest.mark.parametrize("name", ["upper_teeth", "lower_teeth"])
+def test_teeth_are_closed_towards_the_tongue(name: str) -> None:
+    arch = teeth(name, np.zeros(3), 0.021, 0.040, COLOURS)
+    a, b, c = (arch.vertices[arch.triangles[:, k]] for k in range(3))
+    ups = np.cross(b - a, c - a)
+    middle = np.abs(a[:, 0]) < 0.008
+    assert (ups[middle, 2] > 0).any()  # those that face the lips
+    assert (ups[middle, 2] < 0).any()  # and those that face the tongue
+    rows = arch.vertices.reshape(-1, len(SHADES), 3)
+    assert (rows[:, 0, 2] < rows[:, -1, 2]).all()
+
+
+def test_the_lining_of_the_mouth_is_darker_to_the_back_and_leaves_the_skin_alone() -> None:
+    deep = np.array([0.0, 0.01, 0.03, 0.08, 0.0])
+    share = np.array([1.0, 1, 1, 1, 0])
+    out, gloss, light = np.full((5, 3), 50.0), np.full(5, 0.2), np.full(5, 0.25)
+    paint_mouth(out, gloss, light, share, deep, {"mouth": [120, 48, 44], "tongue": [196, 104, 100]})
+    assert (np.diff(light[:4]) < 0).all()
+    assert (np.diff(out[:4], axis=0) < 0).all()
+    assert light[0] == pytest.approx(LIT[1])
+    assert (out[4] == 50).all()
+    assert gloss[3] == pytest.approx(0)
+    assert (gloss[4], light[4]) == (0.2, 0.25)
+
+
+@pytest.mark.parametrize("name", [info.name for info in list_faces()])
+def test_an_open_mouth_is_dark_red_from_the_side_and_not_black(name: str) -> None:
+    face = load_face(name)
+    shape = opened(face)
+    camera = camera_for(face, "three-quarter")
+    canvas = OnboardCanvas(face, (512, 512), camera, preset("portrait"))
+    picture = canvas.draw(shape, normals(face, shape[None])[0]).astype(float)
+    canvas.close()
+    upper, lower = camera.project(shape[[face.feature_points["2.2"], face.feature_points["2.3"]]], (512, 512))
+    for share in (0.4, 0.5, 0.6):
+        x, y = np.rint(upper + share * (lower - upper)).astype(int)
+        red, green, blue = picture[y - 1 : y + 2, x - 1 : x + 2].mean(axis=(0, 1))
+        assert 42 < red < 140, share
+        assert red > 1.6 * green, share
+        assert abs(green - blue) < 15, share
+
+
+@pytest.mark.parametrize("name", [info.name for info in list_faces()])
+def test_the_tongue_sinks_less_than_the_jaw_and_stays_behind_the_teeth(name: str) -> None:
+    face = load_face(name)
+    shape = opened(face)
+    fall = face.vertices[:, 1] - shape[:, 1]
+    tip, edge = face.feature_points["6.1"], face.feature_points["9.11"]
+    assert 0.004 < fall[tip] < 0.8 * fall[edge]
+    assert shape[tip, 2] < shape[edge, 2]

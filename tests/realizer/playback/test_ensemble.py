@@ -1,0 +1,396 @@
+"""Blocks together: who starts when, who ends whom, and what is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse
+from realizer.playback.player import Player
+from realizer.scheduling.timing import Schedule
+from realizer.speech import SilentVoice
+
+BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+
+
+class Stage:
+    """A player and the log of what it told: "a:start 0.0", "a IN_PREP 0.0-", "! a:b TYPE"."""
+
+    def __init__(self) -> None:
+        self.player = Player(idle=False)
+        self.log: list[str] = []
+        self.texts: list[str] = []
+        self.now = 0.0
+
+    def send(self, id: str, inside: str = "", *, at: float = 0.0, **attributes: str) -> Schedule:
+        names = {
+            "preplan",
+            "appendAfter",
+            "chunkAfter",
+            "prependBefore",
+            "chunkBefore",
+            "interrupt",
+            "onStart",
+        }
+        said = "".join(f' {"bmla:" if k in names else ""}{k}="{v}"' for k, v in attributes.items())
+        block = parse(f'<bml id="{id}" {BMLA}{said}>{inside}</bml>')
+        says = {b: SilentVoice().say(say) for b, say in self.player.wants(block).items()}
+        schedule = self.player.submit(block, at, says)
+        self.until(at)
+        return schedule
+
+    def until(self, now: float) -> list[str]:
+        for told in self.player.due(now):
+            if isinstance(told, BlockProgress):
+                self.log.append(f"{told.id} {told.status} {told.global_time:g}")
+            elif isinstance(told, WarningFeedback):
+                self.log.append(f"! {told.id} {told.type}")
+                self.texts.append(told.text)
+            elif isinstance(told, PredictionFeedback):
+                (block,) = told.blocks
+                end = "" if block.global_end is None else f"{block.global_end:g}"
+                self.log.append(f"{block.id} {block.status} {block.global_start:g}-{end}")
+        return self.log
+
+    def progress(self) -> list[str]:
+        self.now += 1e4
+        return [line for line in self.until(self.now) if ":" in line and not line.startswith("!")]
+
+    def au(self, target: int, times: list[float]) -> np.ndarray:
+        return self.player.frames(np.array(times)).aus[:, target]
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+def smile(end: float = 2.0) -> str:
+    return f'<faceLexeme id="s" lexeme="SMILE" attackPeak="0.4" relax="{end - 0.5}" start="0" end="{end}"/>'
+
+
+def wait(seconds: float, id: str = "w") -> str:
+    return f'<wait id="{id}" duration="{seconds}"/>'
+
+
+def gaze(id: str = "g", target: str = "x") -> str:
+    return f'<gaze id="{id}" target="{target}" start="0" ready="0.4" relax="1.5" end="2"/>'
+
+
+def test_a_block_goes_through_its_states(stage: Stage) -> None:
+    stage.send("a", smile())
+    assert stage.until(9) == [
+        "a IN_PREP 0-",
+        "a LURKING 0-2",
+        "a:start IN_EXEC 0",
+        "a IN_EXEC 0-2",
+        "a SUBSIDING 0-2",
+        "a:end DONE 2",
+    ]
+
+
+def test_an_empty_block_starts_and_ends_at_once(stage: Stage) -> None:
+    stage.send("a", at=3.0)
+    assert stage.progress() == ["a:start IN_EXEC 3", "a:end DONE 3"]
+
+
+# APPEND and what BMLA adds to it
+
+
+def test_append_waits_for_all_of_its_character(stage: Stage) -> None:
+    stage.send("a", wait(2), characterId="Ann")
+    stage.send("b", wait(3), at=0.5)
+    stage.send("other", wait(9), characterId="Bob", at=0.5)
+    stage.send("c", wait(1), composition="APPEND", at=0.6)
+    assert "c:start IN_EXEC 3.5" in stage.progress()
+
+
+def test_append_after_waits_for_the_blocks_it_names_and_for_no_others(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("b", wait(5))
+    stage.send("c", wait(1), appendAfter="a,nobody")
+    assert "c:start IN_EXEC 1" in stage.progress()
+
+
+def test_append_after_in_composition_means_the_same(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("b", wait(2))
+    stage.send("c", wait(1), composition="APPEND-AFTER(a,b)")
+    assert "c:start IN_EXEC 2" in stage.progress()
+
+
+def test_an_empty_list_waits_for_nothing(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("c", wait(1), composition="APPEND-AFTER()")
+    assert "c:start IN_EXEC 0" in stage.progress()
+
+
+def test_chunk_after_starts_when_the_other_subsides(stage: Stage) -> None:
+    stage.send("a", smile())
+    stage.send("b", wait(1), chunkAfter="a")
+    assert stage.progress() == ["a:start IN_EXEC 0", "b:start IN_EXEC 1.5", "a:end DONE 2", "b:end DONE 2.5"]
+
+
+def test_prepend_before_lets_a_waiting_block_wait_longer_and_says_so(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("c", wait(1), composition="APPEND")
+    stage.send("b", wait(3), prependBefore="c")
+    assert "c LURKING 3-4" in stage.log
+    assert "c:start IN_EXEC 3" in stage.progress()
+
+
+def test_what_is_put_before_a_block_ends_before_that_starts_and_so_on_down_the_line(stage: Stage) -> None:
+    stage.send("a", wait(4))
+    stage.send("c", composition="APPEND")
+    stage.send("e", composition="APPEND")
+    stage.send("d", wait(4), prependBefore="c")
+    told = ["d:end DONE 4", "c:start IN_EXEC 4", "c:end DONE 4", "e:start IN_EXEC 4", "e:end DONE 4"]
+    assert stage.progress()[-5:] == told
+
+
+def test_chunk_before_lets_it_wait_for_the_subsiding_only(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("c", wait(1), composition="APPEND")
+    stage.send("b", smile(), chunkBefore="c")
+    assert "c:start IN_EXEC 1.5" in stage.progress()
+
+
+def test_a_block_that_has_started_cannot_be_put_behind_another(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    assert stage.send("b", wait(1), prependBefore="a").failed
+    assert "! b TargetBlockAlreadyStartedException" in stage.log
+    assert not any(line.startswith("b:") for line in stage.progress())
+
+
+def test_a_circle_of_waits_is_refused(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("b", wait(1), composition="APPEND")
+    assert stage.send("c", wait(1), appendAfter="b", prependBefore="b").failed
+    assert "! c IMPOSSIBLE_TO_SCHEDULE" in stage.log
+
+
+def test_a_chain_of_appended_blocks_follows_when_the_first_is_stopped(stage: Stage) -> None:
+    stage.send("a", smile(5))
+    stage.send("b", wait(2), composition="APPEND")
+    stage.send("c", wait(1), composition="APPEND")
+    stage.player.stop(1.0, ["a"])
+    stage.until(1.0)
+    assert stage.log[-5:-1] == ["a:end INTERRUPTED 1", "b LURKING 1-3", "c LURKING 3-4", "b:start IN_EXEC 1"]
+    assert stage.progress()[-3:] == ["b:end DONE 3", "c:start IN_EXEC 3", "c:end DONE 4"]
+
+
+def test_a_reference_into_another_block_keeps_its_instant_when_the_start_moves(stage: Stage) -> None:
+    stage.send("a", wait(4))
+    stage.send("m", '<head id="n" lexeme="NOD" stroke="5"/>')
+    later = stage.send("b", '<head id="k" lexeme="NOD" stroke="m:n:stroke + 1"/>', appendAfter="a")
+    assert later.start + later.at("k", "stroke") == pytest.approx(6.0)
+    stage.player.stop(1.0, ["a"])
+    moved = stage.player.latest(later)
+    assert moved.start == 1.0
+    assert moved.start + moved.at("k", "stroke") == pytest.approx(6.0)
+
+
+# REPLACE and interrupt
+
+
+def test_replace_ends_what_plays_and_waits_first_and_its_ids_can_be_used_again(stage: Stage) -> None:
+    stage.send("a", smile(5))
+    stage.send("b", wait(1), composition="APPEND")
+    stage.send("a", wait(1), composition="REPLACE", at=1.0)
+    assert stage.progress() == [
+        "a:start IN_EXEC 0",
+        "a:end INTERRUPTED 1",
+        "b:end REVOKED 1",
+        "a:start IN_EXEC 1",
+        "a:end DONE 2",
+    ]
+
+
+def test_replace_leaves_other_characters_alone(stage: Stage) -> None:
+    stage.send("a", smile(5), characterId="Ann")
+    stage.send("b", smile(5), characterId="Bob")
+    stage.send("c", wait(1), composition="REPLACE", characterId="Ann", at=1.0)
+    assert "b:end DONE 5" in stage.progress()
+
+
+def test_a_block_that_is_replaced_relaxes_without_a_jump(stage: Stage) -> None:
+    stage.send("a", smile(5))
+    stage.send("b", wait(1), composition="REPLACE", at=2.0)
+    times = list(np.arange(1.9, 2.6, 0.001))
+    face = stage.player.frames(np.array(times)).aus
+    assert face[0].max() > 0.3
+    assert face[-1].max() == 0.0
+    assert np.abs(np.diff(face, axis=0)).max() < 0.01
+
+
+def test_the_interrupt_attribute_ends_blocks_when_the_block_is_scheduled(stage: Stage) -> None:
+    stage.send("a", smile(5))
+    stage.send("b", smile(5))
+    stage.send("c", wait(1), interrupt="a", at=1.0)
+    told = stage.progress()
+    assert told.index("a:end INTERRUPTED 1") < told.index("c:start IN_EXEC 1")
+    assert "b:end DONE 5" in told
+
+
+def test_a_refused_block_interrupts_nobody(stage: Stage) -> None:
+    stage.send("a", smile(5))
+    stage.send("c", '<required><faceLexeme id="f" lexeme="NOTHING"/></required>', interrupt="a", at=1.0)
+    assert "a:end DONE 5" in stage.progress()
+
+
+# preplan
+
+
+def test_a_preplanned_block_waits_until_another_ones_start_activates_it(stage: Stage) -> None:
+    stage.send("p", smile(), preplan="true")
+    assert "p PENDING 0-2" in stage.until(1.0)
+    stage.send("a", wait(1), onStart="p", at=3.0)
+    assert stage.progress() == ["a:start IN_EXEC 3", "p:start IN_EXEC 3", "a:end DONE 4", "p:end DONE 5"]
+
+
+def test_a_block_after_a_preplanned_one_waits_with_it(stage: Stage) -> None:
+    stage.send("p", wait(2), preplan="true")
+    stage.send("b", wait(1), appendAfter="p")
+    assert stage.progress() == []
+    stage.send("a", wait(1), onStart="p", at=1.5e4)
+    told = [line for line in stage.progress() if line[0] == "b"]
+    assert told == ["b:start IN_EXEC 15002", "b:end DONE 15003"]
+
+
+def test_append_does_not_wait_for_a_block_nobody_may_ever_start(stage: Stage) -> None:
+    stage.send("p", wait(2), preplan="true")
+    stage.send("b", wait(1), composition="APPEND")
+    assert "b:start IN_EXEC 0" in stage.progress()
+
+
+def test_a_preplanned_block_that_is_replaced_is_revoked(stage: Stage) -> None:
+    stage.send("p", wait(2), preplan="true")
+    stage.send("b", wait(1), composition="REPLACE", at=1.0)
+    assert "p:end REVOKED 1" in stage.progress()
+
+
+def test_on_start_of_a_block_that_is_not_there_is_a_warning(stage: Stage) -> None:
+    stage.send("a", wait(1), onStart="nobody")
+    assert "! a EXECUTION_FAILURE" in stage.until(9)
+
+
+def test_a_preplanned_block_is_planned_again_beside_what_plays_when_it_is_activated(stage: Stage) -> None:
+    stage.send("p", gaze() + smile(), preplan="true")
+    stage.send("a", gaze("h"), onStart="p", at=1.0)
+    assert stage.until(9).count("! p:g CANNOT_CREATE_BEHAVIOR") == 1
+    assert "p:end DONE 3" in stage.log
+
+
+# arbitration
+
+
+def test_a_newer_block_does_not_disturb_the_gaze_of_an_earlier_one(stage: Stage) -> None:
+    stage.send("a", gaze())
+    schedule = stage.send("b", gaze("h") + smile(), at=1.0)
+    assert list(schedule.times) == ["s"]
+    assert "! b:h CANNOT_CREATE_BEHAVIOR" in stage.log
+    assert "gaze" in stage.texts[0]
+    assert "a:g" in stage.texts[0]
+
+
+@pytest.mark.parametrize("spoken", [lambda t: f'<speech id="s{t}"><text>{t}</text></speech>'])
+def test_a_character_speaks_one_speech_at_a_time(stage: Stage, spoken: Callable[[str], str]) -> None:
+    schedule = stage.send("a", spoken("one") + spoken("two"))
+    assert list(schedule.times) == ["sone"]
+    assert [line for line in stage.log if line[0] == "!"] == ["! a:stwo CANNOT_CREATE_BEHAVIOR"]
+
+
+def test_priority_decides_within_a_block(stage: Stage) -> None:
+    schedule = stage.send("a", gaze("g") + gaze("h").replace("<gaze", '<gaze bmla:priority="5"'))
+    assert list(schedule.times) == ["h"]
+
+
+def test_a_required_gaze_stays_and_the_other_goes(stage: Stage) -> None:
+    schedule = stage.send("a", gaze("g") + f"<required>{gaze('h')}</required>")
+    assert list(schedule.times) == ["h"]
+
+
+def test_two_required_gazes_at_one_time_fail_their_block(stage: Stage) -> None:
+    assert stage.send("a", f"<required>{gaze('g')}{gaze('h')}</required>").failed
+    assert [line for line in stage.log if line[0] == "!"] == ["! a CANNOT_CREATE_BEHAVIOR"]
+
+
+def test_what_waited_for_a_behaviour_that_goes_is_named_in_its_warning(stage: Stage) -> None:
+    nod = '<head id="n" lexeme="NOD" start="h:relax"/>'
+    schedule = stage.send("a", gaze("g") + gaze("h") + nod)
+    assert list(schedule.times) == ["g", "n"]
+    assert "with it went n:start" in stage.texts[0]
+
+
+def test_a_required_constraint_on_a_behaviour_that_goes_fails_the_block(stage: Stage) -> None:
+    tie = '<required><constraint><after ref="h:end"><sync ref="g:end"/></after></constraint></required>'
+    assert stage.send("a", gaze("g") + gaze("h") + tie).failed
+
+
+def test_two_characters_look_where_they_want(stage: Stage) -> None:
+    stage.send("a", gaze(), characterId="Ann")
+    stage.send("b", gaze(), characterId="Bob")
+    assert not stage.texts
+
+
+def test_a_gaze_that_another_block_is_done_with_is_free(stage: Stage) -> None:
+    stage.send("a", gaze())
+    stage.send("b", gaze(), at=1.5)
+    assert not stage.texts
+
+
+# ids
+
+
+def test_an_id_in_use_is_refused(stage: Stage) -> None:
+    stage.send("a", smile())
+    assert stage.send("a", smile(), at=1.0).failed
+    stage.send("a", smile(), at=2.0)
+    assert stage.progress().count("a:end DONE 4") == 1
+
+
+def test_a_thousand_appended_blocks_follow_one_another_and_move_together(stage: Stage) -> None:
+    for n in range(1000):
+        stage.send(f"b{n}", wait(1), composition="APPEND")
+    stage.player.stop(0.5, ["b0"])
+    stage.until(0.5)
+    ends = [line for line in stage.progress() if ":end" in line]
+    assert ends[:2] == ["b0:end INTERRUPTED 0.5", "b1:end DONE 1.5"]
+    assert ends[-1] == "b999:end DONE 999.5"
+
+
+@pytest.mark.parametrize("said", [{"interrupt": "b"}, {"composition": "REPLACE"}])
+@pytest.mark.parametrize("before", ["prependBefore", "chunkBefore"])
+def test_a_block_that_is_ended_by_the_one_put_before_it_stays_ended(
+    stage: Stage, said: dict[str, str], before: str
+) -> None:
+    stage.send("a", wait(0.5))
+    stage.send("b", wait(0.5), composition="APPEND")
+    assert not stage.send("c", wait(1), **said, **{before: "b"}).failed
+    told = stage.progress()
+    assert "b:end REVOKED 0" in told
+    assert "c:end DONE 1" in told
+    assert not any(line.startswith("b:start") for line in told)
+
+
+def test_replace_does_not_take_the_id_of_another_characters_block(stage: Stage) -> None:
+    stage.send("b", wait(0.5), characterId="Ann")
+    stage.send("x", wait(0.5), characterId="Bob")
+    assert stage.send("x", wait(1), composition="REPLACE", characterId="Ann").failed
+    assert "still in use" in stage.texts[0]
+    assert "x:end DONE 0.5" in stage.progress()
+
+
+def test_what_is_interrupted_of_a_preplanned_block_does_not_come_when_it_is_activated(stage: Stage) -> None:
+    stage.send("p", wait(0.5) + wait(0.2, id="s"), preplan="true")
+    stage.send("i", '<bmla:interrupt id="x" target="p" include="w"/>')
+    stage.send("a", '<bmla:activate id="k" target="p"/>', at=1.0)
+    assert "p:end DONE 1.2" in stage.progress()
+
+
+def test_a_wait_that_is_interrupted_ends_at_once(stage: Stage) -> None:
+    stage.send("a", wait(2) + wait(1, id="v"))
+    stage.send("i", '<bmla:interrupt id="x" target="a" include="w" start="0.3"/>')
+    assert "a:end DONE 1" in stage.progress()

@@ -1,0 +1,322 @@
+"""Composition, feedback and frames of a player that is told the time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bml_schema import Block, parse
+from bml_schema.feedback import (
+    BlockProgress,
+    Feedback,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
+from realizer.animation.targets import AU_NAMES
+from realizer.behaviours import VOCABULARY
+from realizer.playback.player import Player
+from realizer.speech import SilentVoice
+
+
+def block(content: str, id: str = "b", attributes: str = "") -> Block:
+    return parse(f'<bml id="{id}" {attributes}>{content}</bml>', VOCABULARY)
+
+
+def submit(player: Player, *args: str, now: float = 0.0) -> None:
+    made = block(*args)
+    voice = SilentVoice()
+    player.submit(made, now, {b: voice.say(say) for b, say in player.wants(made).items()})
+
+
+def progress(feedback: list[Feedback]) -> list[tuple[str, float]]:
+    return [(f.id, f.global_time) for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)]
+
+
+def au(player: Player, name: str, *times: float, character: int = 0) -> list[float]:
+    values = player.frames(np.array(times), character).aus[:, AU_NAMES().index(name)]
+    return [float(v) for v in values]
+
+
+SMILE = '<faceLexeme id="s" lexeme="SMILE" amount="1" start="0" attackPeak="0.4" relax="2" end="2.6"/>'
+
+
+def test_a_block_is_acknowledged_predicted_started_and_ended() -> None:
+    player = Player()
+    submit(player, SMILE, now=5.0)
+    first, planned, *rest = player.due(100.0)
+    assert isinstance(first, PredictionFeedback)
+    assert first.blocks[0].global_start == 5.0
+    assert first.blocks[0].global_end is None
+    assert isinstance(planned, PredictionFeedback)
+    assert planned.blocks[0].global_end == pytest.approx(7.6)
+    assert progress(rest) == [
+        ("b:start", 5.0),
+        ("b:s:start", 5.0),
+        ("b:s:attackPeak", pytest.approx(5.4)),
+        ("b:s:relax", pytest.approx(7.0)),
+        ("b:s:end", pytest.approx(7.6)),
+        ("b:end", pytest.approx(7.6)),
+    ]
+
+
+def test_feedback_comes_due_at_its_time_and_once() -> None:
+    player = Player()
+    submit(player, SMILE)
+    player.due(0.0)
+    assert player.next_deadline() == pytest.approx(0.4)
+    assert player.due(0.39) == []
+    assert [f.id for f in player.due(0.41) if isinstance(f, SyncPointProgress)] == ["b:s:attackPeak"]
+    assert player.due(0.41) == []
+    rest = [
+        f.id if isinstance(f, SyncPointProgress | BlockProgress) else "SUBSIDING" for f in player.due(10.0)
+    ]
+    assert rest == ["b:s:relax", "SUBSIDING", "b:s:end", "b:end"]
+    assert player.next_deadline() is None
+
+
+def test_an_empty_block_starts_and_ends_at_once() -> None:
+    player = Player()
+    submit(player, "", now=2.0)
+    assert progress(player.due(2.0)) == [("b:start", 2.0), ("b:end", 2.0)]
+
+
+def test_append_starts_when_all_earlier_blocks_end_and_after_their_end_is_reported() -> None:
+    player = Player()
+    submit(player, SMILE, "first")
+    submit(player, SMILE, "second", 'composition="APPEND"')
+    told = progress(player.due(100.0))
+    assert told.index(("first:end", 2.6)) < told.index(("second:start", 2.6))
+
+
+def test_append_with_nothing_to_wait_for_starts_now() -> None:
+    player = Player()
+    submit(player, SMILE, "a", 'composition="APPEND"', now=3.0)
+    assert ("a:start", 3.0) in progress(player.due(3.0))
+
+
+def test_merge_plays_beside() -> None:
+    player = Player()
+    submit(player, SMILE, "first")
+    submit(player, SMILE, "second", now=1.0)
+    told = dict(progress(player.due(100.0)))
+    assert told["second:start"] == 1.0
+    assert told["first:end"] == pytest.approx(2.6)
+
+
+def test_replace_ends_earlier_blocks_first_and_silences_them() -> None:
+    player = Player()
+    submit(player, SMILE, "first")
+    submit(player, SMILE, "waiting", 'composition="APPEND"')
+    player.due(1.0)
+    submit(player, SMILE, "second", 'composition="REPLACE"', now=1.0)
+    told = [id for id, _ in progress(player.due(100.0))]
+    assert told[:3] == ["first:end", "waiting:end", "second:start"]
+    assert not any(id.startswith(("first:s", "waiting:s")) for id in told)
+
+
+def test_ids_can_be_used_again_after_the_end_and_after_a_replace() -> None:
+    player = Player()
+    submit(player, SMILE, "b")
+    player.due(1.0)
+    submit(player, SMILE, "b", 'composition="REPLACE"', now=1.0)
+    player.due(20.0)
+    submit(player, SMILE, "b", now=20.0)
+    told = progress(player.due(100.0))
+    assert ("b:start", 20.0) in told
+
+
+def test_an_id_that_still_plays_is_refused_with_one_warning() -> None:
+    player = Player()
+    submit(player, SMILE)
+    player.due(0.5)
+    submit(player, SMILE, now=1.0)
+    told = player.due(1.0)
+    warnings = [f for f in told if isinstance(f, WarningFeedback)]
+    assert len(warnings) == 1
+    assert "still in use" in warnings[0].text
+    assert [id for id, _ in progress(player.due(100.0))][-1] == "b:end"
+
+
+def test_stop_ends_a_block_without_a_jump_of_the_face() -> None:
+    player = Player(idle=False)
+    submit(player, SMILE)
+    player.due(1.0)
+    before = au(player, "12L", 1.0)[0]
+    assert player.stop(1.0) == ["b"]
+    assert progress(player.due(1.0)) == [("b:end", 1.0)]
+    times = np.arange(1.0, 1.6, 0.01)
+    values = np.array(au(player, "12L", *times))
+    assert values[0] == pytest.approx(before, abs=1e-6)
+    assert np.abs(np.diff(values)).max() < 0.1
+    assert values[-1] == 0
+    assert player.due(100.0) == []
+
+
+def test_a_nod_lands_on_its_word() -> None:
+    player = Player(idle=False)
+    made = block(
+        '<speech id="say"><text>Yes I <sync id="really"/>really do</text></speech>'
+        '<head id="nod" lexeme="NOD" stroke="say:really"/>'
+    )
+    voice = SilentVoice()
+    plan = player.submit(made, 0.0, {b: voice.say(s) for b, s in player.wants(made).items()})
+    assert plan.at("nod", "stroke") == pytest.approx(plan.at("say", "really"))
+    assert au(player, "54", plan.at("nod", "stroke"))[0] > 0.05
+
+
+def test_a_shift_stays_and_the_next_shift_takes_it_over() -> None:
+    player = Player(idle=False)
+    shift = '<faceShift id="{}" start="0" end="1"><faceLexeme lexeme="SMILE" amount="{}"/></faceShift>'
+    submit(player, shift.format("f", 0.6), "one")
+    player.due(5.0)
+    smile = au(player, "12L", 5.0)[0]
+    assert smile > 0.2
+    submit(player, shift.format("f", 0), "two", now=10.0)
+    player.due(10.0)
+    assert au(player, "12L", 10.0)[0] == pytest.approx(smile, abs=1e-5)
+    assert au(player, "12L", 11.5)[0] == pytest.approx(0, abs=1e-6)
+
+
+def test_the_first_name_heard_is_the_first_characters_and_others_stand_beside() -> None:
+    player = Player(idle=False)
+    submit(player, SMILE, "a", 'characterId="Ann"')
+    submit(player, SMILE, "b", 'characterId="Bob" composition="APPEND"')
+    assert player.characters == ["Ann", "Bob"]
+    assert au(player, "12L", 1.0, character=0)[0] > 0.4
+    assert au(player, "12L", 1.0, character=1)[0] > 0.4
+
+
+def test_a_reference_into_a_running_block_is_pinned_to_it() -> None:
+    player = Player()
+    submit(player, SMILE, "first")
+    player.due(1.0)
+    submit(player, '<head id="n" lexeme="NOD" stroke="first:s:end"/>', "second", now=1.0)
+    told = dict(progress(player.due(100.0)))
+    assert told["second:n:stroke"] == pytest.approx(2.6)
+
+
+def test_a_required_behaviour_that_cannot_be_played_takes_the_block_with_one_warning() -> None:
+    player = Player()
+    submit(player, f'{SMILE}<required><faceLexeme id="x" lexeme="WAGGLE_EARS"/></required>')
+    told = player.due(100.0)
+    assert progress(told) == []
+    warnings = [f for f in told if isinstance(f, WarningFeedback)]
+    assert [w.id for w in warnings] == ["b"]
+    assert "WAGGLE_EARS" in warnings[0].text
+
+
+def test_a_dropped_behaviour_does_not_hold_up_the_end() -> None:
+    player = Player()
+    submit(player, f'{SMILE}<faceLexeme id="x" lexeme="WAGGLE_EARS" start="0" end="60"/>')
+    told = player.due(100.0)
+    assert [f.id for f in told if isinstance(f, WarningFeedback)] == ["b:x"]
+    assert progress(told)[-1] == ("b:end", pytest.approx(2.6))
+
+
+def test_directly_set_values_hold_until_let_go() -> None:
+    player = Player(idle=False)
+    player.set_direct({"12L": 0.8}, now=1.0)
+    assert au(player, "12L", 1.0, 5.0) == pytest.approx([0, 0.8])
+    player.set_direct({"12L": None}, now=6.0)
+    assert au(player, "12L", 6.0, 8.0) == pytest.approx([0.8, 0])
+    with pytest.raises(KeyError):
+        player.set_direct({"99X": 1.0}, now=8.0)
+
+
+def test_a_long_session_forgets_what_is_past() -> None:
+    player = Player()
+    for i in range(50):
+        submit(player, SMILE, f"b{i}", now=10.0 * i)
+        player.due(10.0 * i + 5)
+    assert len(player._blocks.cast.all()) <= 2
+    assert player.state(500.0)["blocks"] == []
+
+
+@given(st.integers(0, 2**31), st.floats(0, 200))
+def test_frames_at_25_fps_are_every_second_of_50(seed: int, start: float) -> None:
+    player = Player(seed=seed)
+    submit(player, SMILE, now=start)
+    slow = player.frames(start + np.arange(40) / 25)
+    fast = player.frames(start + np.arange(80) / 50)
+    assert np.allclose(slow.values, fast.values[::2], atol=1e-6)
+
+
+@given(st.lists(st.floats(0, 4), min_size=1, max_size=8))
+def test_however_often_it_is_asked_the_feedback_is_the_same(asked: list[float]) -> None:
+    def told(times: list[float]) -> list[str]:
+        player = Player()
+        submit(player, SMILE, "a")
+        submit(player, SMILE, "c", 'composition="APPEND"')
+        return [f.to_xml() for now in times for f in player.due(now)]
+
+    assert told([*sorted(asked), 100.0]) == told([100.0])
+
+
+# What a face moves by itself: brows, lids, head, eyes.
+OWN = ("1L", "1R", "2L", "2R", "45L", "45R", *map(str, range(51, 57)), *map(str, range(61, 65)))
+WORDS = "Whoever follows the river to the tower, will discover a little door."
+TALK = f'<speech id="t"><text>{WORDS}</text></speech>'
+
+
+def test_without_prosody_a_face_that_speaks_is_as_idle_as_one_that_is_silent() -> None:
+    times = np.arange(0.0, 8.0, 0.04)
+    own = np.array([name in OWN for name in AU_NAMES()])
+    silent, still, lively = Player(seed=4), Player(seed=4, prosody=False), Player(seed=4)
+    submit(still, TALK)
+    submit(lively, TALK)
+    np.testing.assert_array_equal(still.frames(times).aus[:, own], silent.frames(times).aus[:, own])
+    assert not np.array_equal(lively.frames(times).aus[:, own], silent.frames(times).aus[:, own])
+
+
+def test_without_idle_motion_there_is_no_prosody() -> None:
+    times = np.arange(0.0, 8.0, 0.04)
+    one, other = Player(idle=False), Player(idle=False, prosody=False)
+    submit(one, TALK)
+    submit(other, TALK)
+    np.testing.assert_array_equal(one.frames(times).values, other.frames(times).values)
+
+
+def test_a_face_that_keeps_still_does_so_while_it_speaks() -> None:
+    times = np.arange(0.2, 8.0, 0.04)
+    still = '<own:idle id="i" blinks="0" motion="0" start="0" end="0.1"/>'
+    player = Player()
+    submit(player, still + TALK, "b", 'xmlns:own="urn:bml-realizer:1"')
+    own = [AU_NAMES().index(name) for name in OWN]
+    assert player.frames(times).aus[:, own].max() == 0.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_nod_that_a_document_asks_for_is_the_same_while_the_face_speaks(seed: int) -> None:
+    nod = '<head id="n" lexeme="NOD" start="1.5" end="3"/>'
+    lively, still = Player(seed=seed), Player(seed=seed, prosody=False)
+    for player in (lively, still):
+        submit(player, TALK + nod)
+    heads = [AU_NAMES().index(str(number)) for number in range(51, 57)]
+    during = np.arange(1.5, 3.001, 0.02)
+    shown, wanted = (p.frames(during).aus[:, heads] for p in (lively, still))
+    np.testing.assert_array_equal(shown, wanted)
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 1000), st.lists(st.floats(0.0, 12.0), min_size=1, max_size=3), st.floats(0.0, 12.0))
+def test_a_face_that_is_looked_at_as_it_speaks_moves_as_one_that_is_played_back(
+    seed: int, starts: list[float], nod: float
+) -> None:
+    """Blocks that have ended are forgotten by and by; what was shown and what comes stay what they are."""
+    live, played = Player(seed=seed), Player(seed=seed, history=float("inf"))
+    todo = sorted([(start, TALK) for start in starts] + [(nod, '<head id="n" lexeme="NOD"/>')])
+    own = [AU_NAMES().index(name) for name in OWN]
+    seen = []
+    times = np.arange(0.0, 26.0, 0.16)
+    for number, now in enumerate(times):
+        while todo and todo[0][0] <= now:
+            _, content = todo.pop(0)
+            for player in (live, played):
+                submit(player, content, f"b{number}-{len(todo)}", now=float(now))
+        for player in (live, played):
+            player.due(float(now))
+        seen.append(live.frames(np.array([now])).aus[0, own])
+    np.testing.assert_array_equal(np.array(seen), played.frames(times).aus[:, own])

@@ -1,0 +1,35 @@
+"""Every sync reference of a block is found, wherever it stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bml_schema import parse
+from realizer.playback.references import abroad, redirected, references
+
+
+def test_references_of_attributes_texts_and_constraints_are_found() -> None:
+    block = parse(
+        """<bml id="b"><head id="h" lexeme="NOD" start="1" stroke="x:y:end"/>
+        <speech id="s"><text>a <sync id="m" ref="2"/> b</text></speech>
+        <required><constraint><before ref="h:end"><sync ref="3"/></before>
+        <synchronize><sync ref="4"/><sync ref="s:start"/></synchronize></constraint></required></bml>"""
+    )
+    assert sorted(map(str, references(block))) == ["1", "2", "3", "4", "h:end", "s:start", "x:y:end"]
+
+
+def test_references_abroad_are_those_into_other_blocks() -> None:
+    block = parse('<bml id="b"><head id="h" lexeme="NOD" start="x:y:end" relax="b:h:stroke + 1"/></bml>')
+    assert [str(ref) for ref in abroad(block)] == ["x:y:end"]
+
+
+def test_every_reference_can_be_made_to_another() -> None:
+    block = parse(
+        """<bml id="b"><head id="h" lexeme="NOD" start="1" stroke="x:y:end"/>
+        <speech id="s"><text>a <sync id="m" ref="2"/> b</text></speech>
+        <required><constraint><before ref="h:end"><sync ref="3"/></before>
+        <synchronize><sync ref="4"/><sync ref="s:start"/></synchronize></constraint></required></bml>"""
+    )
+    assert redirected(block, lambda ref: ref) == block
+    later = redirected(block, lambda ref: replace(ref, offset=ref.offset + 1))
+    assert sorted(ref.offset for ref in references(later)) == [1, 1, 1, 2, 3, 4, 5]

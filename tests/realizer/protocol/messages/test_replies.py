@@ -1,0 +1,58 @@
+"""Messages out: what is not said is left out, and what goes over the wire is as it is described."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from realizer.protocol.messages import (
+    PICTURES,
+    STREAMS,
+    Capabilities,
+    ErrorMessage,
+    FrameMessage,
+    ScheduleMessage,
+    StateMessage,
+    Welcome,
+)
+
+NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
+
+
+def test_replies_leave_out_what_they_do_not_say() -> None:
+    text = ErrorMessage(code="invalid", message="y").text()
+    assert text == '{"type":"error","code":"invalid","message":"y"}'
+
+
+def test_welcome_names_version_capabilities_and_limits(driver) -> None:
+    (told,) = driver.send({"type": "hello"}).of("welcome")
+    welcome = Welcome.model_validate(told, extra="forbid")
+    assert welcome.version == 1
+    assert welcome.capabilities.streams == {name: list(known) for name, known in STREAMS.items()}
+    assert welcome.capabilities.pictures == list(PICTURES)
+    assert (welcome.limits.document, welcome.limits.fps) == (2**20, 240)
+    assert isinstance(welcome.capabilities, Capabilities)
+
+
+@pytest.mark.parametrize("stream", ["fap", "au", "arkit"])
+def test_json_frames_are_as_described(driver, stream) -> None:
+    driver.send({"type": "subscribe", "stream": stream, "encoding": "json"})
+    client = driver.run(0.5)
+    assert len(client.of(stream)) == 13
+    for frame in client.of(stream):
+        FrameMessage.model_validate(frame, extra="forbid")
+        assert len(frame["values"]) == len(client.of("subscribed")[0]["names"])
+
+
+def test_schedules_and_states_are_as_described(driver) -> None:
+    driver.send({"type": "subscribe", "stream": "schedule"})
+    driver.send(NOD)
+    driver.run(0.2)
+    driver.send({"type": "state"})
+    client = driver.run(5)
+    for told in client.of("schedule"):
+        ScheduleMessage.model_validate(told, extra="forbid")
+    (state,) = [StateMessage.model_validate(told, extra="forbid") for told in client.of("state")]
+    assert [(b.id, b.status, b.behaviours) for b in state.blocks] == [("b", "IN_EXEC", ["n"])]
+    assert json.loads(state.text()) == client.of("state")[0]

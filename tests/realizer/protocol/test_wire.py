@@ -1,0 +1,130 @@
+"""Binary frames: what is packed is what is unpacked, and the header is where clients look for it."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.protocol.wire import (
+    ClipPiece,
+    FrameKind,
+    WireError,
+    json_frame,
+    pack,
+    pack_clip,
+    pack_frames,
+    unpack,
+    unpack_clip,
+)
+
+
+@given(
+    kind=st.sampled_from(list(FrameKind)),
+    frame=st.integers(0, 2**32 - 1),
+    time=st.floats(0, 1e6),
+    payload=st.binary(max_size=64),
+    character=st.integers(0, 255),
+    forget=st.booleans(),
+)
+def test_a_frame_comes_back_as_it_was(kind, frame, time, payload, character, forget) -> None:
+    got = unpack(pack(kind, frame, time, payload, character=character, forget=forget))
+    assert (got.kind, got.frame, got.time, got.payload) == (kind, frame, time, payload)
+    assert (got.character, got.forget) == (character, forget)
+
+
+@given(
+    kind=st.sampled_from([FrameKind.FAP, FrameKind.AU]),
+    first=st.integers(0, 2**31),
+    count=st.integers(0, 5),
+    width=st.integers(1, 70),
+    character=st.integers(0, 255),
+)
+def test_frames_packed_together_are_those_packed_alone(kind, first, count, width, character) -> None:
+    dtype = "<i4" if kind is FrameKind.FAP else "<f4"
+    rows = np.arange(count * width).reshape(count, width).astype(dtype)
+    times = (first + np.arange(count)) / 25
+    whole, size = pack_frames(kind, first, times, rows, character=character)
+    alone = [
+        pack(kind, first + k, float(times[k]), rows[k].tobytes(), character=character) for k in range(count)
+    ]
+    assert [whole[k * size : (k + 1) * size] for k in range(count)] == alone
+    assert len(whole) == count * size
+
+
+def test_the_header_is_sixteen_bytes_little_endian() -> None:
+    message = pack(FrameKind.SOUND, 7, 0.14, b"xy", character=3, forget=True)
+    assert struct.unpack("<BBHId", message[:16]) == (4, 1, 0x103, 7, 0.14)
+    assert message[16:] == b"xy"
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        (FrameKind.FAP, np.arange(68, dtype="<i4")),
+        (FrameKind.AU, np.linspace(0, 1, 9, dtype="<f4")),
+        (FrameKind.SOUND, np.arange(-5, 5, dtype="<i2")),
+        (FrameKind.MESH, np.arange(12, dtype="<i2").reshape(4, 3)),
+    ],
+)
+def test_values_are_numbers_of_their_kind(kind, values) -> None:
+    got = unpack(pack(kind, 0, 0.0, values.tobytes())).values
+    assert got.dtype == values.dtype
+    assert np.array_equal(got, values)
+
+
+def test_a_picture_has_no_values() -> None:
+    with pytest.raises(WireError, match="picture has no values"):
+        _ = unpack(pack(FrameKind.PICTURE, 0, 0.0, b"jpeg")).values
+
+
+@pytest.mark.parametrize(
+    ("message", "says"),
+    [
+        (b"short", "16 bytes, got 5"),
+        (struct.pack("<BBHId", 1, 9, 0, 0, 0.0), "version 1 .* got 9"),
+        (struct.pack("<BBHId", 77, 1, 0, 0, 0.0), "got 77"),
+    ],
+)
+def test_what_is_no_frame_is_told(message, says) -> None:
+    with pytest.raises(WireError, match=says):
+        unpack(message)
+
+
+def test_a_json_frame_says_its_stream_number_and_time() -> None:
+    assert json.loads(json_frame("fap", 3, 0.12, [1, 2])) == {
+        "type": "fap",
+        "frame": 3,
+        "time": 0.12,
+        "values": [1, 2],
+    }
+    assert json.loads(json_frame("au", 0, 0.0, [], "Ada"))["character"] == "Ada"
+
+
+def test_a_piece_of_a_clip_comes_back_as_it_was() -> None:
+    piece = ClipPiece("müsli", 7, 22050, b"\x01\x02\x03", final=False)
+    message = pack_clip(piece)
+    assert message[:8] == bytes([4, 1, 0, 0, 7, 0, 0, 0])
+    assert unpack_clip(message) == piece
+    assert unpack_clip(pack_clip(replace(piece, final=True))).final
+
+
+@pytest.mark.parametrize(
+    ("message", "says"),
+    [
+        (b"\x04\x01", "header"),
+        (pack(FrameKind.FAP, 0, 0.0, b""), "kind 1"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"abc"), "rate and an id"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"\x00\x00\x00\x00\x05ab"), "id of 5 bytes"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"\x00\x00\x00\x00\x00ab"), "id of 1 bytes"),
+        (pack(FrameKind.SOUND, 0, 0.0, b"\x00\x00\x00\x00\x02\xff\xfe"), "UTF-8"),
+    ],
+)
+def test_what_is_no_clip_says_why(message, says) -> None:
+    with pytest.raises(WireError, match=says):
+        unpack_clip(message)

@@ -1,0 +1,86 @@
+"""The text that Prometheus reads, read back."""
+
+from __future__ import annotations
+
+import re
+
+from realizer.server.http.metrics import COUNTERS, GAUGES, Metrics, summed
+
+SAMPLE = re.compile(r'([a-z_]+)(?:\{([a-z]+="[^"]*"(?:,[a-z]+="[^"]*")*)\})? (\S+)')
+
+
+def samples(text: str) -> dict[tuple[str, str], float]:
+    """(name, labels) -> value, of a text of which every line is a comment or a sample."""
+    assert text.endswith("\n")
+    found = {}
+    for line in text.splitlines():
+        if not line.startswith("# "):
+            match = SAMPLE.fullmatch(line)
+            assert match, line
+            found[match[1], match[2] or ""] = float(match[3])
+    return found
+
+
+def test_every_series_says_what_it_is_once() -> None:
+    text = Metrics().text(dict.fromkeys(GAUGES, 0), {})
+    names = re.findall(r"^# TYPE (\S+) (\S+)$", text, re.M)
+    assert len(names) == len({name for name, _ in names}) == len(GAUGES) + len(COUNTERS) + 2
+    assert re.findall(r"^# HELP (\S+) .+$", text, re.M) == [name for name, _ in names]
+
+
+def test_a_histogram_counts_upwards_to_all() -> None:
+    metrics = Metrics()
+    for seconds in (0.0, 0.0005, 0.002, 0.3, 70.0):
+        metrics.late.observe(seconds)
+    got = samples(metrics.text(dict.fromkeys(GAUGES, 0), {}))
+    buckets = [value for (name, _), value in got.items() if name == "realizer_lateness_seconds_bucket"]
+    assert buckets == sorted(buckets)
+    assert got["realizer_lateness_seconds_bucket", 'le="0.0005"'] == 2  # an end belongs to its bucket
+    assert got["realizer_lateness_seconds_bucket", 'le="0.5"'] == 4
+    assert got["realizer_lateness_seconds_bucket", 'le="+Inf"'] == 5
+    assert got["realizer_lateness_seconds_count", ""] == 5
+    assert abs(got["realizer_lateness_seconds_sum", ""] - 70.3025) < 1e-6
+
+
+def test_one_of_several_workers_says_which_it_is() -> None:
+    metrics = Metrics(worker=1)
+    metrics.counts["messages"] += 3
+    got = samples(metrics.text(dict.fromkeys(GAUGES, 2), {"messages": 4}))
+    assert got["realizer_messages_total", 'worker="1"'] == 7
+    assert got["realizer_sessions", 'worker="1"'] == 2
+    assert got["realizer_planning_seconds_bucket", 'worker="1",le="+Inf"'] == 0
+
+
+def test_a_count_is_told_to_its_last_digit() -> None:
+    metrics = Metrics()
+    metrics.counts["messages"] = 123_456_789
+    metrics.late.observe(1e9 + 0.25)
+    got = samples(metrics.text(dict.fromkeys(GAUGES, 7_654_321), {}))
+    assert got["realizer_messages_total", ""] == 123_456_789
+    assert got["realizer_sessions", ""] == 7_654_321
+
+
+def test_what_all_workers_counted_is_the_sum_of_theirs() -> None:
+    texts = {}
+    for number in (0, 2):
+        metrics = Metrics(worker=number)
+        metrics.counts["frames_dropped"] = 10_000_000 + number
+        for seconds in (0.0001, 0.3 * (number + 1)):
+            metrics.late.observe(seconds)
+        texts[number] = metrics.text(dict.fromkeys(GAUGES, number + 1), {})
+    whole = summed(texts)
+    got = samples(whole)
+    assert got["realizer_frames_dropped_total", ""] == 20_000_002
+    assert got["realizer_sessions", ""] == 4
+    assert got["realizer_lateness_seconds_bucket", 'le="0.0005"'] == 2
+    assert got["realizer_lateness_seconds_bucket", 'le="0.5"'] == 3
+    assert got["realizer_lateness_seconds_bucket", 'le="+Inf"'] == 4
+    assert abs(got["realizer_lateness_seconds_sum", ""] - 1.2002) < 1e-6
+    assert {labels: v for (name, labels), v in got.items() if name == "realizer_worker_sessions"} == {
+        'worker="0"': 1,
+        'worker="2"': 3,
+    }
+    # The comments of a series come once, before its samples.
+    types = re.findall(r"^# TYPE (\S+) \S+$", whole, re.M)
+    assert len(types) == len(set(types))
+    assert whole.index("# TYPE realizer_lateness_seconds ") < whole.index("realizer_lateness_seconds_bucket")

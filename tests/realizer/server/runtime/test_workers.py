@@ -1,0 +1,346 @@
+"""Several processes behind one port: a session has one of them, whoever comes to it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Coroutine, Iterator
+from typing import TypeVar
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+
+from realizer.core.settings import Settings
+from realizer.server.runtime import gathered
+from realizer.server.runtime.workers import Workers, worker_of
+
+T = TypeVar("T")
+LIMIT = 60  # s; a hung test ends
+NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Workers]:
+    """Two, in an event loop of their own."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+
+    def wait(coroutine: Coroutine[None, None, T]) -> T:
+        return asyncio.run_coroutine_threadsafe(coroutine, loop).result(LIMIT)
+
+    there = wait(Workers(Settings(port=0, voice="silent", workers=2)).start())
+    yield there
+    wait(there.close())
+    loop.call_soon_threadsafe(loop.stop)
+    thread.join()
+    loop.close()
+
+
+def played(test: Coroutine[None, None, None]) -> None:
+    """Run a client to its end."""
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT):
+            await test
+
+    asyncio.run(run())
+
+
+def address(workers: Workers) -> str:
+    return f"ws://127.0.0.1:{workers.port}/ws"
+
+
+def one_of(number: int) -> str:
+    """The name of a session that a worker has."""
+    return next(f"s{k}" for k in range(100) if worker_of(f"s{k}", 2, Settings()) == number)
+
+
+async def told(client: ClientConnection, what: str) -> str:
+    """The first text message that holds `what`."""
+    async for message in client:
+        if isinstance(message, str) and what in message:
+            return message
+    raise AssertionError(f"the connection ended before {what!r}")
+
+
+def test_clients_meet_in_the_session_they_name_whichever_worker_has_it(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        for number in (0, 1):
+            name = one_of(number)
+            async with connect(f"{url}?session={name}") as sends, connect(f"{url}?session={name}") as looks:
+                await sends.send(NOD.format(f"b{number}"))
+                assert "blockProgress" in await told(looks, f'"b{number}:start"')
+
+    played(test())
+
+
+def test_a_session_that_another_worker_has_says_how_it_is_reached(
+    workers: Workers,
+) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        async with connect(f"{url}?session={one_of(0)}") as client:
+            await client.send(json.dumps({"type": "hello", "version": 1, "session": one_of(1)}))
+            error = json.loads(await told(client, '"error"'))
+            assert f"/ws?session={one_of(1)}" in error["message"]
+            await client.send(NOD.format("b"))  # and plays on where it is
+            await told(client, '"b:end"')
+
+    played(test())
+
+
+def test_each_worker_tells_its_own_numbers_to_who_names_it(workers: Workers) -> None:
+    for number in (0, 1, 1, 0):
+        address = f"http://127.0.0.1:{workers.port}/metrics?worker={number}"
+        with urllib.request.urlopen(address, timeout=LIMIT) as answer:
+            assert f'realizer_sessions{{worker="{number}"}}' in answer.read().decode()
+
+
+def metrics(workers: Workers, query: str = "", headers: dict[str, str] | None = None) -> dict[str, float]:
+    """name and labels -> value, of what all workers or one of them tell."""
+    address = f"http://127.0.0.1:{workers.port}/metrics{query}"
+    with urllib.request.urlopen(urllib.request.Request(address, headers=headers or {}), timeout=LIMIT) as got:
+        text = got.read().decode()
+        assert len(text.encode()) == int(got.headers["Content-Length"])
+    assert text.count("# TYPE realizer_sessions gauge") == 1
+    return {
+        line.rpartition(" ")[0]: float(line.rpartition(" ")[2])
+        for line in text.splitlines()
+        if not line.startswith("#")
+    }
+
+
+def test_one_scrape_tells_the_sum_of_all_workers(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        names = [one_of(0), one_of(1)]
+        async with contextlib.AsyncExitStack() as stack:
+            clients = [await stack.enter_async_context(connect(f"{url}?session={name}")) for name in names]
+            clients.append(await stack.enter_async_context(connect(f"{url}?session={names[1]}")))
+            for number, client in enumerate(clients):
+                await client.send(NOD.format(f"m{number}"))
+            for number, client in enumerate(clients):
+                await told(client, f'"m{number}:start"')
+            each = [await asyncio.to_thread(metrics, workers, f"?worker={number}") for number in (0, 1)]
+            whole = await asyncio.to_thread(metrics, workers)
+        for name in ("realizer_sessions", "realizer_connections", "realizer_messages_total"):
+            assert whole[name] == sum(each[k][f'{name}{{worker="{k}"}}'] for k in (0, 1))
+        assert whole["realizer_connections"] == 3
+        for number in (0, 1):
+            mine = each[number][f'realizer_sessions{{worker="{number}"}}']
+            assert whole[f'realizer_worker_sessions{{worker="{number}"}}'] == mine >= 1
+        planned = [each[k][f'realizer_planning_seconds_bucket{{worker="{k}",le="+Inf"}}'] for k in (0, 1)]
+        assert whole['realizer_planning_seconds_bucket{le="+Inf"}'] >= sum(planned) >= 3
+        assert (
+            whole["realizer_planning_seconds_count"] == whole['realizer_planning_seconds_bucket{le="+Inf"}']
+        )
+
+    played(test())
+
+
+@pytest.mark.parametrize("named", ["9", "2", "x", "-1", "", "01"])
+@pytest.mark.parametrize("path", ["metrics", "healthz"])
+def test_a_worker_that_there_is_not_is_not_found(workers: Workers, path: str, named: str) -> None:
+    with pytest.raises(urllib.error.HTTPError, match="404") as missing:
+        urllib.request.urlopen(f"http://127.0.0.1:{workers.port}/{path}?worker={named}", timeout=LIMIT)
+    assert missing.value.read().decode() == f"worker: wanted a number of 0..1, got {named!r}\n"
+    missing.value.close()
+
+
+def health(workers: Workers, query: str = "") -> dict[str, object]:
+    with urllib.request.urlopen(f"http://127.0.0.1:{workers.port}/healthz{query}", timeout=LIMIT) as answer:
+        told: dict[str, object] = json.loads(answer.read())
+    return told
+
+
+def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        names = [one_of(0), one_of(1)]
+        async with contextlib.AsyncExitStack() as stack:
+            for name in names:
+                await stack.enter_async_context(connect(f"{url}?session={name}"))
+            each = [await asyncio.to_thread(health, workers, f"?worker={k}") for k in (0, 1)]
+            assert all(one["connections"] for one in each)
+            whole = await asyncio.to_thread(health, workers)
+            assert (whole["status"], whole["workers"]) == ("ok", 2)
+            assert whole["connections"] == sum(int(str(one["connections"])) for one in each)
+            os.kill(workers.processes[1], signal.SIGSTOP)
+            try:
+                left = await asyncio.to_thread(health, workers)
+            finally:
+                os.kill(workers.processes[1], signal.SIGCONT)
+            assert (left["status"], left["silent"]) == ("partly", [1])
+            assert left["connections"] == each[0]["connections"]
+
+    played(test())
+
+
+def test_one_worker_that_hangs_is_left_out_of_the_sum(
+    workers: Workers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gathered, "PATIENCE", 2.0)
+    os.kill(workers.processes[1], signal.SIGSTOP)
+    try:
+        whole = metrics(workers)
+    finally:
+        os.kill(workers.processes[1], signal.SIGCONT)
+    assert 'realizer_worker_sessions{worker="0"}' in whole
+    assert 'realizer_worker_sessions{worker="1"}' not in whole
+
+
+def test_the_sum_is_for_those_who_have_the_token() -> None:
+    async def test() -> None:
+        there = await Workers(Settings(port=0, voice="silent", workers=2, token="Xk-secret-7")).start()
+        try:
+            with pytest.raises(urllib.error.HTTPError, match="401") as refused:
+                await asyncio.to_thread(metrics, there)
+            assert b"REALIZER_TOKEN" in refused.value.read()
+            refused.value.close()
+            for query, headers in (("?token=Xk-secret-7", {}), ("", {"Authorization": "Bearer Xk-secret-7"})):
+                whole = await asyncio.to_thread(metrics, there, query, headers)
+                assert whole['realizer_worker_sessions{worker="1"}'] == 0
+            # Both workers have refused one.
+            assert whole["realizer_refused_total"] == 2
+        finally:
+            await there.close()
+
+    played(test())
+
+
+def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        async with connect(f"{url}?session={one_of(0)}") as stays:
+            async with connect(f"{url}?session={one_of(1)}") as client:
+                await client.send(NOD.format("b"))
+                await told(client, '"b:start"')
+                os.kill(workers.processes[1], signal.SIGKILL)
+                with contextlib.suppress(Exception):
+                    async for _ in client:
+                        pass
+            await stays.send(NOD.format("c"))
+            await told(stays, '"c:end"')
+            async with connect(f"{url}?session={one_of(1)}") as client:
+                await client.send(NOD.format("d"))
+                await told(client, '"d:end"')
+
+    played(test())
+
+
+def test_a_client_that_says_nothing_or_half_a_line_keeps_nobody_waiting(workers: Workers) -> None:
+    url = address(workers)
+
+    async def test() -> None:
+        silent = [socket.create_connection(("127.0.0.1", workers.port)) for _ in range(20)]
+        silent[0].sendall(b"GET /ws?sess")
+        async with connect(url) as client:
+            await client.send(NOD.format("b"))
+            await told(client, '"b:start"')
+        silent[0].sendall(b"ion=x HTTP/1.1\r\nHost: x\r\n\r\n")
+        answer = await asyncio.to_thread(silent[0].recv, 4096)
+        assert b" 426 " in answer
+        for one in silent:
+            one.close()
+
+    played(test())
+
+
+def test_sessions_of_other_doors_are_where_these_doors_are() -> None:
+    for name in ("asap-127.0.0.1", "xface-127.0.0.1", "stomp-json", "xface-player"):
+        assert worker_of(name, 7, Settings()) == 0
+    assert {worker_of(f"session-{k}", 7, Settings()) for k in range(100)} == set(range(7))
+
+
+def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "realizer",
+        "serve",
+        "--port",
+        "0",
+        "--voice",
+        "silent",
+        "--workers",
+        "2",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        url = service.stdout.readline().split()[2]
+        page = service.stdout.readline().split()[2]
+        with urllib.request.urlopen(page + "healthz", timeout=LIMIT) as answer:
+            assert json.loads(answer.read())["status"] == "ok"
+
+        async def play() -> None:
+            async with connect(url) as client:
+                await client.send(NOD.format("b"))
+                await told(client, '"b:start"')
+                service.send_signal(signal.SIGTERM)
+                await told(client, '"b:end"')
+
+        played(play())
+        assert service.wait(LIMIT) == 0
+
+
+def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("realizer.server.runtime.workers.GRACE", 0.2)
+
+    async def test() -> None:
+        service = await Workers(Settings(port=0, voice="silent", workers=2, drain=0.0)).start()
+        children = service.processes
+        os.kill(children[1], signal.SIGSTOP)
+        await service.close()
+        for child in children:
+            with pytest.raises(ProcessLookupError):
+                os.kill(child, 0)
+
+    played(test())
+    assert "worker 1 does not end: it is killed" in caplog.text
+
+
+def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> None:
+    command = [sys.executable, "-m", "realizer", "-v", "serve", "--port", "0", "--voice", "silent"]
+    command += ["--workers", "2", "--token", "a-token-nobody-knows"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        page = service.stdout.readline() and service.stdout.readline().split()[2]
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(page + "metrics?worker=1", timeout=LIMIT)
+        refused.value.close()
+        service.send_signal(signal.SIGTERM)
+        _, logged = service.communicate(timeout=LIMIT)
+    assert any(line.startswith("realizer: worker 1: ") and "token" in line for line in logged.splitlines())
+
+
+def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
+        command += ["--workers", "2", "--xface-port", str(taken.getsockname()[1])]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 3
+    (line,) = done.stderr.splitlines()
+    assert "address already in use" in line
+
+
+def test_an_address_that_is_taken_is_said_before_a_worker_starts() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
+        asyncio.run(Workers(Settings(port=taken.getsockname()[1], workers=2)).start())

@@ -1,0 +1,344 @@
+"""Who is let in at the real door: tokens, origins, TLS, a rate; what /metrics tells, and logs do not."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import re
+import ssl
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import jwt
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
+
+from realizer.core.settings import Settings, SettingsError
+from realizer.server.documents import limits
+from realizer.server.http import guard
+from realizer.server.http.passes import Pass
+from realizer.server.serve import Server
+
+LIMIT = 60  # s; a hung test ends
+TOKEN = "Xk-secret-7"
+SECRET = "a secret that is long enough to be one"
+NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
+
+
+def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent", **settings)) as server:
+            await test(server)
+
+    asyncio.run(run())
+
+
+def signed(**claims: Any) -> str:
+    return jwt.encode(claims, SECRET, "HS256")
+
+
+async def read(url: str, headers: dict[str, str] | None = None) -> str:
+    request = urllib.request.Request(url, headers=headers or {})
+
+    def get() -> str:
+        with urllib.request.urlopen(request) as answer:
+            return str(answer.read().decode())
+
+    return await asyncio.get_running_loop().run_in_executor(None, get)
+
+
+async def welcomed(url: str, hello: dict[str, Any] | None = None, **options: Any) -> dict[str, Any]:
+    """What the service answers a hello with."""
+    async with connect(url, **options) as socket:
+        await socket.send(json.dumps({"type": "hello", **(hello or {})}))
+        reply: dict[str, Any] = json.loads(await socket.recv())
+        return reply
+
+
+def test_a_token_opens_the_door_in_each_of_its_three_places() -> None:
+    async def test(server: Server) -> None:
+        ways: list[dict[str, Any]] = [
+            {"url": f"{server.url}?token={TOKEN}"},
+            {"url": server.url, "additional_headers": {"Authorization": f"Bearer {TOKEN}"}},
+            {"url": server.url, "hello": {"token": TOKEN}},
+        ]
+        for way in ways:
+            assert (await welcomed(**way))["type"] == "welcome"
+
+    serving(test, token=TOKEN)
+
+
+def test_a_wrong_token_is_refused_before_a_session_is_made() -> None:
+    async def test(server: Server) -> None:
+        for target in (f"{server.url}?token=x", server.url.replace("/ws", "/check")):
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(target)
+            assert refused.value.response.status_code == 401
+            assert b"REALIZER_TOKEN" in refused.value.response.body
+        told = await welcomed(server.url, {"token": "x"})
+        assert (told["type"], told["code"], told["where"]) == ("error", "token", "hello.token")
+        async with connect(server.url) as socket:
+            await socket.send(NOD.format("b"))
+            assert json.loads(await socket.recv())["code"] == "token"
+            with pytest.raises(ConnectionClosed) as closed:
+                await socket.recv()
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1008
+        assert json.loads(await read(f"{server.page}healthz"))["sessions"] == 0
+
+    serving(test, token=TOKEN)
+
+
+def test_a_client_that_says_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "PATIENCE", 0.05)
+
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            assert json.loads(await socket.recv())["code"] == "token"
+
+    serving(test, token=TOKEN)
+
+
+def test_a_signed_token_opens_its_sessions_and_no_other() -> None:
+    async def test(server: Server) -> None:
+        mine, all_ = signed(session=["show"]), signed()
+        assert (await welcomed(f"{server.url}?session=show&token={mine}"))["session"] == "show"
+        header = {"Authorization": f"Bearer {mine}"}
+        assert (await welcomed(f"{server.url}?session=show", additional_headers=header))["session"] == "show"
+        assert (await welcomed(f"{server.url}?session=show", {"token": mine}))["session"] == "show"
+        assert (await welcomed(server.url, {"token": all_}))["type"] == "welcome"
+        for target in (f"{server.url}?session=other&token={mine}", f"{server.url}?token={mine}"):
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(target)
+            assert refused.value.response.status_code == 403
+            assert b"session: wanted one that the token is for (show)" in refused.value.response.body
+        told = await welcomed(f"{server.url}?session=other", {"token": mine})
+        assert (told["code"], told["where"]) == ("token", "hello.session")
+        async with connect(f"{server.url}?session=show&token={mine}") as socket:
+            await socket.send(json.dumps({"type": "hello", "session": "other"}))
+            error = json.loads(await socket.recv())
+            assert (error["type"], error["where"]) == ("error", "hello.session")
+        health = json.loads(await read(f"{server.page}healthz"))
+        assert health["sessions"] <= 2  # show, and one without a name that may be ending
+
+    serving(test, jwt_key=SECRET)
+
+
+@pytest.mark.parametrize(
+    ("claims", "says"),
+    [({"exp": 1}, b"has expired"), ({"nbf": 10**10}, b"not valid yet"), ({"aud": "x"}, b"for somebody else")],
+)
+def test_a_signed_token_that_does_not_hold_is_refused(claims: dict[str, Any], says: bytes) -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as refused:
+            await connect(f"{server.url}?token={signed(**claims)}")
+        assert refused.value.response.status_code == 401
+        assert says in refused.value.response.body
+
+    serving(test, jwt_key=SECRET)
+
+
+def test_one_whose_token_ends_is_let_go_and_the_others_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test(server: Server) -> None:
+        until = int(time.time()) + 1000
+        async with connect(f"{server.url}?token={signed()}") as stays:
+            monkeypatch.setattr(Pass, "left", property(lambda self: None if self.until is None else 0.0))
+            async with connect(f"{server.url}?token={signed(exp=until)}") as socket:
+                with pytest.raises(ConnectionClosed) as closed:
+                    await socket.recv()
+            assert closed.value.rcvd is not None
+            assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1008, "token: it has expired")
+            await stays.send(json.dumps({"type": "hello"}))
+            assert json.loads(await stays.recv())["type"] == "welcome"
+
+    serving(test, jwt_key=SECRET)
+
+
+def test_metrics_of_all_are_not_for_one_who_has_a_session() -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            await read(f"{server.page}metrics?token={signed(session='show')}")
+        assert "realizer_sessions 0" in await read(f"{server.page}metrics?token={signed()}")
+
+    serving(test, jwt_key=SECRET)
+
+
+def test_one_address_opens_no_more_sessions_than_its_share() -> None:
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=a"), connect(f"{server.url}?session=b") as socket:
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(f"{server.url}?session=c")
+            assert refused.value.response.status_code == 429
+            assert b"REALIZER_MAX_ADDRESS_SESSIONS" in refused.value.response.body
+            async with connect(f"{server.url}?session=a"):  # to join is not to open
+                pass
+            await socket.send(json.dumps({"type": "hello"}))
+            assert json.loads(await socket.recv())["type"] == "welcome"
+        # Both have a name and are kept; the one that was left first makes room.
+        async with connect(f"{server.url}?session=c"):
+            pass
+        assert json.loads(await read(f"{server.page}healthz"))["sessions"] == 2
+
+    serving(test, max_address_sessions=2)
+
+
+def test_where_memory_is_used_up_those_that_play_go_on(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    pages = tmp_path / "statm"
+    pages.write_text("2 1 0")
+    monkeypatch.setattr(limits, "MEMORY", pages)
+
+    async def test(server: Server) -> None:
+        async with connect(f"{server.url}?session=show") as socket:
+            pages.write_text("2000000 1000000 0")
+            for target in (server.url, server.url.replace("/ws", "/check")):
+                with pytest.raises(InvalidStatus) as refused:
+                    await connect(target)
+                assert refused.value.response.status_code == 503
+                assert b"REALIZER_MAX_MEMORY" in refused.value.response.body
+            await socket.send(NOD.format("b"))
+            while 'id="b:end"' not in str(await socket.recv()):
+                pass
+            async with connect(f"{server.url}?session=show&seen=1") as back:
+                assert 'seq="2"' in str(await back.recv())
+
+    serving(test, max_memory=64)
+
+
+@pytest.mark.parametrize("seen", ["abc", "-1", "1.5", "9" * 16, "%C2%B2"])
+def test_a_seen_that_is_no_number_is_refused_with_what_was_wanted(seen: str) -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as refused:
+            await connect(f"{server.url}?session=show&seen={seen}")
+        assert refused.value.response.status_code == 400
+        assert b"seen: wanted the number of the last feedback that came" in refused.value.response.body
+
+    serving(test)
+
+
+def test_no_token_is_logged_however_much_is(caplog: pytest.LogCaptureFixture) -> None:
+    async def test(server: Server) -> None:
+        quiet = logging.getLogger("websockets.client")
+        quiet.setLevel(logging.INFO)  # this side is the client's own
+        await welcomed(f"{server.url}?token={TOKEN}")
+        await welcomed(server.url, additional_headers={"Authorization": f"Bearer {TOKEN}"})
+        await welcomed(server.url, {"token": TOKEN})
+        with pytest.raises(InvalidStatus):
+            await connect(f"{server.url}?token=other-secret")
+        await welcomed(f"{server.url}?token={mine}")
+        await welcomed(server.url, {"token": mine})
+        with pytest.raises(InvalidStatus):
+            await connect(f"{server.url}?token={old}")
+        quiet.setLevel(logging.NOTSET)
+
+    mine, old = signed(), signed(exp=1)
+    with caplog.at_level(logging.DEBUG):
+        serving(test, token=TOKEN, jwt_key=SECRET)
+    told = [*caplog.messages, *map(str, (vars(record) for record in caplog.records))]
+    assert any("joined" in line for line in told)
+    secrets = (TOKEN, SECRET, "other-secret", mine, old)
+    assert not [line for line in told if any(secret in line for secret in secrets)]
+
+
+def test_a_page_of_elsewhere_opens_no_socket() -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(InvalidStatus) as refused:
+            await connect(server.url, origin="https://evil.example")  # type: ignore[arg-type]
+        assert refused.value.response.status_code == 403
+        assert b"REALIZER_ORIGINS" in refused.value.response.body
+        for origin in ("http://localhost:3000", "https://app.example"):
+            assert (await welcomed(server.url, origin=origin))["type"] == "welcome"
+
+    serving(test, origins=("https://app.example",))
+
+
+def test_a_flood_is_told_and_read_slowly_and_nothing_of_it_is_lost() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            for k in range(8):
+                await socket.send(json.dumps({"type": "ping", "id": str(k)}))
+            replies = []
+            while len([r for r in replies if r["type"] == "pong"]) < 8:
+                replies.append(json.loads(await socket.recv()))
+        assert [r["id"] for r in replies if r["type"] == "pong"] == [str(k) for k in range(8)]
+        errors = [r for r in replies if r["type"] == "error"]
+        assert {error["code"] for error in errors} == {"rate"}
+        assert "REALIZER_MAX_RATE" in errors[0]["message"]
+
+    serving(test, max_rate=2)
+
+
+def test_metrics_count_what_happened() -> None:
+    async def test(server: Server) -> None:
+        async with connect(server.url) as socket:
+            await socket.send(NOD.format("b"))
+            while 'id="b:end"' not in str(await socket.recv()):
+                pass
+            text = await read(f"{server.page}metrics")
+        values = dict(re.findall(r"^realizer_(\S+) (\S+)$", text, re.M))
+        assert (values["sessions"], values["connections"], values["messages_total"]) == ("1", "1", "1")
+        assert values["blocks_playing"] == values["refused_total"] == values["failures_total"] == "0"
+        assert int(values["planning_seconds_count"]) >= 1
+        assert int(values["lateness_seconds_count"]) >= 2
+        assert 2**20 < int(values["memory_bytes"]) < 2**40
+
+    serving(test)
+
+
+def test_metrics_are_for_those_who_have_the_token() -> None:
+    async def test(server: Server) -> None:
+        with pytest.raises(urllib.error.HTTPError, match="401"):
+            await read(f"{server.page}metrics")
+        assert "refused_total 1" in await read(f"{server.page}metrics", {"Authorization": f"Bearer {TOKEN}"})
+
+    serving(test, token=TOKEN)
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("tls")
+    cert, key = folder / "cert.pem", folder / "key.pem"
+    command = (
+        "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=localhost"
+    )
+    names = ["-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
+    try:
+        subprocess.run(
+            [*command.split(), *names, "-keyout", str(key), "-out", str(cert)],
+            check=True,
+            capture_output=True,
+        )
+    except FileNotFoundError:
+        pytest.skip("needs openssl to make a certificate")
+    return cert, key
+
+
+def test_with_a_certificate_everything_speaks_tls(certificate: tuple[Path, Path]) -> None:
+    cert, key = certificate
+
+    async def test(server: Server) -> None:
+        assert server.url.startswith("wss://")
+        assert server.page.startswith("https://")
+        assert server.doors[0].lines[0] == f"listening on {server.url}"
+        context = ssl.create_default_context(cafile=str(cert))
+        assert (await welcomed(server.url, ssl=context))["type"] == "welcome"
+        with pytest.raises(InvalidMessage):
+            await welcomed(server.url.replace("wss", "ws"))
+
+    serving(test, tls_cert=cert, tls_key=key)
+
+
+def test_a_certificate_without_its_key_is_told_before_a_door_opens(certificate: tuple[Path, Path]) -> None:
+    async def test(server: Server) -> None:
+        raise AssertionError("it opened")
+
+    with pytest.raises(SettingsError, match=r"wanted certificates in PEM, .* got .*cert\.pem and none"):
+        serving(test, tls_cert=certificate[0])

