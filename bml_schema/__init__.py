@@ -1,15 +1,6 @@
 """The language BML 1.0: text in, typed nodes out, and back; feedback likewise."""
 
 from bml_schema.absolute import timed
-from bml_schema.asap import (
-    Activate,
-    AudioFile,
-    FaceInterpolator,
-    FaceKeyframe,
-    Interrupt,
-    ParameterValueChange,
-    Trajectory,
-)
 from bml_schema.behaviours import (
     Face,
     FaceFacs,
@@ -31,8 +22,19 @@ from bml_schema.behaviours import (
     Sync,
     Wait,
 )
+from bml_schema.bmla import (
+    Activate,
+    AudioFile,
+    FaceInterpolator,
+    FaceKeyframe,
+    Interrupt,
+    ParameterValueChange,
+    Trajectory,
+)
 from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS, parse, read
+from bml_schema.dropped_references import Lost, without
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
+from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood, Timeline
 from bml_schema.feedback import (
     BlockPrediction,
     BlockProgress,
@@ -43,7 +45,7 @@ from bml_schema.feedback import (
     parse_feedback,
     predicted,
 )
-from bml_schema.losses import Lost, without
+from bml_schema.node_schema import attribute, child, children, mixed, node, sync_ref, text
 from bml_schema.nodes import (
     BMLA,
     BMLT,
@@ -60,9 +62,7 @@ from bml_schema.nodes import (
     Required,
     Synchronize,
 )
-from bml_schema.own import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood, Timeline
 from bml_schema.parser import MOST_BEHAVIOURS
-from bml_schema.shape import attribute, child, children, mixed, node, sync_ref, text
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import Value, flag, integer, number, one_of, seconds, string, word
 from bml_schema.vocabulary import VOCABULARY

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
-from bml_schema.losses import without
+from bml_schema.dropped_references import without
 from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Required, Synchronize
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import MOST_SECONDS

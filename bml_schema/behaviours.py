@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from bml_schema.node_schema import attribute, child, children, mixed, node, sync_ref
 from bml_schema.nodes import Behaviour, Part, core, extension
-from bml_schema.shape import attribute, child, children, mixed, node, sync_ref
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import integer, name, number, one_of, string, word
 

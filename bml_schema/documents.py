@@ -10,11 +10,11 @@ from itertools import count
 
 from lxml import etree
 
+from bml_schema.document_splitter import NEXT, Stretch, stretches
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, shown
+from bml_schema.node_schema import local
 from bml_schema.nodes import Behaviour, Block
 from bml_schema.parser import MOST_BEHAVIOURS, read_block
-from bml_schema.shape import local
-from bml_schema.stretches import NEXT, Stretch, stretches
 from bml_schema.vocabulary import VOCABULARY
 
 __all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]

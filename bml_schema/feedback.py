@@ -13,14 +13,14 @@ from typing import Any
 
 from lxml import etree
 
-from bml_schema.asap import FaceKeyframe
 from bml_schema.behaviours import Speech, SpeechText, Sync
+from bml_schema.bmla import FaceKeyframe
 from bml_schema.documents import element
 from bml_schema.errors import BMLError, BMLSyntaxError, shown
 from bml_schema.escape import escape, legal, legal_value
+from bml_schema.node_schema import changed, local, node
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
-from bml_schema.shape import changed, local, node
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import NUMBER, decimal
 from bml_schema.vocabulary import VOCABULARY

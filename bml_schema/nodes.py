@@ -7,7 +7,7 @@ from dataclasses import field
 from typing import ClassVar
 
 from bml_schema.errors import Place, Problem
-from bml_schema.shape import attribute, node, sync_ref
+from bml_schema.node_schema import attribute, node, sync_ref
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import block_name, block_names, flag, integer, name, number, one_of, word
 

@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
+from bml_schema.block_outline import Entry, Outline, flat, made
 from bml_schema.canonical import attributes
-from bml_schema.elements import Elements, Vocabulary
+from bml_schema.dropped_references import Losses
+from bml_schema.element_reader import Elements, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
     CUSTOM_ATTRIBUTE_NOT_SUPPORTED,
@@ -28,10 +30,8 @@ from bml_schema.errors import (
     Problem,
     shown,
 )
-from bml_schema.losses import Losses
+from bml_schema.node_schema import local, shape_of
 from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
-from bml_schema.outline import Entry, Outline, flat, made
-from bml_schema.shape import local, shape_of
 from bml_schema.sync_refs import Names
 from bml_schema.values import block_names, unwanted
 

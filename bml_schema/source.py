@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bml_schema.scan import DOCUMENT, Element, Slip, scan
+from bml_schema.tolerant_scanner import DOCUMENT, Element, Slip, scan
 
 __all__: list[str] = []
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from bml_schema.errors import did_you_mean, shown
-from bml_schema.shape import node
+from bml_schema.node_schema import node
 from bml_schema.values import MOST_SECONDS, NUMBER, decimal, unwanted
 
 __all__ = ["SyncRef"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from bml_schema import asap, behaviours, own
+from bml_schema import behaviours, bmla, extensions
 from bml_schema.nodes import Behaviour
 
 __all__ = ["VOCABULARY"]
@@ -13,7 +13,7 @@ __all__ = ["VOCABULARY"]
 # Clark tag -> class; users add theirs: {**VOCABULARY, Wink.tag: Wink}.
 VOCABULARY: Final[Mapping[str, type[Behaviour]]] = {
     cls.tag: cls
-    for module in (behaviours, asap, own)
+    for module in (behaviours, bmla, extensions)
     for cls in map(vars(module).get, module.__all__)
     if isinstance(cls, type) and issubclass(cls, Behaviour)
 }

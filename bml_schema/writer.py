@@ -8,6 +8,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.escape import escape, escape_value
+from bml_schema.node_schema import shape_of, sync_ref
 from bml_schema.nodes import (
     BMLA,
     BMLT,
@@ -20,7 +21,6 @@ from bml_schema.nodes import (
     Description,
     Required,
 )
-from bml_schema.shape import shape_of, sync_ref
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import decimal
 

@@ -13,11 +13,11 @@ from bml_schema import Block, BMLError, read
 from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
 from realizer.core.errors import VoiceError
-from realizer.face.mapping import mapping_of
+from realizer.face.fap_mapping import mapping_of
 from realizer.playback.player import Player
 from realizer.realization import Realization, seen
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech.fitting import fitted, stretched
+from realizer.speech.duration_fit import fitted, stretched
 from realizer.speech.utterance import Say, Utterance, Voice
 
 if TYPE_CHECKING:

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bml_schema import Feedback, WarningFeedback
-from realizer.animation.fap.fap import to_fap
-from realizer.animation.fap.mapping import FapMapping, standard
+from realizer.animation.axis import AU_NAMES
+from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.pose import poses
-from realizer.animation.targets import AU_NAMES
-from realizer.core.arrays import Float32, Float64, Int16
+from realizer.core.array_types import Float32, Float64, Int16
 from realizer.core.errors import RealizerError
 from realizer.core.units import frame_count
+from realizer.playback.active_block import HUSH, Speaking
+from realizer.playback.audio_mix import heard
 from realizer.playback.player import Player
-from realizer.playback.playing import HUSH, Speaking
-from realizer.playback.sound import heard
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 from realizer.tables import faps

@@ -34,7 +34,7 @@ from bml_schema import (
     Sync,
     Synchronize,
 )
-from bml_schema.shape import Attribute, shape_of
+from bml_schema.node_schema import Attribute, shape_of
 from tests.cases import CASES, CORPUS, Case
 
 __all__ = ["FILE", "Rule", "elsewhere", "gaps", "proofs", "render", "rules"]

@@ -38,11 +38,11 @@ from realizer.playback.player import Player
 from realizer.protocol.messages import ErrorMessage, parse_control
 from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
-from realizer.server.transports.dialect import Leave, ToSession
-from realizer.server.transports.xface.xface_brought import prepare
-from realizer.server.transports.xface.xface_reader import Content, Fault, TaskReader
-from realizer.server.transports.xface.xface_tasks import ABLE, UNABLE, Answer, Desk
-from realizer.server.transports.xface.xface_wire import Task, pack_task, read_notes
+from realizer.server.transports.message_format import Leave, ToSession
+from realizer.server.transports.xface.attachments import prepare
+from realizer.server.transports.xface.reader import Content, Fault, TaskReader
+from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, Desk
+from realizer.server.transports.xface.wire import Task, pack_task, read_notes
 from realizer.speech import SilentVoice
 from tests.interleavings import CONTROLS, FILTERS, Interleaving, no_error
 from tests.mutants import mutants

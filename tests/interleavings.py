@@ -19,15 +19,15 @@ from realizer.core.errors import RenderError, VoiceError
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.journal import JournalError
-from realizer.server.journal import notes as thresholds
+from realizer.server.journal import journal_writer as thresholds
 from realizer.server.journal.entry import Entry, Kept
-from realizer.server.journal.notes import Notes
+from realizer.server.journal.journal_writer import Notes
 from realizer.server.journal.replay import restored
-from realizer.server.runtime.hub import Hub
+from realizer.server.runtime.session_registry import Hub
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
-from realizer.speech.fitting import fitted
+from realizer.speech.duration_fit import fitted
 from realizer.speech.utterance import Utterance
 from tests.mutants import mutants
 from tests.waking import wakes

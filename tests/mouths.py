@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.face.deform import deform
 from realizer.face.model import Face
 

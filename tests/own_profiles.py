@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from realizer import tables
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.axis import AU_NAMES, au, axis
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, au, axis
 from realizer.tables.cooccurrence import rules
 from realizer.tables.emotions import emotion_faces
 

@@ -27,7 +27,7 @@ from bml_schema import (
     SyncRef,
     Value,
 )
-from bml_schema.shape import shape_of, sync_ref
+from bml_schema.node_schema import shape_of, sync_ref
 
 __all__ = ["attribute_values", "blocks", "descriptions", "names", "numbers", "xml_text"]
 

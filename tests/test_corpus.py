@@ -18,9 +18,9 @@ from bml_schema import (
     parse,
     write,
 )
-from bml_schema.shape import shape_of
+from bml_schema.node_schema import shape_of
+from realizer.animation.axis import AU_NAMES
 from realizer.animation.curves import gain_at
-from realizer.animation.targets import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from tests.cases import CASES, Case, Instant, Told
 from tests.stage import Played, play

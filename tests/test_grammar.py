@@ -22,7 +22,7 @@ from bml_schema import (
     timed,
     write,
 )
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.fap.conversion import to_fap
 from realizer.pipeline import submitted
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule

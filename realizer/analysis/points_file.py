@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.face.features import NAMES
 
 __all__ = ["bridge", "read_points"]

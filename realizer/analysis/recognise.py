@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import wheel
 from realizer.tables.emotion_model import emotion_model
-from realizer.tables.feelings import ring
+from realizer.tables.wheel_words import ring
 
 __all__ = ["Recogniser", "Recognition", "recogniser"]
 

@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 
 from realizer import tables
+from realizer.animation.axis import AU_NAMES, au, axis, presence, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import Samples, in_order, sample, samples, weights
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.idle import Idle
-from realizer.animation.targets import AU_NAMES, au, axis, presence, region
-from realizer.core.arrays import Float32, Float64, Index
+from realizer.animation.idle.motion import Idle
+from realizer.core.array_types import Float32, Float64, Index
 from realizer.tables.cooccurrence import Rules
 
 __all__ = ["blend"]

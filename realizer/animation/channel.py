@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from realizer.animation.targets import Target
-from realizer.core.arrays import Float64
+from realizer.animation.axis import Target
+from realizer.core.array_types import Float64
 
 __all__ = ["Channel", "Gain", "Joint", "Layer", "later"]
 

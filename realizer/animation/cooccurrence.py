@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from realizer.animation.rounds import Rounds
-from realizer.animation.targets import AU_NAMES
-from realizer.core.arrays import Bool, Float32, Index
+from realizer.animation.axis import AU_NAMES
+from realizer.animation.group_reduce import Rounds
+from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 __all__ = ["Bounds", "Shown", "bounds", "cooccur"]

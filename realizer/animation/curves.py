@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.animation.channel import Channel, Gain, Joint
-from realizer.core.arrays import Float64, Index
+from realizer.core.array_types import Float64, Index
 
 __all__ = ["CURVES", "Samples", "gain_at", "in_order", "sample", "samples", "smooth", "weights"]
 

@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
+from realizer.animation.axis import AU_NAMES
 from realizer.animation.cooccurrence import Bounds, bounds
-from realizer.animation.targets import AU_NAMES
-from realizer.core.arrays import Bool, Float32, Float64, Int32
+from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.tables.cooccurrence import Rules
 
 __all__ = ["AUFrames", "FAPFrames"]

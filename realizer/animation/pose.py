@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.animation.fap.fap import to_fap
-from realizer.animation.fap.mapping import FapMapping
+from realizer.animation.axis import AU_NAMES, axis
+from realizer.animation.fap.au_fap_mapping import FapMapping
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, axis
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 
 __all__ = ["poses"]
 

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
+from realizer.core.atomic_files import write_text
 from realizer.core.errors import RealizerError
-from realizer.core.files import write_text
 
 __all__ = ["NAME", "BusyError", "Manifest", "Row"]
 

@@ -10,8 +10,8 @@ from typing import Protocol
 from realizer.batch.documents import Document
 from realizer.batch.manifest import Manifest, Row
 from realizer.batch.task import Options, Task, fingerprint, key_of
-from realizer.batch.work import Outcome, failed
-from realizer.core.files import write_bytes
+from realizer.batch.worker import Outcome, failed
+from realizer.core.atomic_files import write_bytes
 
 __all__ = ["Crew", "batch"]
 

@@ -9,8 +9,8 @@ from typing import Any
 from realizer.behaviours import (
     audio,
     blink,
-    bodily,
-    control,
+    block_control,
+    body,
     emotion,
     expression,
     face,
@@ -33,7 +33,7 @@ MODULES = (
     head,
     speech,
     wait,
-    bodily,
+    body,
     emotion,
     expression,
     fap_values,
@@ -42,7 +42,7 @@ MODULES = (
     blink,
     idle_control,
     audio,
-    control,
+    block_control,
 )
 
 # Clark tag of an element -> what it brings; -> the class a parser makes of it.

@@ -10,7 +10,7 @@ from bml_schema import AudioFile
 from realizer.animation.channel import Channel
 from realizer.behaviours import recordings
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Utterance
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bml_schema import Blink
 from realizer.animation.channel import Channel
-from realizer.behaviours import poses
+from realizer.behaviours import pose_channels
 from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.preferred import preferred
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]
@@ -19,7 +19,7 @@ def timing(node: Blink, world: World) -> Timing:
 
 def expand(node: Blink, times: Float64, world: World) -> tuple[Channel, ...]:
     """Shut from attackPeak to relax, by AU45."""
-    return poses.shown(poses.columns({(45, node.side): 1.0}, node.amount), times, node.id)
+    return pose_channels.shown(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
 
 
 KINDS = (Kind(Blink, timing, expand, parameters={"amount": "amount"}),)

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from bml_schema import Emotion, Mood
+from realizer.animation.axis import Target, fap
 from realizer.animation.channel import Channel
-from realizer.animation.targets import Target, fap
-from realizer.behaviours import poses
+from realizer.behaviours import pose_channels
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.preferred import preferred
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
 from realizer.emotions.wheel import affect, place_of_affect, shares, strength_at, wheel
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
 from realizer.emotions.words import emotion as profile_of
@@ -74,12 +74,12 @@ def timing_of_mood(node: Mood, world: World) -> Timing:
 
 def expand(node: Emotion, times: Float64, world: World) -> tuple[Channel, ...]:
     """There at attackPeak, held to relax, gone at end."""
-    return poses.shown(values_of(node), times, node.id)
+    return pose_channels.shown(values_of(node), times, node.id)
 
 
 def expand_mood(node: Mood, times: Float64, world: World) -> tuple[Channel, ...]:
     """From start to end the new base face rises, and stays; the neutral one has no channels."""
-    return poses.kept(values_of(node), times, node.id)
+    return pose_channels.kept(values_of(node), times, node.id)
 
 
 def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
@@ -90,7 +90,7 @@ def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
         except UnknownWordError as wrong:
             if node.name[-1:].isdecimal():
                 return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)
-            return (poses.unknown("name", node.name, known_words()),)
+            return (pose_channels.unknown("name", node.name, known_words()),)
         except ValueError as wrong:
             return (Fault("CANNOT_CREATE_BEHAVIOR", f"name: {wrong}"),)
     if node.profile not in (*OWN, *PUBLISHED):
@@ -132,7 +132,7 @@ def values_of(node: Emotion | Mood) -> dict[Target, float]:
         frame = found.frame() if node.seed is None else found.draw(node.seed)
         return {fap(number): node.intensity * float(frame[number - 1]) for number in found.ranges}
     aus = _aus(Feeling.of(node))
-    return poses.columns(aus if node.seed is None else _drawn(aus, node.seed), node.intensity)
+    return pose_channels.columns(aus if node.seed is None else _drawn(aus, node.seed), node.intensity)
 
 
 def _drawn(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bml_schema import Expression
 from realizer.animation.channel import Channel
-from realizer.behaviours import poses
+from realizer.behaviours import pose_channels
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.preferred import from_gaps
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import from_gaps
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]
@@ -22,12 +22,14 @@ def timing(node: Expression, world: World) -> Timing:
 
 def expand(node: Expression, times: Float64, world: World) -> tuple[Channel, ...]:
     """There at attackPeak, held to relax, gone at end."""
-    return poses.shown(poses.columns(world.library[node.name].aus, node.intensity), times, node.id)
+    return pose_channels.shown(
+        pose_channels.columns(world.library[node.name].aus, node.intensity), times, node.id
+    )
 
 
 def check(node: Expression, world: World) -> tuple[Fault, ...]:
     """An unknown name is fatal."""
-    return () if node.name in world.library else (poses.unknown("name", node.name, world.library),)
+    return () if node.name in world.library else (pose_channels.unknown("name", node.name, world.library),)
 
 
 KINDS = (

@@ -9,12 +9,12 @@ import numpy as np
 
 from bml_schema import Face, FaceFacs, FaceLexeme, FaceShift
 from realizer import tables
+from realizer.animation.axis import Target, au
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.targets import Target, au
-from realizer.behaviours import poses
+from realizer.behaviours import pose_channels
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.preferred import from_gaps, preferred
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import from_gaps, preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]
@@ -104,7 +104,7 @@ def _targets(node: Part, world: World) -> dict[Target, float]:
     """Column -> value at the sustained part."""
     if isinstance(node, FaceFacs):
         return dict.fromkeys(au(node.au, node.side), node.amount)
-    return poses.columns(world.library[node.lexeme].aus, node.amount)
+    return pose_channels.columns(world.library[node.lexeme].aus, node.amount)
 
 
 def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
@@ -113,7 +113,7 @@ def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
     for part in parts:
         if isinstance(part, FaceLexeme):
             if part.lexeme not in world.library:
-                faults.append(poses.unknown("lexeme", part.lexeme, world.library))
+                faults.append(pose_channels.unknown("lexeme", part.lexeme, world.library))
         elif part.au not in known:
             said = f"au: wanted a FACS action unit, got {part.au}; near: {tables.nearest(part.au)}"
             faults.append(Fault("CANNOT_CREATE_BEHAVIOR", said))

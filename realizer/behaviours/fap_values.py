@@ -6,16 +6,16 @@ import numpy as np
 
 from bml_schema import FapFile, Faps
 from realizer import tables
+from realizer.animation.axis import fap
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.animation.targets import fap
 from realizer.behaviours import media
-from realizer.behaviours.fap_compound import shown
+from realizer.behaviours.fap_visemes import shown
+from realizer.behaviours.key_channels import track
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.preferred import preferred
-from realizer.behaviours.tracks import track
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -9,12 +9,12 @@ import numpy as np
 
 from bml_schema import Gaze, GazeShift
 from realizer import tables
+from realizer.animation.axis import au, presence
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.targets import au, presence
+from realizer.behaviours.gaze_targets import Turn, angles, facts, limits, target_faults, turn, within
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.preferred import preferred
-from realizer.behaviours.scene import Turn, angles, facts, limits, target_faults, turn, within
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -9,13 +9,13 @@ import numpy as np
 
 from bml_schema import Head, HeadDirectionShift
 from realizer import tables
+from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.targets import au
+from realizer.behaviours.gaze_targets import angles, limits, target_faults, turn, within
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.poses import unknown
-from realizer.behaviours.preferred import from_gaps, preferred
-from realizer.behaviours.scene import angles, limits, target_faults, turn, within
-from realizer.core.arrays import Float64
+from realizer.behaviours.pose_channels import unknown
+from realizer.behaviours.table_timing import from_gaps, preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
 from realizer.tables.timing import Gap, gaps

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from bml_schema import Idle
+from realizer.animation.axis import presence
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import Fewer
-from realizer.animation.targets import presence
 from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.preferred import preferred
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -10,12 +10,12 @@ import numpy as np
 
 from bml_schema import FaceKeyframe
 from realizer import tables
+from realizer.animation.axis import Target, au, fap
 from realizer.animation.channel import Channel
-from realizer.animation.targets import Target, au, fap
 from realizer.behaviours.fap_values import RECORDED, out_of_range
+from realizer.behaviours.key_channels import track
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.tracks import track
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.animation.channel import Channel
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.expressions import Library, shipped
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, Say, Utterance

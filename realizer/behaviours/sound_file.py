@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from realizer.behaviours.wav_file import read_wav
-from realizer.core.arrays import Int16
+from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Recording
 

@@ -14,7 +14,7 @@ from realizer.animation.channel import Channel
 from realizer.behaviours import recordings
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.behaviours.media import MediaError
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MOST_TEXT, Recording, Say, Utterance
 
@@ -101,7 +101,7 @@ _made: WeakKeyDictionary[Utterance, tuple[float, tuple[Channel, ...]]] = WeakKey
 
 def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
     # Imported here: it reads its tables, which a block without speech does not need.
-    from realizer.animation.lips.lips import lip_channels
+    from realizer.animation.lips.lip_sync import lip_channels
 
     if utterance not in _made:
         _made[utterance] = start, lip_channels(utterance.phonemes, start, room=max(start, 0.0))

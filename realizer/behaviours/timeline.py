@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from bml_schema import Timeline as Node
+from realizer.animation.axis import Target, presence, rank
 from realizer.animation.channel import Channel
-from realizer.animation.targets import Target, presence, rank
-from realizer.behaviours import media, poses
+from realizer.behaviours import media, pose_channels
 from realizer.behaviours.kind import Fault, Kind, World
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.expressions import Timeline, Track, faults_of, lasts, read_timeline, remarks, spans
 from realizer.scheduling.timing import Timing
 
@@ -95,7 +95,7 @@ def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[C
 
 def _pose(name: str, intensity: float, world: World) -> dict[Target, float]:
     found = world.library.get(name)
-    return {} if found is None else poses.columns(found.aus, intensity)
+    return {} if found is None else pose_channels.columns(found.aus, intensity)
 
 
 KINDS = (Kind(Node, timing, expand, check, parameters={"amount": 1.0}),)

@@ -9,8 +9,8 @@ import numpy as np
 from bml_schema import Wait
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.preferred import preferred
-from realizer.core.arrays import Float64
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Int16
+from realizer.core.array_types import Float32, Int16
 from realizer.core.errors import RealizerError
 
 __all__ = ["read_wav"]

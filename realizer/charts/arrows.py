@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from realizer.charts.colours import HELD, LINK, PAPER, ROOM, TIGHT
+from realizer.charts.diverging_scale import HELD, LINK, PAPER, ROOM, TIGHT
 from realizer.charts.rows import ABOVE, BAR, SMALL
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of

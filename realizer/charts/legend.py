@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from realizer.charts.colours import FAINT, HELD, LINK, LOST, RIGID, ROOM, TIGHT, colour_of
+from realizer.charts.diverging_scale import FAINT, HELD, LINK, LOST, RIGID, ROOM, TIGHT, colour_of
 from realizer.charts.rows import NAME
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from realizer.charts import legend
 from realizer.charts.arrows import draw_links
-from realizer.charts.colours import FAINT, GRID, INK, PAPER, TIGHT
+from realizer.charts.diverging_scale import FAINT, GRID, INK, PAPER, TIGHT
 from realizer.charts.rows import HEIGHT, NAME, draw_dropped, draw_line, height_of
 from realizer.charts.scale import Scale, last_of, scale_of
 from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut_inside, width_of

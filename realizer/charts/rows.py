@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from realizer.charts.colours import FAINT, INK, LOST, PAPER, RIGID, colour_of, on
+from realizer.charts.diverging_scale import FAINT, INK, LOST, PAPER, RIGID, colour_of, on
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, cut, cut_inside, fold, hatch, width_of
 from realizer.charts.timeline import Dropped, Gap, Line

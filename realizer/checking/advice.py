@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, SyncRef
-from bml_schema.shape import local, shape_of
+from bml_schema.node_schema import local, shape_of
 from bml_schema.source import Source
+from realizer.checking.explain import near
 from realizer.checking.finding import Finding, Label
-from realizer.checking.findings import near
 
 if TYPE_CHECKING:
     from realizer.playback.player import Player

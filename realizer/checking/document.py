@@ -9,9 +9,9 @@ from typing import Any
 from bml_schema import Behaviour, Block, Required, read
 from bml_schema.source import Source
 from realizer.behaviours import VOCABULARY
+from realizer.checking.explain import finding_of
 from realizer.checking.finding import Finding
-from realizer.checking.findings import finding_of
-from realizer.checking.hidden import hidden, told_of, without_faults
+from realizer.checking.masked_faults import hidden, told_of, without_faults
 from realizer.pipeline import speak, submitted, warning_of
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule, Warning

@@ -18,8 +18,8 @@ from realizer.cli.enrich import enrich
 from realizer.cli.expressions import expressions
 from realizer.cli.faces import faces
 from realizer.cli.fap import fap
-from realizer.cli.lists import outputs, voices
-from realizer.cli.play import realize, schedule
+from realizer.cli.list_commands import outputs, voices
+from realizer.cli.realize import realize, schedule
 from realizer.cli.replay import replay
 from realizer.cli.serve import serve
 from realizer.cli.timeline import timeline

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.play import PICTURES, performance
+from realizer.cli.realize import PICTURES, performance
 
 if TYPE_CHECKING:
     from realizer.batch.run import Crew
@@ -162,10 +162,10 @@ def _listed(places: tuple[str, ...]) -> list[str]:
 
 def _crew(how: Options, workers: int, dask: str | None) -> Crew:
     if dask is not None:
-        from realizer.batch.cluster import Cluster
+        from realizer.batch.dask_cluster import Cluster
 
         return Cluster(how, dask)
-    from realizer.batch.processes import Processes
+    from realizer.batch.process_pool import Processes
 
     return Processes(how, workers)
 

@@ -61,8 +61,8 @@ def check(
     """
     from bml_schema.source import Source
     from realizer.checking import Finding, advice, checked
+    from realizer.cli.behaviour_advice import habits
     from realizer.cli.diagnostics import one_line, render
-    from realizer.cli.habits import habits
     from realizer.playback.player import Player
 
     long = sys.stdout.isatty() if long is None else long

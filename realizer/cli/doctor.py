@@ -26,7 +26,7 @@ def doctor() -> int:
 
 
 def _pictures() -> Iterator[Finding]:
-    from realizer.render.child import asked
+    from realizer.render.drawing_process import asked
 
     says = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
     way, fix = asked()

@@ -200,8 +200,8 @@ def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
 
     from realizer.emotions.wheel import wheel
     from realizer.render import Renderer
-    from realizer.render.sheets import sheet
-    from realizer.tables.feelings import ring
+    from realizer.render.contact_sheet import sheet
+    from realizer.tables.wheel_words import ring
 
     places = [(place, activation) for activation in RINGS for place in ring("paul").values()]
     rows = np.stack([wheel(place.angle, activation, profiles).frame() for place, activation in places])

@@ -16,7 +16,7 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from bml_schema import Block
     from realizer.knowledge.enrich import Enricher, Heard
-    from realizer.knowledge.languages import Words
+    from realizer.knowledge.word_languages import Words
 
 __all__: list[str] = []
 
@@ -74,7 +74,7 @@ def words_for(language: str | None, file: Path | None) -> Words:
         click.UsageError: a file that is no list of words.
     """
     from realizer.core.errors import TableError
-    from realizer.knowledge.languages import Words
+    from realizer.knowledge.word_languages import Words
     from realizer.tables.emotional_words import words_of
 
     try:
@@ -98,7 +98,7 @@ def tell_unknown(words: Words, languages: Iterable[str], told: set[str]) -> None
 def languages_in(block: Block, words: Words) -> list[str]:
     """The languages of what is said in a block, each once."""
     from bml_schema import Speech
-    from realizer.knowledge.languages import language_of
+    from realizer.knowledge.word_languages import language_of
 
     said = [node for node in block.behaviours if isinstance(node, Speech)]
     return list(dict.fromkeys(language_of(node, block, words.language) for node in said))
@@ -256,7 +256,7 @@ def _heard(block: Block, language: str) -> list[Heard]:
     """The texts of a block, each when it begins as the block is scheduled."""
     from bml_schema import Speech
     from realizer.knowledge.enrich import Heard
-    from realizer.knowledge.languages import language_of
+    from realizer.knowledge.word_languages import language_of
     from realizer.pipeline import submitted
     from realizer.playback.player import Player
     from realizer.speech import SilentVoice

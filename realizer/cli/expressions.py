@@ -13,7 +13,7 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from realizer.analysis.likeness import Likeness
+    from realizer.analysis.picture_search import Likeness
     from realizer.expressions import Expression
 
 __all__: list[str] = []
@@ -129,7 +129,7 @@ def find(
 
 
 def _looked_up(like: Path, known: Sequence[Expression], face: str | None) -> Likeness:
-    from realizer.analysis.likeness import UnknownPictureError, by_picture, read_picture
+    from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
     try:
         return by_picture(read_picture(like), known, None if face is None else [face])
@@ -166,11 +166,11 @@ def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: s
     from PIL import Image
 
     from realizer.animation.pose import poses
-    from realizer.cli.poses import Series, frames, of_expressions
+    from realizer.cli.sheet_poses import Series, frames, of_expressions
+    from realizer.face.fap_mapping import mapping_of
     from realizer.face.load import takes
-    from realizer.face.mapping import mapping_of
     from realizer.render import Renderer
-    from realizer.render.sheets import sheet
+    from realizer.render.contact_sheet import sheet
 
     rows = poses(frames([Series("", of_expressions(found))]), takes(face), mapping_of(face))
     with Renderer(face, (220, 220), "close") as renderer:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from realizer.cli.bring import check, import_
 from realizer.cli.fit import fit
+from realizer.cli.import_face import check, import_
 from realizer.cli.mapping import mapping
 from realizer.cli.sheet import sheet
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.play import perform, performing
+from realizer.cli.realize import perform, performing
 
 if TYPE_CHECKING:
     from realizer.animation.fap.fap_clip import FAPClip
@@ -37,7 +37,7 @@ def fap() -> None:
 @click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
 def info(file: str, as_json: bool) -> None:
     """Say how long a file is, at what rate, what it moves and how far."""
-    from realizer.behaviours.fap_compound import shown
+    from realizer.behaviours.fap_visemes import shown
     from realizer.tables import faps
 
     clip = _read(file)
@@ -85,9 +85,9 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
     \b
     realizer fap convert greta.fap -o clean.fap --fps 30
     """
-    from realizer.behaviours.fap_compound import shown
-    from realizer.core.files import write_text
-    from realizer.outputs.clip_files import ENCODINGS, limited
+    from realizer.behaviours.fap_visemes import shown
+    from realizer.core.atomic_files import write_text
+    from realizer.outputs.fap_clip_files import ENCODINGS, limited
 
     suffix = Path(output).suffix.lower()
     if suffix not in ENCODINGS:
@@ -126,8 +126,8 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     import numpy as np
 
     from bml_schema.documents import MOST_BYTES
-    from realizer.behaviours.fap_compound import shown
     from realizer.behaviours.fap_document import document_of
+    from realizer.behaviours.fap_visemes import shown
     from realizer.core.errors import RealizerError
 
     clip = shown(_read(file))
@@ -154,7 +154,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
 
 def _read(file: str) -> FAPClip:
     from realizer.core.errors import RealizerError
-    from realizer.outputs.clip_files import read_clip
+    from realizer.outputs.fap_clip_files import read_clip
 
     (content,) = options.read_documents([file])
     try:

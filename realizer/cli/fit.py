@@ -55,7 +55,7 @@ def fit(
     from realizer.face.au.file import write_model
     from realizer.face.load import folder_of, load_face
     from realizer.facebuild.au.fit import fit_models, table, table_text
-    from realizer.facebuild.au.limit import runaways
+    from realizer.facebuild.au.fit_limits import runaways
     from realizer.facebuild.au.measure import read_measured, read_shapes, write_shapes
 
     if measurements and data:

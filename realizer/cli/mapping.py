@@ -31,7 +31,7 @@ def mapping(name: str, output: Path | None, mapping: Path | None) -> None:
     realizer faces mapping ada -o mine.txt
     realizer realize hello.bml -o hello.mp4 --mapping mine.txt
     """
-    from realizer.face.mapping import mapping_of
+    from realizer.face.fap_mapping import mapping_of
     from realizer.tables.mappings import FORMS, as_text, write_mapping
 
     if output is not None and output.suffix not in FORMS:

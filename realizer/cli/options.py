@@ -125,7 +125,7 @@ def read_documents(names: Iterable[str]) -> list[bytes]:
 
 
 def read_scene(path: str | Path | None) -> dict[str, Position] | None:
-    from realizer.playback.scene import parse_scene
+    from realizer.playback.scene_file import parse_scene
 
     if path is None:
         return None

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from realizer.cli import options
-from realizer.cli.play import PICTURES
+from realizer.cli.realize import PICTURES
 
 __all__: list[str] = []
 
@@ -46,8 +46,8 @@ def replay(
     from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
     from realizer.server.journal import JournalError
-    from realizer.server.journal.folder import read_record
     from realizer.server.journal.playback import played, told
+    from realizer.server.journal.recordings import read_record
 
     writer = None
     if output is not None:

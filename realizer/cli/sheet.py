@@ -15,9 +15,9 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from realizer.animation.fap.mapping import FapMapping
-    from realizer.cli.poses import Series
-    from realizer.render.sheets import Cell
+    from realizer.animation.fap.au_fap_mapping import FapMapping
+    from realizer.cli.sheet_poses import Series
+    from realizer.render.contact_sheet import Cell
 
 __all__: list[str] = []
 
@@ -86,9 +86,9 @@ def sheet(
     """
     from PIL import Image
 
-    from realizer.cli import poses
-    from realizer.face.mapping import mapping_of
-    from realizer.render.sheets import Group, album
+    from realizer.cli import sheet_poses
+    from realizer.face.fap_mapping import mapping_of
+    from realizer.render.contact_sheet import Group, album
 
     if output.suffix != ".png":
         raise click.BadParameter(f"wanted a name that ends in .png, got {output}", param_hint="-o")
@@ -98,13 +98,13 @@ def sheet(
     if not (faps or aus or emotions):
         faps = aus = True
     in_force = mapping_of(name, options.settings(mapping=mapping).mapping)
-    series = [poses.neutral()]
+    series = [sheet_poses.neutral()]
     if faps:
-        series += poses.of_faps(value)
+        series += sheet_poses.of_faps(value)
     if aus:
-        series += poses.of_aus(intensity)
+        series += sheet_poses.of_aus(intensity)
     if emotions:
-        series += poses.of_emotions()
+        series += sheet_poses.of_emotions()
     count = sum(len(part.poses) for part in series)
     with _progress(count * len(cameras), context.obj["quiet"]) as step:
         groups = [
@@ -135,19 +135,19 @@ def _cells(
     import numpy as np
 
     from realizer.animation.pose import poses as poses_of
-    from realizer.cli import poses
+    from realizer.cli import sheet_poses
     from realizer.face.load import takes
     from realizer.render import Renderer
-    from realizer.render.difference import difference, faint, flatten
+    from realizer.render.contact_sheet import Cell
+    from realizer.render.difference_image import difference, faint, flatten
     from realizer.render.light import preset
-    from realizer.render.sheets import Cell
 
     # Plain, so that what differs is the face.
     behind = np.rint(np.array(preset(light).backdrop_middle) * 255)
     if background:
         behind = np.frombuffer(bytes.fromhex(background[1:]), np.uint8)
     every = [pose for part in series for pose in part.poses]
-    rows = poses_of(poses.frames(series), takes(name, deformer=deformer), mapping)
+    rows = poses_of(sheet_poses.frames(series), takes(name, deformer=deformer), mapping)
     shown: list[list[Any]] = [[] for _ in every]
     for camera in cameras:
         neutral = below = None
@@ -177,8 +177,8 @@ def _scale() -> Any:
     import numpy as np
     from PIL import Image, ImageDraw, ImageFont
 
-    from realizer.render.difference import FULL, ramp
-    from realizer.render.sheets import INK, PAPER
+    from realizer.render.contact_sheet import INK, PAPER
+    from realizer.render.difference_image import FULL, ramp
 
     width, height = SCALE
     image = Image.new("RGB", (width, height * 2 + 8), PAPER)

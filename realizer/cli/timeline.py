@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import click
 
 from realizer.cli import options
-from realizer.cli.play import perform, performing
+from realizer.cli.realize import perform, performing
 
 if TYPE_CHECKING:
     from realizer.expressions import Library, Timeline
@@ -98,7 +98,7 @@ def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -
 def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[str]:
     from bml_schema import Block
     from realizer.expressions import evident
-    from realizer.knowledge.advise import Seen, advise, lasting
+    from realizer.knowledge.advice import Seen, advise, lasting
 
     seen = []
     for place, expression, begin, end in evident(timeline, library):

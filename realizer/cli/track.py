@@ -11,7 +11,7 @@ import click
 from realizer.cli import options
 
 if TYPE_CHECKING:
-    from realizer.core.arrays import Float64
+    from realizer.core.array_types import Float64
     from realizer.face.model import Fapu
 
 __all__: list[str] = []
@@ -48,7 +48,7 @@ def track(points: str, output: Path, fps: float, profiles: str | None) -> None:
     """
     import numpy as np
 
-    from realizer.analysis.measure import faps_from_points
+    from realizer.analysis.faps_from_points import faps_from_points
     from realizer.analysis.points_file import bridge, read_points
     from realizer.analysis.recognise import recogniser
     from realizer.animation.fap.fap_clip import FAPClip

@@ -1,9 +1,9 @@
 """A client of the service: BML out, feedback, frames and films in; `async with` or plain `with`."""
 
-from realizer.client.connecting import connect
-from realizer.client.live import Client
-from realizer.client.mail import ClientError, Frame
-from realizer.client.plain import SyncClient
+from realizer.client.async_client import Client
+from realizer.client.connection import connect
+from realizer.client.message_router import ClientError, Frame
 from realizer.client.speech import Speech, SyncSpeech
+from realizer.client.sync_client import SyncClient
 
 __all__ = ["Client", "ClientError", "Frame", "Speech", "SyncClient", "SyncSpeech", "connect"]

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
-from realizer.client.mail import ClientError
+from realizer.client.message_router import ClientError
 
 __all__ = ["Speech", "SyncSpeech"]
 

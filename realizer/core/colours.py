@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.core.arrays import Float32, UInt8
+from realizer.core.array_types import Float32, UInt8
 
 __all__ = ["linear", "srgb"]
 

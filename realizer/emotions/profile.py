@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from realizer import tables
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 
 __all__ = ["Profile"]
 

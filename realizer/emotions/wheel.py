@@ -10,7 +10,7 @@ from realizer.emotions.archetypes import archetypes
 from realizer.emotions.intermediate import Anchor
 from realizer.emotions.profile import Profile
 from realizer.tables.emotion_model import emotion_model
-from realizer.tables.feelings import ring as places
+from realizer.tables.wheel_words import ring as places
 
 __all__ = ["affect", "place_of_affect", "shares", "strength_at", "wheel"]
 

@@ -13,7 +13,7 @@ from realizer.emotions.archetypes import archetypes
 from realizer.emotions.intermediate import between
 from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import NEUTRAL, neighbours, shares, wheel
-from realizer.tables.feelings import own_words, ring, whissell_words
+from realizer.tables.wheel_words import own_words, ring, whissell_words
 
 __all__ = ["UnknownWordError", "WordPlace", "emotion", "known_words", "place_of", "strength_of"]
 

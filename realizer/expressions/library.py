@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from realizer.expressions.expression import Expression, key
-from realizer.expressions.own import read_folder
+from realizer.expressions.user_expressions import read_folder
 from realizer.tables.expression_words import expression_words
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import Template, apex, templates

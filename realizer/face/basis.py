@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Int32
+from realizer.core.array_types import Float32, Int32
 from realizer.core.errors import FaceError
-from realizer.face.archive import read_arrays
 from realizer.face.contours import contours_of
 from realizer.face.model import Fapu
+from realizer.face.npz_file import read_arrays
 from realizer.tables import faps
 
 __all__: list[str] = []

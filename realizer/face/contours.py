@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Int32
+from realizer.core.array_types import Float32, Int32
 from realizer.face.model import Fapu
 from realizer.tables import faps
 

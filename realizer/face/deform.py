@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float32, Float64
+from realizer.core.array_types import Bool, Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.au.deformer import moves_of
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.core.errors import FaceError, TableError
 from realizer.face.model import Fapu
 from realizer.tables import read_csv

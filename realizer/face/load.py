@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.core.errors import FaceError
-from realizer.face.archive import read_arrays
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
+from realizer.face.mesh_checks import range_faults, value_faults
 from realizer.face.model import Face
-from realizer.face.soundness import range_faults, value_faults
+from realizer.face.npz_file import read_arrays
 from realizer.tables import faps
 
 if TYPE_CHECKING:

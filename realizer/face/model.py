@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Int32, UInt8
+from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.tables import faps
 
 if TYPE_CHECKING:

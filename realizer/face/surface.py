@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Int16
+from realizer.core.array_types import Float32, Int16
 from realizer.face.model import Face
 
 __all__ = ["face_scale", "normals", "quantise"]

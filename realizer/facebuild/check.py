@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from realizer.core.errors import FaceError, TableError
-from realizer.face.archive import read_arrays
 from realizer.face.basis import ARRAYS, ROWS
 from realizer.face.features import INSIDE, Point, fapu_of, read_features
 from realizer.face.load import MESH, folder_of, load_folder, read_head
+from realizer.face.mesh_checks import NEEDED, range_faults, surface_faults, value_faults
 from realizer.face.model import Face
-from realizer.face.soundness import NEEDED, range_faults, surface_faults, value_faults
+from realizer.face.npz_file import read_arrays
 from realizer.tables import faps
 from realizer.tables.mappings import own_file, read_mapping
 

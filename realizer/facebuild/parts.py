@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64, Int32
-from realizer.facebuild.patch import Patch
+from realizer.core.array_types import Float64, Int32
+from realizer.facebuild.submesh import Patch
 
 __all__: list[str] = []
 

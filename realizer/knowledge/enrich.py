@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from bml_schema import Block, Expression, Speech, Sync, SyncRef
 from bml_schema.behaviours import SpeechText
-from realizer.knowledge.languages import ENGLISH, Words, language_of
-from realizer.knowledge.placing import Placement, place
+from realizer.knowledge.placement_rules import Placement, place
 from realizer.knowledge.sentences import sentences
+from realizer.knowledge.word_languages import ENGLISH, Words, language_of
 from realizer.tables.knowledge import Company, Knowledge, Mood, Role, knowledge
 from realizer.tables.templates import Template, apex, templates
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from realizer.speech.spelling import syllable_facts, units
+from realizer.speech.letter_to_sound import syllable_facts, units
 from realizer.speech.words import words_in
 
 __all__ = ["Sentence", "SpokenWord", "sentences"]

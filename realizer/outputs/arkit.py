@@ -8,11 +8,11 @@ from functools import cache
 
 import numpy as np
 
-from realizer.animation.fap.fap import to_fap
-from realizer.animation.fap.mapping import FapMapping
+from realizer.animation.axis import AU_NAMES, axis, presence
+from realizer.animation.fap.au_fap_mapping import FapMapping
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, axis, presence
-from realizer.core.arrays import Float32, Float64
+from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.tables import faps, read_csv, text_of
 
@@ -59,7 +59,7 @@ class ArkitFrames:
 @cache
 def ARKIT_NAMES() -> tuple[str, ...]:
     """ARKit's names of its 52 shapes, such as "jawOpen", alphabetically."""
-    from realizer.tables.names import shapes
+    from realizer.tables.arkit_names import shapes
 
     return tuple(sorted(shapes()))
 
@@ -139,7 +139,7 @@ def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, floa
 @cache
 def _from_aus(mapping: FapMapping | None) -> tuple[list[int], Float32, Float32]:
     """The AUs that shapes show, what each adds to each shape (n_au, 52), and what speech owns of a shape."""
-    from realizer.tables.names import shapes
+    from realizer.tables.arkit_names import shapes
 
     share = np.zeros((len(AU_NAMES()), len(ARKIT_NAMES())), np.float32)
     for k, name in enumerate(ARKIT_NAMES()):
@@ -172,7 +172,7 @@ def _beside(side: str) -> Float32:
 @cache
 def _effects(mapping: FapMapping | None) -> Float32:
     """(52, 68) FAPU: what each shape at weight 1 does, as the mapping has it of its action unit."""
-    from realizer.tables.names import shapes
+    from realizer.tables.arkit_names import shapes
 
     names = ARKIT_NAMES()
     values = np.zeros((len(names), len(axis())), np.float32)

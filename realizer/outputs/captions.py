@@ -7,11 +7,11 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from realizer.outputs import said
-from realizer.outputs.said import Span
+from realizer.outputs import speech_spans
+from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.playing import Speaking
+    from realizer.playback.active_block import Speaking
     from realizer.realization import Realization
 
 __all__ = ["Track", "captions"]
@@ -39,7 +39,7 @@ def captions(realization: Realization) -> tuple[Span, ...]:
     found = []
     for start, end in pairwise(bounds):
         shown = [line.text for line in lines if line.start < end and line.end > start]
-        if shown and end - start >= said.LEAST:
+        if shown and end - start >= speech_spans.LEAST:
             found.append(Span(start, end, "\n".join(shown)))
     return tuple(found)
 
@@ -47,7 +47,7 @@ def captions(realization: Realization) -> tuple[Span, ...]:
 def _lines(speaking: Speaking) -> Iterator[Span]:
     """The words of an utterance by the line; each stays a little, but not into the next."""
     lines: list[Span] = []
-    for word in said.words(speaking):
+    for word in speech_spans.words(speaking):
         if lines:
             line = lines[-1]
             rest, text = word.start - line.end, f"{line.text} {word.text}"

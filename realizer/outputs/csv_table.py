@@ -6,7 +6,7 @@ import csv
 import io
 from typing import TYPE_CHECKING
 
-from realizer.animation.targets import AU_NAMES
+from realizer.animation.axis import AU_NAMES
 from realizer.outputs.output import Drawing, Output
 from realizer.tables import faps
 

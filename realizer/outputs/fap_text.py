@@ -12,7 +12,7 @@ import numpy as np
 
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.lips.viseme_weights import fap_1
-from realizer.core.arrays import Int32
+from realizer.core.array_types import Int32
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.arrays import Int16, UInt8
+from realizer.core.array_types import Int16, UInt8
+from realizer.core.atomic_files import replacing
 from realizer.core.errors import RealizerError
-from realizer.core.files import replacing
 from realizer.outputs.captions import Track, captions
 from realizer.outputs.output import Drawing, Output
-from realizer.outputs.said import Span
+from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
     from realizer.realization import Realization

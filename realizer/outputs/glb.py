@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
-from realizer.outputs.morphs import morphs
+from realizer.outputs.morph_targets import morphs
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

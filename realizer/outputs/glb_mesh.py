@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float32
+from realizer.core.array_types import Bool, Float32
 from realizer.core.colours import linear
 from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from realizer.face.surface import normals
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
-    from realizer.outputs.morphs import Morphs
+    from realizer.outputs.morph_targets import Morphs
 
 __all__ = ["morphing_mesh", "rigid_mesh"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from realizer.core.arrays import UInt8
-from realizer.core.files import write_bytes
+from realizer.core.array_types import UInt8
+from realizer.core.atomic_files import write_bytes
 
 if TYPE_CHECKING:
     from realizer.realization import Realization

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.core.arrays import Float32, UInt8
+from realizer.core.array_types import Float32, UInt8
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def encode_png(pixels: UInt8) -> bytes:
 
 def _encode(realization: Realization, drawing: Drawing) -> bytes:
     """With `drawing.at` the picture of that instant; otherwise the sheet, its pictures at half the size."""
-    from realizer.render.sheets import sheet
+    from realizer.render.contact_sheet import sheet
 
     size, alpha = _draws(drawing)
     if drawing.at is not None:

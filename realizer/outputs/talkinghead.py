@@ -12,13 +12,13 @@ import numpy as np
 
 from realizer.animation.lips.viseme_weights import oculus_visemes
 from realizer.animation.lips.visemes import sounds
-from realizer.outputs import said
+from realizer.outputs import speech_spans
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.outputs.output import Drawing, Output
-from realizer.outputs.said import Span
+from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.playing import Speaking
+    from realizer.playback.active_block import Speaking
     from realizer.realization import Realization
 
 __all__ = ["OUTPUTS", "encode_talkinghead"]
@@ -42,9 +42,9 @@ def encode_talkinghead(realization: Realization) -> str:
     be handed over as `[bytes]`, is base64 of 16-bit mono PCM at `sampleRate`.
     """
     mine = tuple(s for s in realization.speaking if s.character == 0)
-    words = [word for speaking in mine for word in said.words(speaking)]
+    words = [word for speaking in mine for word in speech_spans.words(speaking)]
     visemes = [viseme for speaking in mine for viseme in _visemes(speaking)]
-    points = said.points(realization)
+    points = speech_spans.points(realization)
     sound = replace(realization, speaking=mine).sound(RATE)
     content = {
         **_timed("words", "w", words),
@@ -75,13 +75,13 @@ def _visemes(speaking: Speaking) -> Iterator[Span]:
     """The strongest viseme of each sound; neighbours that are the same are one."""
     names = {row.viseme: NAMES.get(row.name, row.name) for row in oculus_visemes()}
     now: Span | None = None
-    for phoneme in said.phonemes(speaking):
+    for phoneme in speech_spans.phonemes(speaking):
         start = phoneme.start
         for sound in sounds(phoneme.text):
             end = start + sound.share * (phoneme.end - phoneme.start)
             if sound.mix:
                 name = names[max(sound.mix, key=lambda part: part[1])[0]]
-                if now is not None and now.text == name and start - now.end < said.LEAST:
+                if now is not None and now.text == name and start - now.end < speech_spans.LEAST:
                     now = replace(now, end=end)
                 else:
                     if now is not None:

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from realizer.outputs import said
+from realizer.outputs import speech_spans
 from realizer.outputs.output import Drawing, Output
-from realizer.outputs.said import Span
+from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -30,9 +30,11 @@ def encode_textgrid(realization: Realization) -> str:
         mine = [speaking for speaking in realization.speaking if speaking.character == index]
         mine.sort(key=lambda speaking: speaking.start)
         prefix = f"{name or index} " if index else ""
-        tiers.append(_intervals(f"{prefix}words", end, (w for s in mine for w in said.words(s))))
-        tiers.append(_intervals(f"{prefix}phonemes", end, (p for s in mine for p in said.phonemes(s))))
-    tiers.append(_points("syncs", end, said.points(realization)))
+        tiers.append(_intervals(f"{prefix}words", end, (w for s in mine for w in speech_spans.words(s))))
+        tiers.append(
+            _intervals(f"{prefix}phonemes", end, (p for s in mine for p in speech_spans.phonemes(s)))
+        )
+    tiers.append(_points("syncs", end, speech_spans.points(realization)))
     lines = [
         'File type = "ooTextFile"', 'Object class = "TextGrid"', "",
         "xmin = 0", f"xmax = {_number(end)}", "tiers? <exists>", f"size = {len(tiers)}", "item []:",
@@ -90,9 +92,9 @@ def _head(kind: str, name: str, end: float) -> list[str]:
 
 def _ends(realization: Realization) -> Iterator[float]:
     for speaking in realization.speaking:
-        for spans in (said.words(speaking), said.phonemes(speaking)):
+        for spans in (speech_spans.words(speaking), speech_spans.phonemes(speaking)):
             yield from (span.end for span in spans)
-    yield from (time for time, _ in said.points(realization))
+    yield from (time for time, _ in speech_spans.points(realization))
 
 
 def _number(seconds: float) -> str:

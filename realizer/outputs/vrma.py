@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realizer.animation.targets import AU_NAMES, au
-from realizer.core.arrays import Float32, Float64
+from realizer.animation.axis import AU_NAMES, au
+from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.outputs.glb import quaternions

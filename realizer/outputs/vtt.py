@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from realizer.outputs import said
+from realizer.outputs import speech_spans
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:
@@ -50,10 +50,13 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
 
 def _cues(realization: Realization) -> Iterator[_Cue]:
     for speaking in realization.speaking:
-        for kind, spans in (("word", said.words(speaking)), ("phoneme", said.phonemes(speaking))):
+        for kind, spans in (
+            ("word", speech_spans.words(speaking)),
+            ("phoneme", speech_spans.phonemes(speaking)),
+        ):
             for span in spans:
                 yield _Cue(span.start, span.end, kind, span.text)
-    for time, name in said.points(realization):
+    for time, name in speech_spans.points(realization):
         yield _Cue(time, time + 1 / realization.fps, "sync", name, name)
 
 

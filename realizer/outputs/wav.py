@@ -6,7 +6,7 @@ import io
 import wave
 from typing import TYPE_CHECKING
 
-from realizer.core.arrays import Int16
+from realizer.core.array_types import Int16
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.core.arrays import UInt8
+from realizer.core.array_types import UInt8
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 
 from bml_schema import Block, Feedback
+from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
-from realizer.animation.idle.idle import Idle, idle_face
+from realizer.animation.idle.motion import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
-from realizer.animation.targets import AU_NAMES, axis
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.expressions import library_of
-from realizer.playback.cast import Cast
+from realizer.playback.active_block import Speaking
+from realizer.playback.block_manager import Ensemble
+from realizer.playback.block_store import Cast
 from realizer.playback.character import RELAX, Character
-from realizer.playback.ensemble import Ensemble
-from realizer.playback.playing import Speaking
-from realizer.playback.reporting import State
+from realizer.playback.feedback_events import State
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Recording, Say, Utterance
 from realizer.tables.cooccurrence import chosen

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Float64, Int16, Int32
+from realizer.core.array_types import Float32, Float64, Int16, Int32
 from realizer.core.errors import RealizerError
 
 __all__ = [

@@ -1,6 +1,6 @@
 """FAP rows become pictures: light, cameras, a canvas in a process of its own, contact sheets."""
 
-from realizer.render.child import available
-from realizer.render.process import Renderer
+from realizer.render.drawing_process import available
+from realizer.render.renderer import Renderer
 
 __all__ = ["Renderer", "available"]

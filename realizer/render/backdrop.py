@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from realizer.core.arrays import UInt8
+from realizer.core.array_types import UInt8
 from realizer.core.errors import RenderError
 from realizer.render.light import Light
 

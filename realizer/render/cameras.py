@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Float64
+from realizer.core.array_types import Float32, Float64
 from realizer.core.errors import RenderError
 from realizer.face.model import Face
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, UInt8
+from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear, srgb
 from realizer.core.errors import RenderError, TableError
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Int32, UInt8
+from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.core.errors import RenderError
 
 __all__ = ["Raster", "ready"]

@@ -9,14 +9,14 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-from realizer.core.arrays import Float32, UInt8
+from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RealizerError
 from realizer.face.model import Face
 from realizer.render.backdrop import channels
+from realizer.render.backends import open_canvas
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.ways import open_canvas
-from realizer.render.wire import Draw, Failed, Message, Open, Pixels, connection
+from realizer.render.process_messages import Draw, Failed, Message, Open, Pixels, connection
 
 __all__: list[str] = []
 
@@ -129,7 +129,7 @@ def serve(orders: Connection, answers: Connection) -> None:
 def check(way: str) -> int:
     """Draw one triangle; say on stdout which way was taken, or return 3 and say what is missing."""
     from realizer.core.errors import RenderError
-    from realizer.render.sample import triangle
+    from realizer.render.probe_triangle import triangle
 
     face = triangle()
     try:

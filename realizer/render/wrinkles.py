@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32, Float64, Int32
+from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.model import Face
-from realizer.render.skin import on_skin
+from realizer.render.surface_points import on_skin
 
 __all__ = ["Wrinkles"]
 

@@ -1,8 +1,8 @@
 """Sync points by least squares: a block's timings in, its sync times out."""
 
-from realizer.scheduling.plan import schedule_block, schedule_together
 from realizer.scheduling.problem import Member
-from realizer.scheduling.shapes import warm_up
+from realizer.scheduling.rigid_clusters import warm_up
+from realizer.scheduling.schedule_block import schedule_block, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 __all__ = ["Member", "Schedule", "Timing", "Warning", "schedule_block", "schedule_together", "warm_up"]

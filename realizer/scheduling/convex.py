@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
+from realizer.scheduling.longest_paths import components, raise_levels
 from realizer.scheduling.model import LOOSE, TIGHT, Index
-from realizer.scheduling.paths import components, raise_levels
-from realizer.scheduling.shapes import settle
-from realizer.scheduling.ties import Ties
+from realizer.scheduling.rigid_clusters import settle
+from realizer.scheduling.union_find import Ties
 
 __all__ = ["Quadratic", "kept", "optimum", "settled"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from realizer.scheduling.clash import Clash, Gap
+from realizer.scheduling.conflict import Clash, Gap
 from realizer.scheduling.problem import Part, Relation
 from realizer.scheduling.timing import Clause, Warning
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from realizer.scheduling.longest_paths import components
 from realizer.scheduling.model import Model
-from realizer.scheduling.paths import components
 from realizer.scheduling.problem import Relation
-from realizer.scheduling.shapes import Shapes
+from realizer.scheduling.rigid_clusters import Shapes
 
 __all__ = ["Group", "groups_of", "slides"]
 

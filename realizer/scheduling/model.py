@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from realizer.core.arrays import Bool, Float64
-from realizer.scheduling.clash import Clash, Web
+from realizer.core.array_types import Bool, Float64
+from realizer.scheduling.conflict import Clash, Web
 from realizer.scheduling.problem import ORIGIN, Problem
-from realizer.scheduling.ties import Ties
+from realizer.scheduling.union_find import Ties
 
 __all__ = ["LOOSE", "TIGHT", "Index", "Model", "model_of"]
 

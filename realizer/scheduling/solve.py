@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.core.arrays import Float64
-from realizer.scheduling.clash import Clash, Link, Web
-from realizer.scheduling.direct import direct
+from realizer.core.array_types import Float64
+from realizer.scheduling.conflict import Clash, Link, Web
+from realizer.scheduling.constrained_groups import squeeze
 from realizer.scheduling.groups import Group, groups_of, slides
+from realizer.scheduling.longest_paths import components, raise_levels
+from realizer.scheduling.minimal_cycles import shortest
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
-from realizer.scheduling.paths import components, raise_levels
 from realizer.scheduling.problem import ORIGIN, Problem
-from realizer.scheduling.shapes import Shapes, shapes_of
-from realizer.scheduling.shortest import shortest
-from realizer.scheduling.squeeze import squeeze
+from realizer.scheduling.rigid_clusters import Shapes, shapes_of
+from realizer.scheduling.small_solver import direct
 
 __all__ = ["Solution", "solve"]
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 
 __all__ = ["Clause", "Schedule", "Timing", "Warning"]
 

@@ -13,15 +13,15 @@ from realizer.core.errors import RealizerError
 from realizer.core.logs import write_json
 from realizer.core.settings import Settings, SettingsError
 from realizer.scheduling import warm_up
-from realizer.server.runtime.cycles import leave_to_shell
-from realizer.server.runtime.shell import Shell
+from realizer.server.runtime.gc_policy import leave_to_shell
+from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.workers import FAULT, READY, Workers, handed
 from realizer.server.transports.asap import AsapDoor
-from realizer.server.transports.door import Door
 from realizer.server.transports.stomp import StompDoor
-from realizer.server.transports.websocket.websocket import WebSocketDoor, lines
-from realizer.server.transports.xface.xface import XfaceDoor
-from realizer.server.transports.xface.xface_player import XfacePlayerDoor
+from realizer.server.transports.transport import Door
+from realizer.server.transports.websocket.server import WebSocketDoor, lines
+from realizer.server.transports.xface.player import XfacePlayerDoor
+from realizer.server.transports.xface.server import XfaceDoor
 
 __all__ = ["Server", "run", "serve", "work"]
 

@@ -9,9 +9,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from realizer.speech.catalogue import VoiceInfo, find_voice, voices
-    from realizer.speech.espeak.espeak import EspeakVoice
-    from realizer.speech.hibari.hibari import HibariVoice
+    from realizer.speech.espeak.voice import EspeakVoice
+    from realizer.speech.hibari.voice import HibariVoice
+    from realizer.speech.registry import VoiceInfo, find_voice, voices
     from realizer.speech.silent import SilentVoice
     from realizer.speech.utterance import Phoneme, Say, Utterance, Voice, Word
 
@@ -30,12 +30,12 @@ __all__ = [
 ]
 
 _HOME = {
-    "EspeakVoice": "espeak.espeak",
-    "HibariVoice": "hibari.hibari",
+    "EspeakVoice": "espeak.voice",
+    "HibariVoice": "hibari.voice",
     "SilentVoice": "silent",
-    "VoiceInfo": "catalogue",
-    "find_voice": "catalogue",
-    "voices": "catalogue",
+    "VoiceInfo": "registry",
+    "find_voice": "registry",
+    "voices": "registry",
 }
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from realizer.core.errors import VoiceError
-from realizer.speech.fitting import fitted
-from realizer.speech.spelling import letters_to_phonemes, syllable_facts, units
+from realizer.speech.duration_fit import fitted
+from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, units
 from realizer.speech.ssml import Mark, read_script
 from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
 from realizer.speech.words import Item, Pause, Spelled, items

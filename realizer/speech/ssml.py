@@ -10,7 +10,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
 from realizer.core.errors import VoiceError
-from realizer.speech.prosody import understood
+from realizer.speech.ssml_prosody import understood
 from realizer.speech.utterance import MOST_TEXT, Say
 
 __all__ = ["Break", "Mark", "Script", "Tag", "read_script"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from realizer.core.arrays import Int16
+from realizer.core.array_types import Int16
 
 __all__ = ["MOST_TEXT", "STRETCH", "WARP", "Phoneme", "Recording", "Say", "Utterance", "Voice", "Word"]
 

@@ -7,8 +7,8 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from realizer.speech.prosody import PLAIN, Prosody
 from realizer.speech.ssml import Break, Mark, Script
+from realizer.speech.ssml_prosody import PLAIN, Prosody
 
 __all__ = ["Item", "Pause", "PlacedMark", "Spelled", "items", "words_in"]
 

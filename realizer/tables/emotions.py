@@ -8,8 +8,8 @@ from functools import cache
 
 from realizer import tables
 from realizer.core.errors import TableError
-from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes, read_aus
+from realizer.tables.wheel_words import ring
 
 __all__ = ["Archetype", "EmotionFace", "archetypes", "emotion_faces"]
 

@@ -19,9 +19,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the drawing process
 import numpy as np
 from decimate import decimated
 
+from realizer.animation.axis import au, axis
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
-from realizer.animation.targets import au, axis
 from realizer.face.au.file import read_model
 from realizer.face.au.mixers import mix
 from realizer.face.au.model import Model
@@ -50,9 +50,9 @@ def frames(shown: list[Mapping[int, float]]) -> AUFrames:
 
 def pictures(face: Face, views: tuple[str, ...], shapes: Callable[[], list[Any]]) -> np.ndarray:
     """Rows of pictures of (n, n_vertices, 3) shapes, by view."""
+    from realizer.render.backends import open_canvas
     from realizer.render.cameras import camera_for
     from realizer.render.light import preset
-    from realizer.render.ways import open_canvas
 
     bands = []
     for view in views:

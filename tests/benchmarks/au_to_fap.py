@@ -20,10 +20,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import numpy.typing as npt
 
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.axis import au, axis
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import au, axis
-from realizer.core.arrays import Float32, Float64, Int32
+from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.au.units import units
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face

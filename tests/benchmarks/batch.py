@@ -35,11 +35,11 @@ os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
 
 from stopwatch import Noise
 
-from realizer.batch.processes import Processes
+from realizer.batch.process_pool import Processes
 from realizer.batch.task import Options, Task
-from realizer.batch.work import Worker
-from realizer.speech.espeak.espeak import WORDS_A_MINUTE
-from realizer.speech.espeak.espeak_worker import load
+from realizer.batch.worker import Worker
+from realizer.speech.espeak.voice import WORDS_A_MINUTE
+from realizer.speech.espeak.worker import load
 
 LENGTHS = (4, 30)  # s, about
 DOCUMENTS = 40

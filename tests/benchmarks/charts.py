@@ -19,13 +19,13 @@ import json
 
 from stopwatch import helped, median, noise
 
+from realizer.charts.chart_data import lines_of
 from realizer.charts.picture import timeline
 from realizer.charts.raster import png
-from realizer.charts.reading import lines_of
 from realizer.charts.svg import svg
 from realizer.pipeline import play
 from realizer.playback.player import Player
-from realizer.server.streams.plans import Plans
+from realizer.server.streams.schedule_stream import Plans
 
 
 def faces(count: int) -> str:

@@ -25,11 +25,11 @@ from plot import bars, exponent
 from stopwatch import noise
 
 from realizer.animation.blend import blend
-from realizer.animation.fap.fap import to_fap
-from realizer.charts.colours import FAINT, INK, PAPER
-from realizer.charts.files import writer_for
+from realizer.animation.fap.conversion import to_fap
+from realizer.charts.diverging_scale import FAINT, INK, PAPER
 from realizer.charts.shapes import Box, Picture, Text
-from realizer.core.arrays import Float64
+from realizer.charts.write_chart import writer_for
+from realizer.core.array_types import Float64
 from realizer.pipeline import play
 from realizer.playback.player import Player
 

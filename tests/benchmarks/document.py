@@ -29,7 +29,7 @@ from stopwatch import helped
 
 from bml_schema import Block, read
 from realizer.behaviours import KINDS, VOCABULARY
-from realizer.playback.planning import plan
+from realizer.playback.block_planner import plan
 from realizer.playback.player import Player
 from realizer.server.session.feedback_log import FeedbackLog
 

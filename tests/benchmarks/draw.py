@@ -24,12 +24,12 @@ from realizer.face.load import load_face
 from realizer.face.surface import normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
 from realizer.render import Renderer, available
+from realizer.render.backends import WAYS
 from realizer.render.cameras import camera_for
-from realizer.render.figure import Figure
 from realizer.render.light import Shader, preset
-from realizer.render.offscreen import Canvas
-from realizer.render.onboard import OnboardCanvas
-from realizer.render.ways import WAYS
+from realizer.render.opengl import Canvas
+from realizer.render.shaded_mesh import Figure
+from realizer.render.software import OnboardCanvas
 from realizer.render.worker import encode
 
 # Spoken by the silent voice in about ten seconds.

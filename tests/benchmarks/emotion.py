@@ -19,8 +19,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realizer.analysis.measure import as_features_see, faps_from_features, features_from_points
-from realizer.analysis.mesh import faps_from_mesh, points_of
+from realizer.analysis.faps_from_mesh import faps_from_mesh, points_of
+from realizer.analysis.faps_from_points import as_features_see, faps_from_features, features_from_points
 from realizer.analysis.recognise import Recogniser, recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer.facebuild.mpeg4.build import copy_with_zones
-from realizer.facebuild.mpeg4.truth import PEERS, Truth, face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import PEERS, Truth, face_truth, mean_score
 from realizer.tables import read_csv
 
 BY_EYE = Path(__file__).with_name("fap_scores_by_eye.csv")

@@ -23,7 +23,7 @@ from au_to_fap import Skin, asked, cosine, shapes_of
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from realizer import tables
-from realizer.core.arrays import Float32, Float64
+from realizer.core.array_types import Float32, Float64
 from realizer.face.load import load_face
 from realizer.tables import by_number, faps, read_csv
 

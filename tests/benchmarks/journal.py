@@ -25,15 +25,15 @@ from unittest.mock import patch
 
 from realizer.core.settings import Settings
 from realizer.server.journal import Entry, Journal, Kept, Log, journal_at
-from realizer.server.journal import notes as thresholds
+from realizer.server.journal import journal_writer as thresholds
 from realizer.server.journal.checkpoint import checkpoint
-from realizer.server.journal.folder import FolderJournal
-from realizer.server.journal.notes import Notes
+from realizer.server.journal.journal_writer import Notes
+from realizer.server.journal.recordings import FolderJournal
 from realizer.server.journal.replay import restored
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
-from realizer.speech.fitting import fitted
+from realizer.speech.duration_fit import fitted
 from realizer.speech.utterance import Utterance
 
 SETTINGS = Settings(voice="silent")

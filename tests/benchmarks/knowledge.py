@@ -10,8 +10,8 @@ import random
 import numpy as np
 from stopwatch import helped, median, noise
 
+from realizer.animation.axis import AU_NAMES
 from realizer.animation.cooccurrence import cooccur
-from realizer.animation.targets import AU_NAMES
 from realizer.knowledge.enrich import Enricher
 from realizer.tables.cooccurrence import rules
 

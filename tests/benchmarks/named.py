@@ -22,11 +22,11 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import Page, Route, sync_playwright
 
+from realizer.animation.axis import au, axis
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
-from realizer.animation.targets import au, axis
+from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import load_face
-from realizer.face.mapping import mapping_of
 from realizer.render import Renderer
 from realizer.tables.cooccurrence import rules
 from realizer.tables.lexemes import face_lexemes

@@ -15,7 +15,7 @@ import numpy as np
 from stopwatch import helped, measure, noise
 
 from bml_schema import parse
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours import VOCABULARY
 from realizer.face.deform import deform
 from realizer.face.load import load_face

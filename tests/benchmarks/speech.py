@@ -24,14 +24,14 @@ from dataclasses import replace
 import numpy as np
 from stopwatch import noise
 
-from realizer.animation.lips.lips import lip_channels
+from realizer.animation.lips.lip_sync import lip_channels
 from realizer.core.settings import Settings
 from realizer.protocol.wire import FrameKind, unpack
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech import Say, find_voice, voices
-from realizer.speech.fitting import fitted
-from realizer.speech.kept import Kept
+from realizer.speech.cache import Kept
+from realizer.speech.duration_fit import fitted
 from realizer.speech.utterance import MOST_TEXT, Utterance, Voice
 
 SENTENCE = "Hello, I am very pleased to meet you, number {}."

@@ -22,7 +22,7 @@ from bml_schema import (
     parse,
     write,
 )
-from bml_schema.shape import shape_of
+from bml_schema.node_schema import shape_of
 
 # What an element needs beyond its required attributes; children without namespace.
 LEAST = {

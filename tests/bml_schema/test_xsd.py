@@ -35,7 +35,7 @@ from bml_schema import (
     parse,
     write,
 )
-from bml_schema.shape import Attribute, shape_of
+from bml_schema.node_schema import Attribute, shape_of
 from tests.strategies import blocks
 
 XSD = Path(str(files("bml_schema") / "xsd"))

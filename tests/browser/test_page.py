@@ -116,9 +116,9 @@ def still(light: str, aus: dict[int, float]):  # type: ignore[no-untyped-def]
     """What the drawing process makes of these action units, (h, w, 3) float."""
     import numpy as np
 
+    from realizer.animation.axis import au, axis
     from realizer.animation.frames import AUFrames
     from realizer.animation.pose import poses
-    from realizer.animation.targets import au, axis
     from realizer.face.load import takes
     from realizer.render import Renderer
 

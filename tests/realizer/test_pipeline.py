@@ -13,7 +13,7 @@ from bml_schema import BMLError
 from realizer import realize, schedule
 from realizer.examples import examples
 from realizer.playback.player import Speaking
-from realizer.playback.scene import parse_scene
+from realizer.playback.scene_file import parse_scene
 from realizer.realization import Realization
 from realizer.speech import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from realizer.animation.frames import FAPFrames
-from realizer.core.arrays import Bool, Int32
+from realizer.core.array_types import Bool, Int32
 from realizer.core.units import frame_count
 
 __all__ = ["FAPClip"]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.animation.fap.fap_clip import FAPClip
-from realizer.core.arrays import Bool
+from realizer.core.array_types import Bool
 from realizer.core.errors import RealizerError
 from realizer.tables import faps
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from realizer.animation.channel import Channel
 from realizer.animation.curves import smooth
-from realizer.animation.idle.chance import uniform
-from realizer.core.arrays import Float64
+from realizer.animation.idle.rng import uniform
+from realizer.core.array_types import Float64
 from realizer.speech.accents import prosody_facts
 
 __all__ = ["Blinks", "Fewer", "PhraseEnd", "blinks_between"]

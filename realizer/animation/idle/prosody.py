@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from realizer import tables
+from realizer.animation.axis import AU_NAMES, au, axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import PhraseEnd
-from realizer.animation.idle.chance import uniform
-from realizer.animation.targets import AU_NAMES, au, axis, region
-from realizer.core.arrays import Float64
+from realizer.animation.idle.rng import uniform
+from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from realizer.animation.lips.dominance import Track
 from realizer.animation.lips.visemes import coarticulation
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 
 __all__ = ["BILABIAL", "LABIODENTAL", "held", "lips_taken"]
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.animation.lips.visemes import SHAPE, VISEMES, coarticulation, shape_table, sounds
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.speech.utterance import Phoneme
 
 __all__ = ["CLASSES", "Track", "dominances", "key_times", "track_of"]

@@ -12,7 +12,7 @@ from realizer import tables
 from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
 from realizer.animation.lips.dominance import dominances, key_times, track_of
 from realizer.animation.lips.visemes import VISEMES
-from realizer.core.arrays import Float64, Int32
+from realizer.core.array_types import Float64, Int32
 from realizer.speech.utterance import Phoneme
 
 __all__ = ["OculusViseme", "fap_1", "oculus_visemes", "oculus_weights", "viseme_weights"]

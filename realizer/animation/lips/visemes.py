@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from realizer import tables
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 
 __all__ = [
     "LipShape",

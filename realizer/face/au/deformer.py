@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float32, Float64
+from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.au.mixers import OPENING, opened
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
-from realizer.face.au.roots import grown, skin
-from realizer.face.au.succession import LEAST, Succession
+from realizer.face.au.skin_binding import grown, skin
+from realizer.face.au.successive_mixer import LEAST, Succession
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face

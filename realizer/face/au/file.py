@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError, TableError
 from realizer.face.au.functions import ANGLE, GAUSSIAN, LOWER
 from realizer.face.au.model import HeadTurn, Model, Motion, Mouth, UnitModel

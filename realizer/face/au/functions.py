@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 
 __all__ = ["angle", "cubic_terms", "density", "direction", "heading", "height"]
 

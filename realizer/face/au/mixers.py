@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.face.au.model import Model, turned
 from realizer.face.au.units import units
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.face.au.functions import heading, height
 
 __all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "half", "rotation", "turned"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64, Int32
+from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.au.model import Mouth
 from realizer.face.model import Face

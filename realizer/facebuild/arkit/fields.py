@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64, Int32
-from realizer.facebuild.arkit.mouth import Mouth, averages
+from realizer.core.array_types import Float64, Int32
+from realizer.facebuild.arkit.mouth_coordinates import Mouth, averages
 from realizer.facebuild.mpeg4.measure import WAYS
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth

@@ -17,7 +17,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 
 __all__ = ["Gltf"]

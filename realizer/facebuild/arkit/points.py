@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.face.features import Point
-from realizer.facebuild.arkit.sorting import behind
-from realizer.facebuild.arkit.surface import Surface
+from realizer.facebuild.arkit.mesh_merge import Surface
+from realizer.facebuild.arkit.part_classifier import behind
 from realizer.facebuild.mpeg4.landmarks import find_points
-from realizer.facebuild.patch import vertex_normals
+from realizer.facebuild.submesh import vertex_normals
 
 __all__ = ["points_of"]
 

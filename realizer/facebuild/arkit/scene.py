@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64, Int32
+from realizer.core.array_types import Float64, Int32
 from realizer.core.colours import srgb
 from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.gltf import Gltf

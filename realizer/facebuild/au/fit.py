@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.face.au.mouth import fit_mouth
 from realizer.face.au.units import units
 from realizer.face.model import Face
-from realizer.facebuild.au.limit import FURTHEST, Watched, furthest, watched
+from realizer.facebuild.au.fit_limits import FURTHEST, Watched, furthest, watched
 from realizer.facebuild.au.measure import Measured
 from realizer.facebuild.au.solve import STILL, Fit, Found
 from realizer.tables import action_units

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError, TableError
-from realizer.face.archive import read_arrays
 from realizer.face.au.units import units
+from realizer.face.npz_file import read_arrays
 from realizer.tables import read_csv
 
 __all__ = ["Measured", "read_measured", "read_shapes", "write_shapes"]

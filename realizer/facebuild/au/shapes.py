@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64, Int32
+from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.au.mouth import fit_mouth, shares
 from realizer.face.au.units import Unit, units
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import Measured
-from realizer.facebuild.patch import Patch, vertex_normals
-from realizer.facebuild.person import hm08
-from realizer.facebuild.person.ground import Ground
+from realizer.facebuild.person import makehuman
+from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
+from realizer.facebuild.submesh import Patch, vertex_normals
 
 __all__ = ["measure_shapes"]
 
@@ -44,7 +44,7 @@ def measure_shapes(
     Raises:
         FaceError: no recipe or data, or a skin that is not made from them.
     """
-    data = hm08.data_folder(data)
+    data = makehuman.data_folder(data)
     ground = person_of(data, read_recipe(folder / "recipe.toml", data).targets).ground
     mesh, at = ground.mesh, ground.at
     twin = mesh.mirror()
@@ -68,7 +68,7 @@ def measure_shapes(
             shape = np.zeros_like(at)
             for name, weight in unit.mixture.items():
                 for side in _sides(data, name):
-                    shape += weight * hm08.read_target(data, side, len(at)) * hm08.DECIMETRE
+                    shape += weight * makehuman.read_target(data, side, len(at)) * makehuman.DECIMETRE
             shape = (shape + shape[twin] * EVEN) / 2
             moves = np.einsum("nk,nkc->nc", share, shape[corners])
             out[unit.au] = Measured(unit.au, skin, moves, seen, upper)

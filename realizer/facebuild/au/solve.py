@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.face.au.functions import ANGLE, GAUSSIAN, angle, density, direction
-from realizer.facebuild.au.limit import overshoot
+from realizer.facebuild.au.fit_limits import overshoot
 
 __all__: list[str] = []
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.face.archive import read_arrays
 from realizer.face.basis import ARRAYS, pack
 from realizer.face.features import read_features, write_features
 from realizer.face.load import MESH, read_head
+from realizer.face.npz_file import read_arrays
 from realizer.facebuild.mpeg4 import rigid
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
 from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64, Int32
+from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.facebuild.mpeg4.zones import Falloff, Setup, Triple, Zone
 from realizer.tables import faps, read_csv

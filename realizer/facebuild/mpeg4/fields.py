@@ -15,7 +15,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.facebuild.mpeg4.measure import WAYS
 from realizer.facebuild.mpeg4.zones import Setup, Zone

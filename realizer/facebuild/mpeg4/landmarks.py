@@ -13,12 +13,12 @@ from importlib.resources import files
 
 import numpy as np
 
-from realizer.core.arrays import Float64, Int32
+from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.features import INSIDE, NAMES, Point
-from realizer.facebuild.mpeg4.evidence import Head, evidence
+from realizer.facebuild.mpeg4.head_geometry import Head, evidence
 from realizer.facebuild.mpeg4.rigid import balls
-from realizer.facebuild.patch import vertex_normals
+from realizer.facebuild.submesh import vertex_normals
 from realizer.tables import read_csv
 
 __all__ = ["find_points"]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.deform import deform
 from realizer.face.model import Face

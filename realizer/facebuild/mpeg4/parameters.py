@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Int32
+from realizer.core.array_types import Int32
 from realizer.core.errors import FaceError
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64, Int32
+from realizer.core.array_types import Float64, Int32
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth

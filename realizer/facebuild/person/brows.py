@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.facebuild.parts import Part, grid, smooth
-from realizer.facebuild.patch import Patch, vertex_normals
+from realizer.facebuild.person.appearance import Look
 from realizer.facebuild.person.lids import Lid
-from realizer.facebuild.person.look import Look
+from realizer.facebuild.submesh import Patch, vertex_normals
 
 __all__: list[str] = []
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from realizer.facebuild.person import hm08
-from realizer.facebuild.person.assembly import assemble
-from realizer.facebuild.person.fields import face_fields
-from realizer.facebuild.person.folder import write_face
+from realizer.facebuild.person import makehuman
+from realizer.facebuild.person.bust import assemble
+from realizer.facebuild.person.face_writer import write_face
+from realizer.facebuild.person.fap_fields import face_fields
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
@@ -35,7 +35,7 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
         FaceError: the data or the recipe are missing or wrong.
     """
     folder = output or Path("faces") / name
-    data = hm08.data_folder(data)
+    data = makehuman.data_folder(data)
     recipe = read_recipe(folder / "recipe.toml", data)
     person = person_of(data, recipe.targets)
     fields, lips = face_fields(person.ground, person.jaw_pivot)

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.facebuild.parts import Part, grid, smooth
-from realizer.facebuild.patch import Patch
 from realizer.facebuild.person.scalp import Scalp
+from realizer.facebuild.submesh import Patch
 
 __all__ = ["Style", "style_of"]
 

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.ground import FORWARD, UP, Ground, scaled
+from realizer.facebuild.person.base_mesh import FORWARD, UP, Ground, scaled
 
 __all__: list[str] = []
 
@@ -28,7 +28,7 @@ class Lid:
     """
 
     def __init__(self, ground: Ground, side: int) -> None:
-        from realizer.facebuild.person.hm08 import walk
+        from realizer.facebuild.person.makehuman import walk
 
         self.side = side
         at = ground.at

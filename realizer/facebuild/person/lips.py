@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.ground import FORWARD, LEFT, UP, Ground, scaled
+from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
 
 __all__: list[str] = []
 
@@ -81,7 +81,7 @@ class Lips:
     def __init__(self, ground: Ground) -> None:
         at, n = ground.at, len(ground.at)
         edges = ground.mesh.edges()
-        from realizer.facebuild.person.hm08 import walk
+        from realizer.facebuild.person.makehuman import walk
 
         rings = []
         for first, second in RINGS:

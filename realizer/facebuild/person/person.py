@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person import hm08
-from realizer.facebuild.person.ground import Ground
+from realizer.facebuild.person import makehuman
+from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import close_lips
 from realizer.tables import read_csv
 
@@ -61,7 +61,7 @@ class Person:
 
 def person_of(data: Path, targets: Mapping[str, float]) -> Person:
     """The person that weighted shape targets make of the base mesh."""
-    mesh = hm08.read_base(data)
+    mesh = makehuman.read_base(data)
     at = identity(mesh, data, targets)
     points = _landmarks(mesh, at)
     twin = mesh.mirror()
@@ -69,8 +69,8 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
     @cache
     def shape(unit: str) -> Float64:
         # The data are rounded to a tenth of a millimetre, each side on its own: take the mean of both.
-        sides = [hm08.read_target(data, name, len(at)) for name in (unit, _other_side(unit))]
-        return np.asarray((sides[0] + sides[1][twin] * MIRROR) / 2 * hm08.DECIMETRE)
+        sides = [makehuman.read_target(data, name, len(at)) for name in (unit, _other_side(unit))]
+        return np.asarray((sides[0] + sides[1][twin] * MIRROR) / 2 * makehuman.DECIMETRE)
 
     at = _relaxed(Ground(mesh, at, points, shape))
     ground = Ground(mesh, close_lips(Ground(mesh, at, points, shape)), points, shape)
@@ -87,15 +87,15 @@ def person_of(data: Path, targets: Mapping[str, float]) -> Person:
     )
 
 
-def identity(mesh: hm08.BaseMesh, data: Path, targets: Mapping[str, float]) -> Float64:
+def identity(mesh: makehuman.BaseMesh, data: Path, targets: Mapping[str, float]) -> Float64:
     """The base mesh mixed to a person, (n, 3) metres: origin between the eyes, both sides alike."""
     at = mesh.vertices.copy()
     for target, weight in targets.items():
         for side in ("l-", "r-") if "*" in target else ("",):
-            at += weight * hm08.read_target(data, target.replace("*", side), len(at))
+            at += weight * makehuman.read_target(data, target.replace("*", side), len(at))
     at = (at + at[mesh.mirror()] * MIRROR) / 2
     eyes = [at[np.unique(mesh.quads[f"helper-{side}-eye"])].mean(axis=0) for side in "lr"]
-    return np.asarray((at - (eyes[0] + eyes[1]) / 2) * hm08.DECIMETRE)
+    return np.asarray((at - (eyes[0] + eyes[1]) / 2) * makehuman.DECIMETRE)
 
 
 def _relaxed(ground: Ground) -> Float64:
@@ -122,11 +122,11 @@ def _ball(shell: Float64) -> tuple[Float64, float]:
     return fit[:3], float(np.sqrt(fit[3] + fit[:3] @ fit[:3])) - EYE_INSET
 
 
-def _joint(mesh: hm08.BaseMesh, at: Float64, name: str) -> Float64:
+def _joint(mesh: makehuman.BaseMesh, at: Float64, name: str) -> Float64:
     return np.asarray(at[np.unique(mesh.quads[name])].mean(axis=0))
 
 
-def _landmarks(mesh: hm08.BaseMesh, at: Float64) -> dict[str, int]:
+def _landmarks(mesh: makehuman.BaseMesh, at: Float64) -> dict[str, int]:
     """Feature point -> base vertex; those on the tongue are found."""
     path = Path(__file__).with_name("hm08_landmarks.csv")
     points = {

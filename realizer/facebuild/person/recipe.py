@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import FaceError
-from realizer.facebuild.person import hm08
+from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.hair import style_of
 
 __all__: list[str] = []
@@ -32,7 +32,7 @@ class Recipe:
         targets: shape target -> weight 0..1; `*` in a name stands for both sides.
         colours: what for -> sRGB 0..255.
         hair: the style of the hair, and the figures it changes.
-        look: figures of `realizer.facebuild.person.look.Look` that differ from the plain ones.
+        look: figures of `realizer.facebuild.person.appearance.Look` that differ from the plain ones.
     """
 
     says: str
@@ -79,7 +79,7 @@ def read_recipe(path: Path, data: Path) -> Recipe:
 
 
 def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:
-    known = hm08.target_names(data)
+    known = makehuman.target_names(data)
     faults = []
     if not any(str(name).startswith("macrodetails/") for name in targets):
         faults.append("targets: wanted at least one of macrodetails/..., got none")

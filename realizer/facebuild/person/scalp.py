@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float64
-from realizer.facebuild.patch import Patch, vertex_normals
+from realizer.core.array_types import Float64
+from realizer.facebuild.submesh import Patch, vertex_normals
 
 __all__: list[str] = []
 

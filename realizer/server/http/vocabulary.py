@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 from bml_schema import CORE, EXTENSIONS, Block, Constraint, Required
-from bml_schema.shape import local, shape_of
+from bml_schema.node_schema import local, shape_of
 from realizer.behaviours import VOCABULARY
 
 __all__ = ["vocabulary"]
@@ -131,7 +131,7 @@ def _values() -> dict[str, list[str]]:
 
 
 def _aus() -> list[dict[str, Any]]:
-    from realizer.animation.targets import AU_NAMES
+    from realizer.animation.axis import AU_NAMES
     from realizer.tables import action_units
 
     known = AU_NAMES()
@@ -159,14 +159,14 @@ def _faps() -> list[dict[str, Any]]:
 
 
 def _groups() -> dict[str, list[dict[str, Any]]]:
-    from realizer.tables.regions import au_regions, fap_regions
+    from realizer.tables.control_groups import au_regions, fap_regions
 
     found = {"aus": au_regions(), "faps": fap_regions()}
     return {kind: [{"name": r.name, "members": r.members} for r in rows] for kind, rows in found.items()}
 
 
 def _wheel() -> list[dict[str, Any]]:
-    from realizer.tables.feelings import ring
+    from realizer.tables.wheel_words import ring
 
     return [
         {"name": p.name, "kind": p.kind, "angle": p.angle, "activation": p.activation}

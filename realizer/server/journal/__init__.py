@@ -14,13 +14,13 @@ def journal_at(where: str) -> Journal:
         JournalError: it cannot be opened, or something must be installed.
     """
     if where.startswith(("redis://", "rediss://", "unix://")):
-        from realizer.server.journal.shared import SharedJournal
+        from realizer.server.journal.redis_journal import SharedJournal
 
         return SharedJournal(where)
     if "://" in where.removeprefix("sqlite://"):  # as it came it may have a password in it
         raise JournalError(
             "the journal: wanted a file, or redis://HOST:PORT/NUMBER, got an address of another kind"
         )
-    from realizer.server.journal.local import LocalJournal
+    from realizer.server.journal.sqlite_journal import LocalJournal
 
     return LocalJournal(where.removeprefix("sqlite://"))

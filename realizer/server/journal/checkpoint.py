@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from realizer.server.journal.entry import JournalError
-from realizer.server.journal.plain import character_of, plain_character, plain_schedule, schedule_of
+from realizer.server.journal.serialization import character_of, plain_character, plain_schedule, schedule_of
 
 if TYPE_CHECKING:
     from realizer.server.session.session import Session

@@ -8,17 +8,17 @@ from typing import Any
 
 from bml_schema import Feedback
 from realizer.core.settings import Settings, SettingsError
-from realizer.playback.playing import Speaking
+from realizer.playback.active_block import Speaking
 from realizer.realization import Realization, counted, warned
 from realizer.server.journal.checkpoint import restore
 from realizer.server.journal.entry import JournalError
-from realizer.server.journal.folder import Record
+from realizer.server.journal.recordings import Record
 from realizer.server.journal.replay import replay
-from realizer.server.journal.viewer import Viewer
-from realizer.server.runtime.studio import Studio
+from realizer.server.journal.replay_viewer import Viewer
+from realizer.server.runtime.engines import Studio
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.session import Session
-from realizer.server.speech.speeches import OPEN
+from realizer.server.speech.speech_streams import OPEN
 
 __all__ = ["played", "told"]
 

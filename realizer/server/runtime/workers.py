@@ -23,7 +23,7 @@ from urllib.parse import parse_qs
 from realizer.core.errors import RealizerError
 from realizer.core.logs import write_words
 from realizer.core.settings import Settings
-from realizer.server.runtime.gathered import gathered, is_for_all
+from realizer.server.runtime.worker_aggregation import gathered, is_for_all
 
 __all__ = ["WorkerError", "Workers", "handed", "worker_of"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.speech.utterance import Say
 
 __all__: list[str] = []

@@ -12,24 +12,24 @@ from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
 from realizer.protocol.messages import ErrorMessage, Gap
-from realizer.server.documents.intake import Intake
 from realizer.server.documents.limits import too_long
+from realizer.server.documents.submission import Intake
 from realizer.server.journal import Lost
 from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.entry import Kind
-from realizer.server.journal.notes import Notes
+from realizer.server.journal.journal_writer import Notes
+from realizer.server.session.character_faces import Faces
+from realizer.server.session.dispatch import take
 from realizer.server.session.effects import Close, Effect, Move, Send
-from realizer.server.session.faces import Faces
 from realizer.server.session.feedback_log import FeedbackLog
-from realizer.server.session.greeting import greeting
-from realizer.server.session.reception import take
-from realizer.server.session.rhythm import Rhythm
-from realizer.server.session.telling import Telling
-from realizer.server.speech.clips import Clips
+from realizer.server.session.feedback_publisher import Telling
+from realizer.server.session.wakeup_plan import Rhythm
+from realizer.server.session.welcome import greeting
+from realizer.server.speech.audio_clips import Clips
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import STUCK, Connection, PictureSubscription, Subscription, View
-from realizer.server.streams.run import Run
-from realizer.server.streams.streams import EPSILON
+from realizer.server.streams.frame_fast_path import Run
+from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
 
 __all__ = ["Session"]

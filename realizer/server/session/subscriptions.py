@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from realizer.animation.targets import AU_NAMES
+from realizer.animation.axis import AU_NAMES
 from realizer.core.settings import raises
 from realizer.protocol.messages import PICTURES, STREAMS, Changed, Subscribe, Subscribed, Unsubscribe
 from realizer.server.documents.limits import MAX_CHARACTERS, too_many_pixels
+from realizer.server.session.control_fields import Wrong, index_of
 from realizer.server.session.effects import Look
-from realizer.server.session.wanted import Wrong, index_of
 from realizer.server.streams.connection import (
     Connection,
     FeedbackFilter,
@@ -20,7 +20,7 @@ from realizer.server.streams.connection import (
     SoundSubscription,
     Subscription,
 )
-from realizer.server.streams.streams import arkit_names
+from realizer.server.streams.frame_windows import arkit_names
 from realizer.tables import faps
 
 if TYPE_CHECKING:

@@ -7,8 +7,10 @@ from collections.abc import Iterable
 from weakref import WeakValueDictionary
 
 from realizer.playback.player import Player
+from realizer.server.session.character_faces import Faces
 from realizer.server.session.effects import Effect, Look, Send
-from realizer.server.session.faces import Faces
+from realizer.server.streams.audio_packets import packets_due, send_packets
+from realizer.server.streams.audio_stream import PACKET, Sound
 from realizer.server.streams.connection import (
     Connection,
     FrameSubscription,
@@ -16,12 +18,10 @@ from realizer.server.streams.connection import (
     PlanSubscription,
     SoundSubscription,
 )
-from realizer.server.streams.packets import packets_due, send_packets
-from realizer.server.streams.pictures import Pictures
-from realizer.server.streams.plans import Plans, message
-from realizer.server.streams.run import Run
-from realizer.server.streams.sound import PACKET, Sound
-from realizer.server.streams.streams import EPSILON, Strip, Timeline, first_at, last_at
+from realizer.server.streams.frame_fast_path import Run
+from realizer.server.streams.frame_windows import EPSILON, Strip, Timeline, first_at, last_at
+from realizer.server.streams.schedule_stream import Plans, message
+from realizer.server.streams.video_stream import Pictures
 
 __all__: list[str] = []
 

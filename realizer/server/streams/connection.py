@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from bml_schema import parse_feedback
 from realizer.server.session.effects import Look
-from realizer.server.streams.sound import Sound
-from realizer.server.streams.streams import Timeline
+from realizer.server.streams.audio_stream import Sound
+from realizer.server.streams.frame_windows import Timeline
 
 __all__: list[str] = []
 

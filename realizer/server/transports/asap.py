@@ -17,11 +17,11 @@ from typing import cast
 
 from bml_schema import WarningFeedback
 from realizer.core.settings import Settings, raises
-from realizer.server.http.guard import Pace
-from realizer.server.runtime.hub import HubError
-from realizer.server.runtime.shell import Shell
-from realizer.server.transports.assembler import Assembler, Fault
-from realizer.server.transports.listener import Listener, session_of
+from realizer.server.http.access import Pace
+from realizer.server.runtime.session_host import Shell
+from realizer.server.runtime.session_registry import HubError
+from realizer.server.transports.document_framing import Assembler, Fault
+from realizer.server.transports.tcp_listener import Listener, session_of
 
 __all__ = ["AsapDoor"]
 

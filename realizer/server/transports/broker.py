@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from realizer.core.errors import RealizerError
-from realizer.server.transports.dialect import Message
+from realizer.server.transports.message_format import Message
 
 __all__ = ["Link", "check_installed"]
 

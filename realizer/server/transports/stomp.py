@@ -13,12 +13,12 @@ from typing import Any
 from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, raises
-from realizer.server.http.guard import Pace
-from realizer.server.runtime.hub import HubError
-from realizer.server.runtime.shell import Shell
+from realizer.server.http.access import Pace
+from realizer.server.runtime.session_host import Shell
+from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.broker import Link, check_installed
-from realizer.server.transports.dialect import Dialect, Leave, Message, ToSession
-from realizer.server.transports.dialects import DIALECTS
+from realizer.server.transports.message_format import Dialect, Leave, Message, ToSession
+from realizer.server.transports.message_formats import DIALECTS
 
 __all__ = ["StompDoor"]
 

@@ -11,8 +11,8 @@ from xml.sax.saxutils import quoteattr, unescape
 
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.settings import raises
-from realizer.server.transports.assembler import Assembler
-from realizer.server.transports.dialect import Action, Leave, Message, ToSession
+from realizer.server.transports.document_framing import Assembler
+from realizer.server.transports.message_format import Action, Leave, Message, ToSession
 
 __all__ = ["Vhmsg"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from realizer.speech.align.aligner import Aligner, align
     from realizer.speech.align.alignment import AlignError, Alignment
-    from realizer.speech.align.given import recorded
+    from realizer.speech.align.recording_marks import recorded
 
 __all__ = ["AlignError", "Aligner", "Alignment", "align", "recorded"]
 

@@ -10,13 +10,13 @@ from xml.sax.saxutils import escape
 
 import numpy.typing as npt
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.speech.align import sphinx
 from realizer.speech.align.alignment import AlignError, Alignment, likely, moved
-from realizer.speech.align.by_model import by_model
-from realizer.speech.align.by_sound import by_sound
-from realizer.speech.align.even import even
+from realizer.speech.align.dtw_align import by_sound
+from realizer.speech.align.model_align import by_model
 from realizer.speech.align.recording import mono, to_aligner
+from realizer.speech.align.uniform_align import even
 from realizer.speech.utterance import Say, Utterance, Voice
 
 __all__ = ["Aligner", "align", "aligned"]
@@ -112,7 +112,7 @@ def aligned(
 
 def _unable(aligner: str | None, voice: Voice | None) -> str | None:
     """Why the aligner that was asked for cannot be used."""
-    from realizer.speech.espeak import espeak
+    from realizer.speech.espeak import voice as espeak
 
     if aligner not in (None, "pocketsphinx", "espeak"):
         return f"aligner: wanted pocketsphinx or espeak, got {aligner!r}"
@@ -124,7 +124,7 @@ def _unable(aligner: str | None, voice: Voice | None) -> str | None:
 @cache
 def _reference_voice() -> Voice:
     """What says the same: espeak-ng, or else rules without a sound. One for the whole process."""
-    from realizer.speech.espeak.espeak import EspeakVoice, missing
+    from realizer.speech.espeak.voice import EspeakVoice, missing
     from realizer.speech.silent import SilentVoice
 
     return SilentVoice() if missing() else EspeakVoice()

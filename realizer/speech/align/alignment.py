@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Phoneme, Utterance, Word
 

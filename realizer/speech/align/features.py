@@ -7,7 +7,7 @@ from math import gcd
 
 import numpy as np
 
-from realizer.core.arrays import Bool, Float32, Float64
+from realizer.core.array_types import Bool, Float32, Float64
 
 __all__ = ["RATE", "cepstra", "energies", "loudness", "normalised", "resampled", "sounding"]
 

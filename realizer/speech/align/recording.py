@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.speech.align.alignment import AlignError
 from realizer.speech.align.features import resampled
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 
 __all__ = ["Said", "by_model", "missing"]
 

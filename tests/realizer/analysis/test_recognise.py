@@ -10,7 +10,7 @@ from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
 from realizer.emotions.words import emotion, known_words
 from realizer.tables.emotion_model import emotion_model
-from realizer.tables.feelings import ring
+from realizer.tables.wheel_words import ring
 
 DRAWS = 60
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from realizer.animation.axis import AU_NAMES, Target, au, axis, fap, presence
 from realizer.animation.blend import OVER, blend
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.idle.blinks import Blinks, Fewer
-from realizer.animation.idle.idle import Idle, Motion, idle_face
-from realizer.animation.targets import AU_NAMES, Target, au, axis, fap, presence
-from realizer.core.arrays import Float64
+from realizer.animation.idle.motion import Idle, Motion, idle_face
+from realizer.core.array_types import Float64
 
 ONE = np.array([0.0])
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Gain, Joint, Layer, later
-from realizer.animation.targets import au
 
 KEYS = np.array([0.0, 0.5, 1.0])
 

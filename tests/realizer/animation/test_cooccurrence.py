@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from realizer.animation.axis import AU_NAMES
 from realizer.animation.cooccurrence import bounds, cooccur
-from realizer.animation.targets import AU_NAMES
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.tables.cooccurrence import Rule, rules
 
 NAMES = AU_NAMES()

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Joint
 from realizer.animation.curves import CURVES, MANY_KEYS, sample, smooth, weights
-from realizer.animation.targets import au
 
 TARGET = au(12, "LEFT")[0]
 

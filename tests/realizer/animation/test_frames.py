@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.axis import AU_NAMES, au, axis, fap
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, au, axis, fap
-from realizer.core.arrays import Float32
+from realizer.core.array_types import Float32
 from realizer.tables.cooccurrence import rules
 
 SMILE, BROW = au(12, "LEFT")[0].column, au(1, "LEFT")[0].column

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import tables
-from realizer.animation.fap.fap import to_fap
+from realizer.animation.axis import AU_NAMES, axis
+from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
-from realizer.animation.targets import AU_NAMES, axis
 
 FAPS = tuple(row.name for row in tables.faps())
 

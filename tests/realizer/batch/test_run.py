@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from realizer.batch.documents import find
-from realizer.batch.processes import Processes
+from realizer.batch.process_pool import Processes
 from realizer.batch.run import batch
 from realizer.batch.task import Options, Task
-from realizer.batch.work import Outcome, Worker
+from realizer.batch.worker import Outcome, Worker
 
 
 class Here:

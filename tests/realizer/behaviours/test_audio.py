@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.speech import Say
-from realizer.speech.espeak.espeak import EspeakVoice, missing
+from realizer.speech.espeak.voice import EspeakVoice, missing
 from tests.realizer.behaviours.conftest import wav
 
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from bml_schema import VOCABULARY as CORE
 from bml_schema import Behaviour, parse
+from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample
-from realizer.animation.targets import AU_NAMES, axis
 from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Fault, World
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Phoneme, Say, Utterance
 from realizer.tables.lexemes import face_lexemes, head_lexemes

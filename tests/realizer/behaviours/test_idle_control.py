@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bml_schema import parse
-from realizer.animation.targets import AU_NAMES
+from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from realizer.playback.player import Player
 from tests.realizer.behaviours.conftest import NAMESPACES

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from realizer.charts.reading import lines_of
+from realizer.charts.chart_data import lines_of
 from realizer.charts.timeline import BlockLine
 from realizer.pipeline import play
 from realizer.playback.player import Player

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.charts.colours import HELD, LINK, ROOM, TIGHT
+from realizer.charts.diverging_scale import HELD, LINK, ROOM, TIGHT
 from realizer.charts.picture import timeline
 from realizer.charts.scale import scale_of
 from realizer.charts.shapes import Box, Path, Text

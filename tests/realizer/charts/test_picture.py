@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import realizer.examples
-from realizer.charts.colours import RIGID, colour_of
+from realizer.charts.diverging_scale import RIGID, colour_of
 from realizer.charts.picture import timeline
 from realizer.charts.scale import scale_of
 from realizer.charts.shapes import Box, Picture, Text, width_of

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from realizer.cli import cli
 from realizer.speech import Say
-from realizer.speech.espeak.espeak import EspeakVoice, missing
+from realizer.speech.espeak.voice import EspeakVoice, missing
 from tests.realizer.behaviours.conftest import wav
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=str(missing()))

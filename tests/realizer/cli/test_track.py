@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from realizer.analysis.mesh import points_of
+from realizer.analysis.faps_from_mesh import points_of
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 from realizer.emotions.archetypes import archetypes

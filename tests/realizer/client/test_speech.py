@@ -12,7 +12,7 @@ from realizer.client import ClientError, connect
 from realizer.client.speech import Heard, Speech
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from tests.realizer.client.test_live import LIMIT, serving
+from tests.realizer.client.test_async_client import LIMIT, serving
 
 
 def test_syncs_of_the_text_are_awaited_and_the_end_too() -> None:

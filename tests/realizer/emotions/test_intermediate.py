@@ -7,7 +7,7 @@ import pytest
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.intermediate import Anchor, between, same_category
 from realizer.emotions.profile import Profile
-from realizer.tables.feelings import whissell_words
+from realizer.tables.wheel_words import whissell_words
 
 FEAR, SAD = archetypes("raw")["fear"][8], archetypes("raw")["sadness"][0]
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.wheel import affect, shares, wheel
-from realizer.tables.feelings import ring as places
+from realizer.tables.wheel_words import ring as places
 
 SETS = st.sampled_from(["own", "published", "raw"])
 RINGS = st.sampled_from(["paul", "plutchik", "affect"])

@@ -8,10 +8,10 @@ from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer.facebuild.parts import SHADES, teeth
-from realizer.facebuild.person.paint import LIT, paint_mouth
+from realizer.facebuild.person.skin_colours import LIT, paint_mouth
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.onboard import OnboardCanvas
+from realizer.render.software import OnboardCanvas
 
 COLOURS = {"tooth": [240.0, 232, 214], "root": [228.0, 206, 180], "gum": [196.0, 112, 106]}
 WIDE = {3: 1100, 4: -80, 5: -1535, 10: -1245, 11: -1245, 52: -1525, 57: -1315, 58: -1315, 12: -480, 13: -480}

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from bml_schema import BlockProgress
+from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.animation.targets import AU_NAMES, axis
 from realizer.playback.player import Speaking
 from realizer.realization import Performance, Realization
 from realizer.scheduling.timing import Schedule, Warning

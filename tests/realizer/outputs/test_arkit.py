@@ -8,8 +8,8 @@ import io
 import numpy as np
 import pytest
 
+from realizer.animation.axis import AU_NAMES, axis, fap
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import AU_NAMES, axis, fap
 from realizer.outputs import OUTPUTS, Drawing, output_for
 from realizer.outputs.arkit import ARKIT_NAMES, arkit, arkit_faps
 from realizer.pipeline import realize

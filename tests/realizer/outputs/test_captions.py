@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from realizer.outputs.captions import MOST, captions
-from realizer.outputs.said import Span
+from realizer.outputs.speech_spans import Span
 from realizer.speech.utterance import Word
 
 

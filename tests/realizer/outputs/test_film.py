@@ -11,7 +11,7 @@ import pytest
 
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.film import FORMATS, RATE, encode_film
-from realizer.outputs.said import Span
+from realizer.outputs.speech_spans import Span
 
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")
 

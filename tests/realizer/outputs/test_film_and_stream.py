@@ -10,7 +10,7 @@ from PIL import Image
 
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.pipeline import realize
-from realizer.server.runtime.studio import Studio
+from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Draw, Speak
 from tests.realizer.server.conftest import Driver
 

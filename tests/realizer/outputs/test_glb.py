@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from realizer.animation.targets import fap
+from realizer.animation.axis import fap
 from realizer.face.deform import deform
 from realizer.face.glb import to_glb
 from realizer.face.load import load_face
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.glb import encode_glb
-from realizer.outputs.morphs import TRUE, morphs
+from realizer.outputs.morph_targets import TRUE, morphs
 from realizer.pipeline import realize
 
 FPS = 12.5

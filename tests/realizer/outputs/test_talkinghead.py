@@ -13,7 +13,7 @@ import pytest
 
 from realizer.outputs import OUTPUTS, Drawing, output_for
 from realizer.pipeline import realize
-from realizer.tables.names import shapes
+from realizer.tables.arkit_names import shapes
 
 READERS = Path(__file__).parent / "readers"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

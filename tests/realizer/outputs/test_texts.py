@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.animation.targets import AU_NAMES
 from realizer.outputs import OUTPUTS, Drawing, output_for
 from realizer.speech.utterance import Phoneme
 from realizer.tables import faps

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from realizer.animation.axis import axis
 from realizer.animation.frames import AUFrames
-from realizer.animation.targets import axis
 from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.arkit import arkit
 from realizer.outputs.vrma import encode_vrma, expressions

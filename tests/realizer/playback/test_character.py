@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import tables
+from realizer.animation.axis import au, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.fap.fap import to_fap
-from realizer.animation.targets import au, axis
+from realizer.animation.fap.conversion import to_fap
 from realizer.playback.character import Character, Shift
 
 SMILE = au(12, "LEFT")[0]

@@ -15,7 +15,7 @@ from bml_schema.feedback import (
     SyncPointProgress,
     WarningFeedback,
 )
-from realizer.animation.targets import AU_NAMES
+from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from realizer.playback.player import Player
 from realizer.speech import SilentVoice

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.timing import Timing
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from scipy.optimize import linprog
 
 from bml_schema import parse
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling import Schedule, Timing, schedule_block
-from realizer.scheduling.clash import Clash, Gap
+from realizer.scheduling.conflict import Clash, Gap
 from realizer.scheduling.explain import in_words
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve

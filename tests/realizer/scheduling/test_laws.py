@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.linalg import null_space
 from scipy.optimize import linprog, minimize
 
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.scheduling.problem import Part, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
 from tests.realizer.scheduling.recipes import (

@@ -29,7 +29,7 @@ from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
 from realizer.protocol.wire import FrameKind, unpack
 from realizer.server.serve import Server
-from realizer.speech.espeak.espeak import EspeakVoice
+from realizer.speech.espeak.voice import EspeakVoice
 from tests.benchmarks.packets import masked
 from tests.crowds import at_once, come_and_go, files_open, half_closed, joined, well_told
 from tests.realizer.server.conftest import Clock
@@ -344,7 +344,7 @@ def test_one_who_closes_its_side_only_is_let_go() -> None:
 def test_those_who_connect_and_say_nothing_or_half_a_word_keep_nobody_waiting(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("realizer.server.transports.websocket.websocket.OPENING", 3600.0)
+    monkeypatch.setattr("realizer.server.transports.websocket.server.OPENING", 3600.0)
 
     async def test(server: Server) -> None:
         silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(100)]

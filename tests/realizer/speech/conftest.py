@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from realizer.speech.espeak import espeak
-from realizer.speech.espeak.espeak import EspeakVoice
-from realizer.speech.hibari import hibari
-from realizer.speech.hibari.hibari import HibariVoice
+from realizer.speech.espeak import voice as espeak
+from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.hibari import voice as hibari
+from realizer.speech.hibari.voice import HibariVoice
 
 
 @pytest.fixture(autouse=True)

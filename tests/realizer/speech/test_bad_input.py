@@ -16,10 +16,10 @@ from realizer.behaviours.kind import World
 from realizer.behaviours.speech import say
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
-from realizer.server.runtime.studio import Studio
+from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Speak
 from realizer.speech import EspeakVoice, Say, Utterance, Voice, engine_process
-from realizer.speech.hibari.hibari import HibariVoice
+from realizer.speech.hibari.voice import HibariVoice
 
 SSML = "application/ssml+xml"
 

@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import speech
-from realizer.animation.lips.lips import lip_channels
+from realizer.animation.lips.lip_sync import lip_channels
 from realizer.core.errors import VoiceError
-from realizer.speech.catalogue import find_voice, voices
+from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, units
+from realizer.speech.registry import find_voice, voices
 from realizer.speech.silent import SilentVoice
-from realizer.speech.spelling import letters_to_phonemes, syllable_facts, units
 from realizer.speech.utterance import Say
 
 COUNTED = {
@@ -117,10 +117,10 @@ def test_every_voice_says_what_it_is_or_what_to_install() -> None:
 
 
 def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.speech.espeak.espeak.missing", lambda: "pip install 'bml-realizer[speech]'")
-    monkeypatch.setattr("realizer.speech.hibari.hibari.missing", lambda: None)
+    monkeypatch.setattr("realizer.speech.espeak.voice.missing", lambda: "pip install 'bml-realizer[speech]'")
+    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: None)
     assert find_voice(None).name == "hibari"
-    monkeypatch.setattr("realizer.speech.hibari.hibari.missing", lambda: "pip install 'bml-realizer[neural]'")
+    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: "pip install 'bml-realizer[neural]'")
     assert find_voice(None).name == "silent"
     assert not voices()[0].available
     assert "pip install" in voices()[0].says

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.core.errors import VoiceError
-from realizer.speech.espeak.espeak_document import write_document
+from realizer.speech.espeak.document import write_document
 from realizer.speech.ssml import MOST_TEXT, Break, Mark, Tag, read_script
 from realizer.speech.utterance import Say
 

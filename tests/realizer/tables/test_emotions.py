@@ -7,9 +7,9 @@ import pytest
 
 from realizer.emotions.wheel import wheel
 from realizer.tables.emotions import archetypes, emotion_faces
-from realizer.tables.feelings import ring
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.profiles import own_ranges
+from realizer.tables.wheel_words import ring
 
 
 def test_the_archetypes_stand_on_the_wheel_in_plutchiks_order() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.idle.blinks import Blinks, blinks_between
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 
 
 def blinks(seed: int, until: float) -> Float64:

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from realizer.animation.axis import AU_NAMES, au, fap
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.fap.fap import to_fap
-from realizer.animation.idle.idle import idle_face
+from realizer.animation.fap.conversion import to_fap
+from realizer.animation.idle.motion import idle_face
 from realizer.animation.idle.prosody import Asked, Talk, phrase_ends, prosody_channels
-from realizer.animation.targets import AU_NAMES, au, fap
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.speech import SilentVoice
 from realizer.speech.accents import phrases, prosody_facts
 from realizer.speech.utterance import Say, Utterance

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
 from realizer.animation.lips.dominance import key_times, track_of
 from realizer.animation.lips.visemes import coarticulation, sounds
-from realizer.core.arrays import Bool, Float64
+from realizer.core.array_types import Bool, Float64
 from realizer.speech.utterance import Phoneme
 
 FRAME = 0.04  # s

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from realizer.animation.lips.viseme_weights import fap_1, oculus_visemes, oculus_weights, viseme_weights
 from realizer.animation.lips.visemes import phoneme_features
-from realizer.core.arrays import Float64
+from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
 
 IPA = sorted(phoneme_features())

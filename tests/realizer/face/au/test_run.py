@@ -20,7 +20,7 @@ from realizer.face.model import Face
 from realizer.playback.player import Player
 from realizer.render import Renderer
 from realizer.server.session.session import Session
-from realizer.server.streams.streams import Timeline
+from realizer.server.streams.frame_windows import Timeline
 
 BOTH = ("mpeg4", "au")
 SPEECH = '<speech id="s" start="0.2"><text>Maybe you would both prefer a warm moment of fun.</text></speech>'

@@ -16,7 +16,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.tables import au_to_fap
-from realizer.tables.names import shapes
+from realizer.tables.arkit_names import shapes
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125
 LIPS = {*range(4, 14), 16, 17, *range(51, 61)}

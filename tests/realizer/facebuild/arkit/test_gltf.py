@@ -17,10 +17,10 @@ from PIL import Image
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
 from realizer.face.load import load_face
-from realizer.facebuild.arkit.folder import look_at
 from realizer.facebuild.arkit.gltf import Gltf
+from realizer.facebuild.arkit.importer import look_at
 from realizer.facebuild.arkit.scene import read_pieces
-from realizer.tables.names import canonical, nearest, shapes
+from realizer.tables.arkit_names import canonical, nearest, shapes
 
 WAYS = {
     "as glTF asks": np.eye(3),

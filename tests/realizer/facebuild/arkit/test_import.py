@@ -10,7 +10,7 @@ import pytest
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.facebuild.arkit.folder import Report, import_head
+from realizer.facebuild.arkit.importer import Report, import_head
 from realizer.facebuild.au.measure import read_shapes
 from realizer.facebuild.check import check_face
 from realizer.tables import Fap, faps

@@ -14,8 +14,8 @@ from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
 from realizer.facebuild.mpeg4.build import apply_zones, setup_of
+from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
 from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
-from realizer.facebuild.mpeg4.truth import face_truth, mean_score
 
 
 def copy(to: Path, fields: bool = False) -> Path:

@@ -12,7 +12,7 @@ from realizer.core.errors import FaceError
 from realizer.face.load import folder_of, load_face
 from realizer.facebuild.mpeg4.build import setup_of
 from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
-from realizer.facebuild.mpeg4.truth import face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 
 FILE = """<?xml version="1.0"?>

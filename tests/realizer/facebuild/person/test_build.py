@@ -6,7 +6,7 @@ import pytest
 
 from realizer.core.errors import FaceError
 from realizer.facebuild.person.build import build_face
-from realizer.facebuild.person.hm08 import OBJ, Edges, walk
+from realizer.facebuild.person.makehuman import OBJ, Edges, walk
 
 
 def ring_of_quads(n: int) -> Edges:

@@ -8,9 +8,9 @@ import scipy.sparse as sp
 
 from realizer.core.errors import FaceError
 from realizer.face.load import load_face
-from realizer.facebuild.patch import Patch, vertex_normals
 from realizer.facebuild.person.hair import Style, hair, scalp_of, shadow, style_of
 from realizer.facebuild.person.scalp import Scalp
+from realizer.facebuild.submesh import Patch, vertex_normals
 from realizer.tables import read_toml, text_of
 
 STYLES = list(read_toml(text_of("hair.toml"), "hair.toml")["styles"])

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from bml_schema.shape import local
+from bml_schema.node_schema import local
 from realizer.behaviours import VOCABULARY
 from realizer.server.http.vocabulary import vocabulary
 

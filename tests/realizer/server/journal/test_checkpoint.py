@@ -11,8 +11,8 @@ import pytest
 
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
-from realizer.server.journal import notes as thresholds
-from realizer.server.journal.notes import Notes
+from realizer.server.journal import journal_writer as thresholds
+from realizer.server.journal.journal_writer import Notes
 from realizer.server.journal.replay import restored
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session

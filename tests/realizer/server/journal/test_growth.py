@@ -13,7 +13,7 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import Journal, JournalError, Kept, journal_at
 from realizer.server.journal.checkpoint import MOST_TOLD, restore
-from realizer.server.journal.notes import ENTRIES, LONG, Notes
+from realizer.server.journal.journal_writer import ENTRIES, LONG, Notes
 from realizer.server.journal.replay import restored
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session

@@ -10,7 +10,7 @@ import pytest
 
 from realizer.server.journal import Entry, JournalError, Kept, Lost, journal_at
 from realizer.server.journal.entry import KEPT
-from realizer.server.journal.local import LocalJournal
+from realizer.server.journal.sqlite_journal import LocalJournal
 
 ENTRIES = [
     Entry(0.0, "join", 1),
@@ -35,7 +35,7 @@ class Clock:
 @pytest.fixture(autouse=True)
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr("realizer.server.journal.local.time", lambda: clock.now)
+    monkeypatch.setattr("realizer.server.journal.sqlite_journal.time", lambda: clock.now)
     return clock
 
 

@@ -13,13 +13,13 @@ from realizer.cli import cli
 from realizer.core.settings import Settings
 from realizer.server.journal import JournalError, playback
 from realizer.server.journal.entry import Entry
-from realizer.server.journal.folder import FolderJournal, head, read_record
-from realizer.server.journal.notes import Notes
+from realizer.server.journal.journal_writer import Notes
 from realizer.server.journal.playback import played
+from realizer.server.journal.recordings import FolderJournal, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech import SilentVoice
-from realizer.speech.fitting import fitted
+from realizer.speech.duration_fit import fitted
 
 SETTINGS = Settings(voice="silent", seed=3)
 SPEECH = """<bml id="a"><speech id="s"><text>Hello, how are <sync id="m"/>you?</text></speech>

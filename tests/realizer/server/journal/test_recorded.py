@@ -22,9 +22,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 from realizer.core.settings import Settings
-from realizer.server.journal.folder import read_record
-from realizer.server.journal.notes import ENTRIES
+from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.journal.playback import told
+from realizer.server.journal.recordings import read_record
 from realizer.server.serve import Server
 from tests.told import feedback, numbers
 

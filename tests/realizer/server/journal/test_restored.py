@@ -20,12 +20,12 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.documents.intake import Intake
-from realizer.server.journal.notes import ENTRIES
-from realizer.server.runtime import shell
+from realizer.server.documents.submission import Intake
+from realizer.server.journal.journal_writer import ENTRIES
+from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
-from realizer.server.transports.websocket import websocket_client
+from realizer.server.transports.websocket import writer
 from tests.realizer.server.conftest import Clock
 from tests.told import feedback, numbers
 
@@ -156,7 +156,7 @@ def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outli
 def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("realizer.server.runtime.shell.SWEEP", 0.05)
+    monkeypatch.setattr("realizer.server.runtime.session_host.SWEEP", 0.05)
     where = str(tmp_path / "journal.db")
 
     async def run() -> None:
@@ -276,8 +276,8 @@ async def held(client: ClientConnection) -> float:
 def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_it_was(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shell, "SWEEP", 0.05)
-    monkeypatch.setattr(websocket_client, "GOODBYE", LIMIT)
+    monkeypatch.setattr(session_host, "SWEEP", 0.05)
+    monkeypatch.setattr(writer, "GOODBYE", LIMIT)
 
     async def run() -> None:
         async with (
@@ -301,7 +301,7 @@ def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_i
 def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_and_may_come_back(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shell, "SWEEP", 0.05)
+    monkeypatch.setattr(session_host, "SWEEP", 0.05)
 
     async def run() -> None:
         async with (
@@ -408,7 +408,7 @@ def test_documents_are_played_and_kept_though_there_is_no_room_for_their_record(
         if NEXT in json.loads(line).get("body", ""):
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("realizer.server.journal.folder._write", full)
+    monkeypatch.setattr("realizer.server.journal.recordings._write", full)
 
     async def run() -> None:
         settings = Settings(

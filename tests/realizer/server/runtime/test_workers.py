@@ -20,7 +20,7 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 
 from realizer.core.settings import Settings
-from realizer.server.runtime import gathered
+from realizer.server.runtime import worker_aggregation
 from realizer.server.runtime.workers import Workers, worker_of
 
 T = TypeVar("T")
@@ -194,7 +194,7 @@ def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Wor
 def test_one_worker_that_hangs_is_left_out_of_the_sum(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(gathered, "PATIENCE", 2.0)
+    monkeypatch.setattr(worker_aggregation, "PATIENCE", 2.0)
     os.kill(workers.processes[1], signal.SIGSTOP)
     try:
         whole = metrics(workers)

@@ -13,8 +13,8 @@ from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.core.errors import RenderError, VoiceError
 from realizer.protocol.wire import FrameKind
 from realizer.server.journal.entry import Entry, JournalError, Lost
-from realizer.server.journal.local import LocalJournal
-from realizer.server.journal.notes import Notes
+from realizer.server.journal.journal_writer import Notes
+from realizer.server.journal.sqlite_journal import LocalJournal
 from realizer.server.session import feedback_log
 from realizer.server.session.effects import Close
 from realizer.speech.utterance import Phoneme, Utterance, Word

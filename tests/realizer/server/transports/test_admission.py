@@ -22,8 +22,8 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatu
 
 from realizer.core.settings import Settings, SettingsError
 from realizer.server.documents import limits
-from realizer.server.http import guard
-from realizer.server.http.passes import Pass
+from realizer.server.http import access
+from realizer.server.http.jwt_tokens import Pass
 from realizer.server.serve import Server
 
 LIMIT = 60  # s; a hung test ends
@@ -97,7 +97,7 @@ def test_a_wrong_token_is_refused_before_a_session_is_made() -> None:
 
 
 def test_a_client_that_says_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guard, "PATIENCE", 0.05)
+    monkeypatch.setattr(access, "PATIENCE", 0.05)
 
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:

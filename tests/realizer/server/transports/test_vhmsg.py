@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema import parse
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
-from realizer.server.transports.dialect import Leave, ToSession
+from realizer.server.transports.message_format import Leave, ToSession
 from realizer.server.transports.vhmsg import Vhmsg
 
 TRICKY = '<bml id="b"><speech id="s"><text>50 % + é &amp; more</text></speech></bml>'

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.speech import Say
-from realizer.speech.espeak.espeak import EspeakVoice
+from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import Utterance
 
 TEXT = "The tall woman carried a basket of apples down the hill."

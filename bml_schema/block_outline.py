@@ -1,0 +1,139 @@
+"""A parsed <bml> element in, what stands in it and what references may name out, before any of it is read."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from lxml import etree
+
+from bml_schema.behaviours import SpeechText, Sync
+from bml_schema.element_reader import Elements
+from bml_schema.node_schema import local, shape_of
+from bml_schema.nodes import Behaviour, Constraint, Description, Required
+from bml_schema.sync_refs import Names, Points
+
+__all__: list[str] = []
+
+# A NamedTuple of thousands is made in a third of the time without its own `__new__`, which is Python.
+made = tuple.__new__
+
+
+class Kind(NamedTuple):
+    """What children of the block of one tag have in common.
+
+    Attributes:
+        step: name in paths.
+        cls: None for a constraint and for what is unknown.
+        points: what references may name; None where nobody knows.
+        varies: that depends on the element: a number of strokes, or marks in what is said.
+    """
+
+    tag: str
+    step: str
+    cls: type[Behaviour] | None = None
+    points: Points | None = None
+    varies: bool = False
+
+
+def _kind_of(cls: type[Behaviour]) -> Kind:
+    kind = _KINDS.get(cls)
+    if kind is None:
+        shape = shape_of(cls)
+        varies = cls.marks or shape.strokes
+        kind = _KINDS[cls] = Kind(cls.tag, shape.name, cls, Points(shape.points), varies)
+    return kind
+
+
+_KINDS: dict[type[Behaviour], Kind] = {}
+
+
+class Entry(NamedTuple):
+    """A child of the block: a behaviour, a constraint, or unknown."""
+
+    element: etree._Element
+    kind: Kind
+    id: str
+    path: str
+    required: bool
+
+
+class Outline:
+    """What stands in one block.
+
+    Attributes:
+        names: what references may name; filled by `entries`.
+        owners: id -> the behaviour that has it, the first of several.
+        loose: text that stands between elements, with the element around it and its path: nobody's.
+    """
+
+    __slots__ = ("elements", "kinds", "loose", "names", "owners")
+
+    def __init__(self, elements: Elements, names: Names) -> None:
+        self.elements = elements
+        self.names = names
+        self.owners: dict[str, Entry] = {}
+        self.kinds: dict[str, Kind] = {}  # by tag as it stands
+        self.loose: list[tuple[str, etree._Element, str]] = []
+
+    # bml := (behaviour | constraint | required)*
+
+    def entries(self, parent: etree._Element, path: str, *, required: bool) -> list[Entry | list[Entry]]:
+        """What stands in a block, as a tree: a list for each <required>; one inside another adds nothing."""
+        tree: list[Entry | list[Entry]] = []
+        counts: dict[str, int] = {}
+        loose = parent.text
+        kinds = self.kinds
+        owners, points = self.owners, self.names.points
+        for element in parent:
+            raw: Any = element.tag
+            kind = kinds.get(raw)
+            if kind is None:
+                kind = kinds[raw] = self.kind(element)
+            step = kind.step
+            counts[step] = n = counts.get(step, 0) + 1
+            here = f"{path}/{step}[{n}]"
+            if not loose or loose.isspace():
+                loose = element.tail
+            if kind.tag == Required.tag:
+                inside = self.entries(element, here, required=True)
+                tree.append(flat(inside))
+                continue
+            id = element.get("id", "").strip()
+            entry = made(Entry, (element, kind, id, here, required))
+            tree.append(entry)
+            # What references may say of it, before any is read.
+            if id and id not in owners and kind.tag != Constraint.tag:
+                owners[id] = entry
+                points[id] = self.points(element, kind) if kind.varies else kind.points
+        if loose and not loose.isspace():
+            self.loose.append((loose.strip(), parent, path))
+        return tree
+
+    def kind(self, element: etree._Element) -> Kind:
+        """What the tag of an element says."""
+        tag = self.elements.tag(element)
+        cls = self.elements.vocabulary.get(tag)
+        return Kind(tag, local(tag)) if cls is None else _kind_of(cls)
+
+    def points(self, element: etree._Element, kind: Kind) -> Points | None:
+        """What references may name of an element of a kind that varies."""
+        if kind.points is None or kind.cls is None:
+            return None
+        names = frozenset(kind.points.names)
+        if not kind.cls.marks:
+            times = element.get("repetition", "").strip()
+            return Points(names, int(times)) if times.isdecimal() and len(times) < 6 else kind.points
+        marks: list[str] = []
+        for child in element:
+            tag = self.elements.tag(child)
+            if tag == SpeechText.tag:
+                marks += [s.get("id", "").strip() for s in child if self.elements.tag(s) == Sync.tag]
+            elif tag == Description.tag:
+                # It may name points that the core text leaves out.
+                marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]
+        return Points(names.union(m for m in marks if ":" not in m)) if marks else kind.points
+
+
+def flat(tree: list[Entry | list[Entry]]) -> list[Entry]:
+    """The entries of a tree in document order."""
+    return [e for item in tree for e in (item if isinstance(item, list) else (item,))]

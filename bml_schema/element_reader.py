@@ -1,0 +1,299 @@
+"""One element inside a block in, its node out: attributes, children, descriptions, constraints.
+
+Recursive descent, one function per grammar rule. The first element with a fault raises it; who called
+decides what goes with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from typing import Any, cast
+
+from lxml import etree
+
+from bml_schema.behaviours import Speech, SpeechText, Sync
+from bml_schema.canonical import MOST_ATTRIBUTES, attributes, canonical
+from bml_schema.errors import Fault, did_you_mean, shown
+from bml_schema.escape import escape
+from bml_schema.node_schema import Attribute, Shape, local, shape_of
+from bml_schema.nodes import (
+    BMLA,
+    BMLT,
+    CORE,
+    EXTENSIONS,
+    OWN,
+    After,
+    Before,
+    Behaviour,
+    Block,
+    Constraint,
+    Description,
+    Required,
+    Synchronize,
+    core,
+    extension,
+)
+from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
+from bml_schema.unknown_attributes import stray
+from bml_schema.values import unwanted
+
+__all__: list[str] = []
+
+Vocabulary = Mapping[str, type[Behaviour]]
+
+# Documents from before the standard name no namespace, or the draft's.
+_DRAFTS = frozenset({"http://www.mindmakers.org/projects/BML"})
+_SSML = "application/ssml+xml"
+_OURS = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
+_KNOWN = (*_OURS, f"{{{BMLA}}}", f"{{{BMLT}}}", f"{{{OWN}}}")
+_PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (Synchronize, Before, After)}
+_SYNC, _DESCRIPTION = Sync.tag, Description.tag
+# Elements of the core that are no behaviours.
+_INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
+
+
+@lru_cache(maxsize=1000)
+def _standard(raw: str) -> tuple[str, str]:
+    """The tag in the core if it is a draft's or has no namespace, and the same in the extensions, else ""."""
+    space, name = raw[1:].split("}") if raw.startswith("{") else ("", raw)
+    if space in _DRAFTS or not space or space == CORE:
+        return core(name), extension(name)
+    return raw, ""
+
+
+class Elements:
+    """Reads elements of one document.
+
+    Attributes:
+        vocabulary: Clark tag -> node class.
+        names: what references may name; None looks nothing up.
+        strays: what is to be said of attributes that nobody knows, with the element; who tells it clears it.
+    """
+
+    __slots__ = ("names", "strays", "vocabulary")
+
+    def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
+        self.vocabulary = vocabulary
+        self.names = names
+        self.strays: list[tuple[str, etree._Element]] = []
+
+    def tag(self, element: etree._Element) -> str:
+        """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
+        raw: Any = element.tag
+        if raw in _INNER or raw in self.vocabulary:
+            return cast("str", raw)
+        known, extended = _standard(raw)
+        return extended if extended in self.vocabulary and known not in self.vocabulary else known
+
+    # element := attributes children
+
+    def node(self, cls: type[Any], element: etree._Element, *, timed: bool = False) -> Any:
+        """An element as its class says; timed: with an id and sync points of its own."""
+        shape = shape_of(cls)
+        values = self.attributes(shape, element, timed)
+        if shape.mixed:
+            values[shape.mixed] = tuple(self.mixed(shape, element))
+        elif shape.text:
+            values[shape.text] = self.text(element)
+        elif shape.children or len(element):
+            self.children(shape, element, values)
+        elif (loose := element.text) and not loose.isspace():
+            self.no_text(element)
+        node: Any = cls(**values)
+        if timed and shape.checked and (said := node.fault()):
+            raise Fault(said, element)
+        return node
+
+    def attributes(self, shape: Shape, element: etree._Element, timed: bool) -> dict[str, Any]:
+        """Values by field; one Fault names everything that is wrong with them."""
+        values: dict[str, Any] = {}
+        syncs: dict[str, SyncRef] = {}
+        foreign: dict[str, str] = {}
+        faults: list[str] = []
+        known = shape.attributes
+        points = shape.points if timed else ()
+        if len(element.attrib) > MOST_ATTRIBUTES:
+            attributes(element)  # which refuses them
+        items: Any = element.items()
+        for name, text in items:
+            spec = known.get(name)
+            try:
+                if spec is None:
+                    if name in points:
+                        syncs[name] = read_sync_ref(text, self.names)
+                    else:
+                        foreign[name] = text
+                elif spec.read is None:
+                    values[spec.field] = read_sync_ref(text, self.names)
+                else:
+                    values[spec.field] = spec.read(text)
+            except ValueError as wrong:
+                # Who reads a reference says the whole sentence.
+                said = wrong if spec is None or spec.read is None else _unwanted(spec, text)
+                faults.append(f"{local(name)}: {said}")
+        if shape.old:
+            faults += _drafts(shape, values, foreign)
+        if not values.keys() >= shape.needed:
+            if shape.timed and not timed and "id" not in element.attrib:
+                values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
+            missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
+            faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
+        said = self.stray(shape, element, foreign, timed) if foreign else ""
+        if faults:
+            faults += (said,) if said else ()
+            raise Fault("; ".join(faults), element)
+        if said:
+            self.strays.append((said, element))
+        if shape.timed:
+            values["syncs"] = syncs
+            values["foreign"] = foreign
+        return values
+
+    def stray(self, shape: Shape, element: etree._Element, foreign: Iterable[str], timed: bool) -> str:
+        """What is to be said of the attributes that a shape does not know; "" for nothing."""
+        suggest = did_you_mean if self.names is None else self.names.suggest
+        return stray(shape, element, foreign, timed, suggest)
+
+    def children(self, shape: Shape, element: etree._Element, values: dict[str, Any]) -> None:
+        """Child elements into the fields of `values`."""
+        found: dict[str, list[Any]] = {}
+        descriptions: list[Description] = []
+        others: list[str] = []
+        loose = element.text
+        for child in element:
+            if not loose or loose.isspace():
+                loose = child.tail
+            tag = self.tag(child)
+            spec = shape.by_tag.get(tag)
+            if spec is None and tag == _DESCRIPTION and shape.timed:
+                descriptions.append(self.description(child))
+                continue
+            if spec is None and tag.startswith(_KNOWN):
+                # Documents leave an extension's children in the core namespace, in none, or in its sister's.
+                spec = shape.by_local.get(local(tag))
+            if spec is not None:
+                found.setdefault(spec[0].field, []).append(self.node(spec[1], child))
+            elif tag.startswith(_OURS):
+                raise Fault(f"wanted {shape.listed}, got <{local(tag)}>", child)
+            elif shape.timed:
+                others.append(canonical(child))
+        if loose and not loose.isspace():
+            self.no_text(element)
+        for kind in shape.children:
+            nodes = found.get(kind.field, [])
+            if len(nodes) < kind.least:
+                raise Fault(f"wanted {shape.listed}, got none", element)
+            if kind.many:
+                values[kind.field] = tuple(nodes)
+            elif len(nodes) > 1:
+                raise Fault(f"wanted one <{local(kind.classes[0].tag)}>, got {len(nodes)}", element)
+            elif nodes:
+                values[kind.field] = nodes[0]
+        if descriptions:
+            values["descriptions"] = tuple(descriptions)
+        if others:
+            values["others"] = tuple(others)
+
+    def no_text(self, element: etree._Element) -> None:
+        loose = loose_text(element)
+        if loose:
+            hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
+            raise Fault(f"wanted elements, got the text {shown(loose)}{hint}", element)
+
+    def mixed(self, shape: Shape, element: etree._Element) -> Iterator[Any]:
+        """text := (characters | sync)*, blanks kept."""
+        if element.text:
+            yield element.text
+        for child in element:
+            spec = shape.by_tag.get(self.tag(child))
+            if spec is None:
+                raise Fault(f"wanted text and {shape.listed}, got <{local(str(child.tag))}>", child)
+            yield self.node(spec[1], child)
+            if child.tail:
+                yield child.tail
+
+    def text(self, element: etree._Element) -> str:
+        if len(element):
+            raise Fault(f"wanted text, got <{local(str(element[0].tag))}>", element[0])
+        return element.text or ""
+
+    # description := any XML
+
+    def description(self, element: etree._Element) -> Description:
+        values = self.attributes(shape_of(Description), element, False)
+        if values["type"] == _SSML:
+            speak = [c for c in element if local(str(c.tag)) == "speak"]
+            if len(speak) != 1:
+                raise Fault(f"wanted one <speak> for {_SSML}, got {len(speak) or 'none'}", element)
+            return Description(**values, content=canonical(speak[0]))
+        inside = [escape(element.text or "")]
+        for child in element:
+            inside += (canonical(child), escape(child.tail or ""))
+        return Description(**values, content="".join(inside))
+
+    # constraint := (synchronize | before | after)+
+
+    def constraint(self, element: etree._Element) -> dict[str, Any]:
+        """The id and parts of a constraint, by field."""
+        values = self.attributes(shape_of(Constraint), element, False)
+        self.no_text(element)
+        values["parts"] = tuple(self.constraint_part(child) for child in element)
+        if not values["parts"]:
+            raise Fault("wanted <synchronize>, <before> or <after>, got none", element)
+        return values
+
+    def constraint_part(self, element: etree._Element) -> Synchronize | Before | After:
+        cls = _PARTS.get(self.tag(element))
+        if cls is None:
+            got = local(str(element.tag))
+            raise Fault(f"wanted <synchronize>, <before> or <after>, got <{got}>", element)
+        self.no_text(element)
+        refs = tuple(self.sync(child) for child in element)
+        if not refs:
+            raise Fault("wanted at least one <sync>, got none", element)
+        if cls is Synchronize:
+            # Drafts name one of the points in an attribute.
+            return Synchronize(refs=((self.ref(element),) if "ref" in element.attrib else ()) + refs)
+        return (After if cls is After else Before)(ref=self.ref(element), refs=refs)
+
+    def sync(self, element: etree._Element) -> SyncRef:
+        if self.tag(element) != _SYNC:
+            raise Fault(f"wanted <sync>, got <{local(str(element.tag))}>", element)
+        return self.ref(element)
+
+    def ref(self, element: etree._Element) -> SyncRef:
+        text = element.get("ref")
+        if text is None:
+            raise Fault("ref: wanted a sync reference, got none", element)
+        try:
+            return read_sync_ref(text, self.names)
+        except ValueError as wrong:
+            raise Fault(f"ref: {wrong}", element) from None
+
+
+def _drafts(shape: Shape, values: dict[str, Any], foreign: dict[str, str]) -> Iterator[str]:
+    """Read what a draft named otherwise, unless its present name is there too; yields what is wrong."""
+    for name, spec in shape.old.items():
+        if name in foreign and spec.field not in values and spec.read is not None:
+            text = foreign.pop(name)
+            try:
+                values[spec.field] = spec.read(text)
+            except ValueError:
+                yield f"{name}: {_unwanted(spec, text)}"
+
+
+def _unwanted(spec: Attribute, text: str) -> str:
+    return unwanted(spec.value.wanted, text, shown(text))
+
+
+def loose_text(element: etree._Element) -> str:
+    """Character data of an element that should hold elements only; "" where there is none."""
+    text = element.text
+    if text and not text.isspace():
+        return text.strip()
+    for child in element:
+        text = child.tail
+        if text and not text.isspace():
+            return text.strip()
+    return ""

@@ -1,0 +1,138 @@
+"""The behaviours that this project adds to BML, in its own namespace `urn:bml-realizer:1`."""
+
+from __future__ import annotations
+
+from bml_schema.behaviours import AMOUNT, PEAK, SIDES
+from bml_schema.node_schema import attribute, children, node
+from bml_schema.nodes import Behaviour, Part, own
+from bml_schema.values import integer, number, one_of, string, word
+
+__all__ = ["Blink", "Emotion", "Expression", "Fap", "FapFile", "Faps", "Idle", "Mood", "Timeline"]
+
+_ANGLE = number(-1e6, 1e6, wanted="degrees")  # on the wheel of emotions; turns do not count
+_AFFECT = number(-1, 1)
+_SEED = integer(0, 2**31 - 1)
+_ACTIVATION = number(0, 7)  # 7 is all of an emotion, as Paul scales Whissel
+_FAPU = number(-1e5, 1e5)
+
+
+@node
+class Feeling(Behaviour):
+    """What an emotion and a mood say alike.
+
+    Attributes:
+        name: its word, or an archetype with the number of one of its profiles ("fear 8").
+        angle, activation: instead of a word, its place on the wheel; activation 0..7, None the angle's own.
+        valence, arousal: instead of both, its place between pleasant and unpleasant, calm and excited.
+        intensity: how much of it shows; 1 all, as a word is already as strong as it says.
+        profile: which of several ways to show it; None the usual one.
+        seed: for a face that is drawn within what the profile allows; None its middle.
+    """
+
+    name: str | None = attribute(word, default=None)
+    angle: float | None = attribute(_ANGLE, default=None)
+    activation: float | None = attribute(_ACTIVATION, default=None)
+    valence: float | None = attribute(_AFFECT, default=None)
+    arousal: float | None = attribute(_AFFECT, default=None)
+    intensity: float = attribute(AMOUNT, default=1.0)
+    profile: str | None = attribute(word, default=None)
+    seed: int | None = attribute(_SEED, default=None)
+
+    def fault(self) -> str:
+        affect = {"valence": self.valence, "arousal": self.arousal}
+        ways = {"a name": self.name, "an angle": self.angle, **affect}
+        given = [way for way, value in ways.items() if value is not None]
+        if given not in (["a name"], ["an angle"], [*affect]):
+            got = " and ".join(given) or "none of them"
+            return f"wanted one of a name, an angle, or valence with arousal, got {got}"
+        if self.activation is not None and self.angle is None:
+            return "activation: wanted an angle with it, got none"
+        return ""
+
+
+@node
+class Emotion(Feeling):
+    """Show an emotion for a while."""
+
+    tag = own("emotion")
+    sync_points = PEAK
+
+
+@node
+class Mood(Feeling):
+    """An emotion that is the resting face from now on."""
+
+    tag = own("mood")
+
+
+@node
+class Expression(Behaviour):
+    """Show an expression of the expression library, such as "template:astonishment".
+
+    Attributes:
+        because: what placed it, in words; for whoever reads the document.
+    """
+
+    tag = own("expression")
+    sync_points = PEAK
+    name: str = attribute(word)
+    intensity: float = attribute(AMOUNT, default=0.5)
+    because: str | None = attribute(string, default=None)
+
+
+@node
+class Fap(Part):
+    """One facial animation parameter, in its own unit."""
+
+    tag = own("fap")
+    number: int = attribute(integer(3, 68))
+    value: float = attribute(_FAPU)
+
+
+@node
+class Faps(Behaviour):
+    """Raw facial animation parameters: reached at attackPeak, held to relax."""
+
+    tag = own("faps")
+    sync_points = PEAK
+    values: tuple[Fap, ...] = children(Fap, least=1)
+
+
+@node
+class FapFile(Behaviour):
+    """Play a .fap file of the media folder."""
+
+    tag = own("fapFile")
+    file_name: str = attribute(word)
+
+
+@node
+class Timeline(Behaviour):
+    """Play a file of the media folder that has expressions one after the other, in several channels."""
+
+    tag = own("timeline")
+    file_name: str = attribute(word)
+
+
+@node
+class Blink(Behaviour):
+    """One blink, or a wink of one side."""
+
+    tag = own("blink")
+    sync_points = PEAK
+    side: str = attribute(one_of(*SIDES), default="BOTH")
+    amount: float = attribute(AMOUNT, default=1.0)
+
+
+@node
+class Idle(Behaviour):
+    """What a face does when it does nothing, from now on.
+
+    Attributes:
+        blinks: the part of its usual blinks that it keeps, 0 none.
+        motion: the part of its usual small movements of head and eyes, 0 none.
+    """
+
+    tag = own("idle")
+    blinks: float = attribute(AMOUNT, default=1.0)
+    motion: float = attribute(AMOUNT, default=1.0)

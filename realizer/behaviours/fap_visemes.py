@@ -1,0 +1,127 @@
+"""A FAPClip with visemes and expressions (FAP 1 and 2) in, the same with the FAPs that show them out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from realizer import tables
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.lips.mouth_faps import mouth_faps
+from realizer.animation.lips.visemes import shape_table
+from realizer.core.array_types import Float64, Int32
+from realizer.emotions.archetypes import archetypes
+
+__all__ = ["FapExpression", "fap_expressions", "shown"]
+
+MOST = 63  # of viseme_blend, and of the intensities of expressions
+
+
+@dataclass(frozen=True, slots=True)
+class FapExpression:
+    """What an expression_select of FAP 2 means: the archetype of that emotion."""
+
+    number: int
+    emotion: str
+
+
+@cache
+def fap_expressions() -> tuple[FapExpression, ...]:
+    """All but 0, which is none."""
+    return tables.read_csv(tables.text_of("fap_expressions.csv"), FapExpression, "fap_expressions.csv")
+
+
+def shown(clip: FAPClip) -> FAPClip:
+    """The clip as faces of FAPs 3 to 68 play it; one without FAP 1 and 2 as it is.
+
+    - Visemes and expressions are mixed as ISO/IEC 14496-2 says: viseme_select1 x blend / 63 +
+      viseme_select2 x (1 - blend / 63), and each expression x its intensity / 63.
+    - Where both are there, a viseme takes from an expression what speech takes: it has the lips.
+    - A FAP that the clip itself gives stands, also at 0; with init_face it is relative to the expression.
+
+    What cannot be shown is left out, and is one more sentence of `notes`.
+    """
+    if not clip.mask[:2].any():
+        return clip
+    notes: list[str] = []
+    visemes, talking = _visemes(clip.visemes, notes)
+    expressions = _expressions(clip.expressions, notes)
+    own = np.array([row.speech_owns for row in tables.faps()])
+    expressions *= 1 - talking[:, None] * own
+    mixed = visemes + expressions
+    relative = (clip.expressions[:, 4:5] == 1) * expressions
+    values = np.where(clip.mask, clip.values + relative, mixed)
+    # Between two visemes the lips are held at 0, and are not somebody else's.
+    mask = clip.mask | (talking.any() & _mouths().any(axis=0)) | expressions.any(axis=0)
+    mask[:2] = False
+    values[:, :2] = 0
+    count = len(values)
+    return replace(
+        clip,
+        values=np.rint(values).astype(np.int32),
+        mask=mask,
+        visemes=np.zeros((count, 4), np.int32),
+        expressions=np.zeros((count, 6), np.int32),
+        notes=(*clip.notes, *notes),
+    )
+
+
+def _visemes(given: Int32, notes: list[str]) -> tuple[Float64, Float64]:
+    """(n, 68) what they show, and (n,) 0..1 how far a viseme is there at all."""
+    selects = _selects(given[:, :2], len(_mouths()), "FAP 1: wanted visemes", notes)
+    share = _parts(given[:, 2], "FAP 1: wanted blends", notes)
+    _defines(given[:, 3], "FAP 1: viseme_def", notes)
+    parts = np.stack([share, 1 - share], axis=1)
+    return np.einsum("np,npf->nf", parts, _mouths()[selects]), (parts * (selects > 0)).sum(axis=1)
+
+
+def _expressions(given: Int32, notes: list[str]) -> Float64:
+    """(n, 68) what they show."""
+    selects = _selects(given[:, [0, 2]], len(_faces()), "FAP 2: wanted expressions", notes)
+    parts = _parts(given[:, [1, 3]], "FAP 2: wanted intensities", notes)
+    _defines(given[:, 5], "FAP 2: expression_def", notes)
+    out: Float64 = np.einsum("np,npf->nf", parts, _faces()[selects])
+    return out
+
+
+def _selects(given: Int32, count: int, wanted: str, notes: list[str]) -> Int32:
+    """The numbers of what there is; 0, which is none, in place of others."""
+    known = (given >= 0) & (given < count)
+    if not known.all():
+        notes.append(f"{wanted} 0..{count - 1}, got {given[~known][0]}: shown as none")
+    return np.where(known, given, 0)
+
+
+def _parts(given: Int32, wanted: str, notes: list[str]) -> Float64:
+    """0..1 of 0..63."""
+    limited = np.clip(given, 0, MOST)
+    if (limited != given).any():
+        notes.append(f"{wanted} 0..{MOST}, got {given[limited != given][0]}: limited to it")
+    parts: Float64 = limited / MOST
+    return parts
+
+
+def _defines(flags: Int32, name: str, notes: list[str]) -> None:
+    if flags.any():
+        notes.append(f"{name} gives a meaning of its own, which is not heeded")
+
+
+@cache
+def _mouths() -> Float64:
+    """(15, 68) FAPU, a row a viseme."""
+    out = np.zeros((len(shape_table()[0]), 68))
+    for number, values in mouth_faps(shape_table()[0]).items():
+        out[:, number - 1] = values
+    return out
+
+
+@cache
+def _faces() -> Float64:
+    """(7, 68) FAPU, a row an expression; 0 is none."""
+    rows = fap_expressions()
+    out = np.zeros((1 + max(row.number for row in rows), 68))
+    for row in rows:
+        out[row.number] = archetypes("own")[row.emotion][0].frame()
+    return out

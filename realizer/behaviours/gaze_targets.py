@@ -1,0 +1,109 @@
+"""A target and the scene -> the angles to look there; signed angles -> AU channels of eyes or head."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from realizer import tables
+from realizer.animation.axis import au
+from realizer.animation.channel import Channel, Layer
+from realizer.behaviours.kind import Fault, Position, World
+from realizer.core.array_types import Float64
+
+__all__: list[str] = []
+
+FILE = "gaze.toml"
+NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
+POINT = re.compile(",".join([NUMBER] * 3))
+# Degrees of yaw, positive to the left, and of pitch, positive up.
+Turn = tuple[float, float]
+# Part -> the AUs of (yaw to the left, to the right), (pitch up, down).
+TURNS = {"eyes": ((61, 62), (63, 64)), "head": ((51, 52), (53, 54))}
+
+
+@cache
+def facts() -> dict[str, Any]:
+    """gaze.toml, whole."""
+    return tables.read_toml(tables.text_of(FILE), FILE)
+
+
+def limits(part: str) -> Turn:
+    """How far "eyes" or "head" turn at most."""
+    return facts()[part]["yaw"], facts()[part]["pitch"]
+
+
+def within(turn: Turn, most: Turn) -> Turn:
+    """As much of a turn as there can be."""
+    (yaw, pitch), (most_yaw, most_pitch) = turn, most
+    return max(-most_yaw, min(most_yaw, yaw)), max(-most_pitch, min(most_pitch, pitch))
+
+
+def position(target: str, world: World) -> Position | None:
+    """Where a target is, in metres: a point "x,y,z" or a name of the scene, either case; None if nowhere."""
+    if match := POINT.fullmatch(target):
+        x, y, z = (float(number) for number in match.groups())
+        return x, y, z
+    if world.scene is None:
+        return None
+    if target in world.scene:
+        return world.scene[target]
+    return next((place for name, place in world.scene.items() if name.lower() == target.lower()), None)
+
+
+def angles(target: str, world: World) -> tuple[float, float, float]:
+    """Yaw (positive to the character's left), pitch (positive up) and how far each eye turns in, degrees.
+
+    What is not known, and a target between the eyes, is straight ahead and far away.
+    """
+    x, y, z = position(target, world) or (0.0, 0.0, 0.0)
+    distance = math.sqrt(x * x + y * y + z * z)
+    if distance < 1e-6:
+        return 0.0, 0.0, 0.0
+    yaw = math.degrees(math.atan2(x, z)) if x or z else 0.0
+    pitch = math.degrees(math.asin(max(-1.0, min(1.0, y / distance))))
+    inward = math.degrees(math.atan2(facts()["eyes"]["apart"] / 2, distance))
+    return yaw, pitch, inward
+
+
+def target_faults(target: str, world: World) -> tuple[Fault, ...]:
+    """NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
+    if world.scene is None or position(target, world) is not None:
+        return ()
+    near = difflib.get_close_matches(target, list(world.scene), n=3) or sorted(world.scene)[:5]
+    wanted = f"one of {', '.join(near)}" if near else 'a point such as "0,0,1", as the scene is empty'
+    return (
+        Fault(
+            "NO_SUCH_TARGET", f"target: wanted {wanted}, got {target!r}; looks straight ahead", fatal=False
+        ),
+    )
+
+
+def turn(
+    part: str,
+    times: Float64,
+    turns: Sequence[Turn],
+    *,
+    layer: Layer,
+    source: str,
+    holds: bool = False,
+) -> tuple[Channel, ...]:
+    """Channels that turn "eyes" or "head" by k turns at times (k,).
+
+    An angle is the difference of two AUs; between keys they add up to one smooth course.
+    """
+    channels = []
+    for degrees, sides in zip(zip(*turns, strict=True), TURNS[part], strict=True):
+        for number, sign, most in zip(sides, (1.0, -1.0), (max(degrees), -min(degrees)), strict=True):
+            if most > 0.0:
+                whole = tables.by_number()[number].degrees
+                values = np.array([max(0.0, sign * angle) / whole for angle in degrees])
+                target = au(number)[0]
+                channels.append(Channel(target, times, values, layer=layer, holds=holds, source=source))
+    return tuple(channels)

@@ -1,0 +1,58 @@
+"""Action units by intensity and a behaviour's times -> channels that rise to a pose and leave or keep it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from realizer.animation.axis import Target, au
+from realizer.animation.channel import Channel, Layer
+from realizer.behaviours.kind import Fault
+from realizer.core.array_types import Float64
+
+__all__: list[str] = []
+
+
+def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target, float]:
+    """Column -> intensity, of {(AU, side): intensity at amount 1}; an AU that is named twice is the stronger.
+
+    What goes beyond an AU's 1 is as strong as it can be.
+    """
+    values: dict[Target, float] = {}
+    for (number, side), intensity in aus.items():
+        for target in au(number, side):
+            values[target] = max(values.get(target, 0.0), min(amount * intensity, 1.0))
+    return values
+
+
+def shown(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
+    """Channels that are 0 at start, there from attackPeak to relax, 0 at end: times (4,)."""
+    return tuple(
+        Channel(target, times, np.array([0.0, value, value, 0.0]), source=source)
+        for target, value in values.items()
+        if value
+    )
+
+
+def kept(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
+    """Channels of a base state that rise from start to end, and stay: times (2,)."""
+    return tuple(
+        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=source)
+        for target, value in values.items()
+    )
+
+
+def unknown(attribute: str, word: str, known: Iterable[str]) -> Fault:
+    """The fault of a word that is none of those known, with those near it."""
+    names = {name.upper(): name for name in known}
+    got = word if len(word) <= 60 else word[:60] + "..."
+    # Of names such as "template:grief" only the last part makes them alike.
+    family, _, part = got.upper().rpartition(":")
+    parts = {name.rpartition(":")[2]: name for name in names if name.rpartition(":")[0] == family}
+    near = difflib.get_close_matches(part, list(parts), n=3)
+    meant = " or ".join(names[parts[name]] for name in near)
+    hint = f", did you mean {meant}?" if near else ""
+    wanted = f"{attribute}: wanted one of {', '.join(names.values())}"
+    return Fault("CANNOT_CREATE_BEHAVIOR", f"{wanted}; got {got!r}{hint}")

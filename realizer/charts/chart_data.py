@@ -1,0 +1,152 @@
+"""Blocks that play in, what a timeline tells of them out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from bml_schema import Behaviour, Block, Place
+from realizer.charts.links import links_of
+from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Link, Point, Spoken
+from realizer.playback.active_block import Playing
+from realizer.playback.block_links import instants
+from realizer.playback.block_store import Cast
+from realizer.scheduling.timing import Schedule, Timing, Warning
+
+__all__ = ["line_of", "lines_of"]
+
+
+def lines_of(cast: Cast, schedules: Iterable[Schedule]) -> list[BlockLine]:
+    """The blocks of a player, one for each schedule that its `submit` gave."""
+    playing = {id(p.first): p for p in cast.all()}
+    out = []
+    for schedule in schedules:
+        known = playing.get(id(schedule))
+        out.append(_refused(schedule) if known is None else line_of(known, cast.schedule_of))
+    return out
+
+
+def line_of(playing: Playing, schedule_of: Callable[[str], Schedule | None]) -> BlockLine:
+    """A block as it now stands.
+
+    Args:
+        schedule_of: block id -> its schedule, for what is tied to other blocks.
+    """
+    block, schedule = playing.block, playing.schedule
+    known = math.isfinite(schedule.start)
+    start = schedule.start if known else None
+    links = links_of(block, schedule, instants(schedule_of, schedule.start if known else 0.0))
+    own = tuple(
+        _line(playing, node, start, tuple(links.get(node.id, ())))
+        for node in block.behaviours
+        if node.id in schedule.times
+    )
+    warnings = tuple(dict.fromkeys((*playing.first.warnings, *schedule.warnings)))
+    dropped = [d for w in warnings if (d := _dropped(w, block, schedule)) is not None]
+    names = {d.id for d in dropped}
+    dropped += [_cut(playing, id) for id in playing.first.times if id not in (*names, *schedule.times)]
+    end = playing.end if known else None
+    return BlockLine(
+        block.id, block.character_id, playing.state.value, start, end, own, tuple(dropped), warnings
+    )
+
+
+def _line(playing: Playing, node: Behaviour, start: float | None, links: tuple[Link, ...]) -> Line:
+    names, times = playing.schedule.points[node.id], playing.schedule.times[node.id].tolist()
+    points = tuple(
+        Point(name, time, None if start is None else start + time)
+        for name, time in zip(names, times, strict=True)
+    )
+    place = playing.block.places.get(node.id)
+    utterance = playing.world.utterances.get(node.id)
+    words = utterance.words if utterance is not None else ()
+    return Line(
+        node.id,
+        node.tag.rpartition("}")[2],
+        place.line if place is not None else None,
+        node.id in playing.block.required,
+        points,
+        _gaps(names, times, playing.plan.timings.get(node.id)),
+        links,
+        tuple(
+            Spoken(times[0] + w.start, times[0] + w.end, w.text)
+            for w in words
+            if times[0] + w.start < times[-1]
+        ),
+    )
+
+
+def _gaps(names: tuple[str, ...], times: list[float], timing: Timing | None) -> tuple[Gap, ...]:
+    gaps = [
+        Gap(begin, end, after - before)
+        for begin, end, before, after in zip(names[:-1], names[1:], times[:-1], times[1:], strict=True)
+    ]
+    if timing is None or timing.points != names:
+        return tuple(gaps)
+    if timing.rigid:
+        return tuple(
+            g._replace(preferred=p, least=p, most=p, rigid=True)
+            for g, p in zip(gaps, timing.preferred.tolist(), strict=True)
+        )
+    most = [math.inf] * len(gaps) if timing.most is None else timing.most.tolist()
+    wants = zip(
+        timing.preferred.tolist(), timing.least.tolist(), timing.stiffness.tolist(), most, strict=True
+    )
+    return tuple(
+        g._replace(preferred=p, least=least, stiffness=a, most=limit if math.isfinite(limit) else None)
+        for g, (p, least, a, limit) in zip(gaps, wants, strict=True)
+    )
+
+
+def _dropped(warning: Warning, block: Block, schedule: Schedule) -> Dropped | None:
+    """What a warning says is gone; None where it is about something that plays."""
+    prefix = f"{block.id}:"
+    id = warning.id.removeprefix(prefix) if warning.id.startswith(prefix) else ""
+    problem = next((p for p in block.problems if (p.id, p.type) == (warning.id, warning.type)), None)
+    if id in schedule.times if problem is None else not problem.dropped:
+        return None
+    place = Place(problem.line, problem.path) if problem is not None else block.places.get(id or warning.id)
+    return Dropped(
+        id or warning.id,
+        _element(place),
+        place.line if place is not None else None,
+        warning.type,
+        warning.text,
+    )
+
+
+def _element(place: Place | None) -> str | None:
+    """The name of what stands there."""
+    if place is None:
+        return None
+    return place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None
+
+
+def _cut(playing: Playing, id: str) -> Dropped:
+    """What was ended before it began."""
+    place, state = playing.block.places.get(id), playing.state.value
+    when = "" if playing.stopped is None else f" at {playing.stopped:.3f} s"
+    # A block that waited is without it by now.
+    tag = next((node.tag for node in playing.block.behaviours if node.id == id), None)
+    return Dropped(
+        id,
+        _element(place) if tag is None else tag.rpartition("}")[2],
+        place.line if place is not None else None,
+        state,
+        f"cut off{when}, before it began",
+    )
+
+
+def _refused(schedule: Schedule) -> BlockLine:
+    """A block that failed."""
+    gone = tuple(Dropped(w.id, None, None, w.type, w.text) for w in schedule.warnings)
+    return BlockLine(
+        schedule.block,
+        schedule.character,
+        "FAILED",
+        schedule.start,
+        schedule.start,
+        (),
+        gone,
+        schedule.warnings,
+    )

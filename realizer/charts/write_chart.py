@@ -1,0 +1,42 @@
+"""Blocks and a path in, a picture of their timelines there: its suffix says as what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from realizer.charts.picture import timeline
+from realizer.charts.raster import png
+from realizer.charts.shapes import Picture
+from realizer.charts.svg import svg
+from realizer.charts.timeline import BlockLine
+from realizer.core.atomic_files import write_bytes
+
+__all__ = ["WRITERS", "write_timeline", "writer_for"]
+
+Writer = Callable[[Picture], bytes]
+WRITERS: Mapping[str, Writer] = {".svg": lambda picture: svg(picture).encode(), ".png": png}
+
+
+def writer_for(path: str | Path) -> Writer:
+    """What makes a picture's bytes.
+
+    Raises:
+        ValueError: no or an unknown suffix; the text lists the known ones.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in WRITERS:
+        raise ValueError(f"{path}: wanted a suffix of {' '.join(WRITERS)}, got {suffix or 'none'}")
+    return WRITERS[suffix]
+
+
+def write_timeline(blocks: Sequence[BlockLine], path: str | Path) -> None:
+    """Write the picture whole or not at all.
+
+    Raises:
+        ValueError: as `writer_for`.
+        RealizerError: there is too much of it for that kind of picture.
+        OSError: it cannot be written there.
+    """
+    write = writer_for(path)
+    write_bytes(path, write(timeline(blocks)))

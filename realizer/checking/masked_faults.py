@@ -1,0 +1,76 @@
+"""What the parser dropped in, what else is wrong with it out: a fault hides those that are sought later."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+from bml_schema import Block, BMLError, Problem, read
+from bml_schema.source import Source
+from realizer.behaviours import VOCABULARY
+from realizer.behaviours.kind import World
+from realizer.checking.explain import attributes_of
+from realizer.playback.player import Player
+from realizer.scheduling.timing import Warning
+
+__all__ = ["hidden", "told_of", "without_faults"]
+
+
+def told_of(block: Block, id: str, type: str, text: str) -> Warning:
+    """A warning of a behaviour, with its place."""
+    place = block.places.get(id)
+    return Warning(f"{block.id}:{id}", type, text if place is None else place.says(text))
+
+
+def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Block | None]:
+    """The blocks of a text as they are without the attributes for which behaviours were dropped.
+
+    Args:
+        items: what was read of it.
+
+    Returns:
+        One for each of them; None where there is nothing more to be seen.
+    """
+    problems = [p for item in items if isinstance(item, Block) for p in item.problems if p.dropped]
+    spans = sorted(set(_spans(source, problems)))
+    if not spans:
+        return [None] * len(items)
+    # Blanks in their place, so that all else stays where it is.
+    parts, last = [], 0
+    for start, end in spans:
+        parts += [source.text[last:start], re.sub(r"[^\n]", " ", source.text[start:end])]
+        last = end
+    again = list(read("".join(parts) + source.text[last:], VOCABULARY))
+    if len(again) != len(items):
+        return [None] * len(items)
+    return [item if isinstance(item, Block) else None for item in again]
+
+
+def hidden(block: Block, whole: Block, player: Player, world: World) -> Iterator[Warning]:
+    """What is wrong with the behaviours that a block has only without its faults.
+
+    Args:
+        whole: the block as `without_faults` gave it.
+    """
+    known = {node.id for node in block.behaviours}
+    for node in whole.behaviours:
+        kind = player.kinds.get(node.tag)
+        if node.id not in known and kind is not None:
+            for fault in kind.check(node, world):
+                yield told_of(whole, node.id, fault.type, fault.text)
+
+
+def _spans(source: Source, problems: Iterable[Problem]) -> Iterator[tuple[int, int]]:
+    """Offsets of the attributes that problems tell of, each from its name to its last quote."""
+    for problem in problems:
+        element = source.find(problem.path, line=problem.line, block=problem.id.partition(":")[0])
+        if element is None:
+            continue
+        for name in attributes_of(problem.text):
+            span = source.value_span(element, name)
+            if span is None or name == "id":
+                continue  # without an id there is nothing to speak of
+            tag = source.text[element.offset : span[0]]
+            begun = re.search(r"[^\s\"'<>/=]+\s*=\s*[\"']$", tag)
+            if begun is not None:
+                yield element.offset + begun.start(), span[1] + 1

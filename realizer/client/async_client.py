@@ -1,0 +1,217 @@
+"""A connection to the service inside an event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from bml_schema.feedback import BlockProgress, Feedback
+from realizer.client.message_router import ANSWERS, ClientError, Frame, Mail, Until, blank
+from realizer.client.speech import Speech
+
+__all__ = ["Client"]
+
+
+class Client:
+    """An open connection; made by `connect`. Several tasks may use it at once.
+
+    Attributes:
+        url: where it is connected to.
+        welcome: what the service said first: session, version, capabilities, limits.
+    """
+
+    def __init__(self, socket: Any, url: str, token: str | None = None) -> None:
+        self.url = url
+        self._token = token
+        self.welcome: Mapping[str, Any] = {}
+        self._socket = socket
+        self._mail = Mail()
+        self._news = asyncio.Condition()
+        self._ended = False
+        self._why = ""
+        self._reader = asyncio.create_task(self._read())
+        self._asking = asyncio.Lock()
+
+    @property
+    def session(self) -> str:
+        """The session's name, which others may join."""
+        return str(self.welcome["session"])
+
+    @property
+    def errors(self) -> list[dict[str, Any]]:
+        """What the service refused of messages that have no answer."""
+        return list(self._mail.errors)
+
+    async def send(self, bml: str) -> None:
+        """Send one or more BML documents.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
+        self._mail.sent(bml)
+        await self._post(bml)
+
+    async def control(self, type: str, **fields: Any) -> None:
+        """Send a control message that has no answer, such as `stop` or `scene`; see `errors`.
+
+        Raises:
+            ClientError: the connection has ended.
+        """
+        await self._post(json.dumps({"type": type, **fields}))
+
+    async def ask(self, type: str, **fields: Any) -> dict[str, Any]:
+        """Send a control message and wait for its answer: hello, subscribe, state, ping.
+
+        Raises:
+            ClientError: the service answered with an error.
+            ValueError: such a message has no answer.
+        """
+        if type not in ANSWERS:
+            raise ValueError(f"wanted one of {', '.join(ANSWERS)}, which are answered; got {type}")
+        async with self._asking:
+            self._mail.ask(type)
+            await self.control(type, **fields)
+            await self._wait(lambda: self._mail.answered)
+            return self._mail.answer()
+
+    async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
+        """Ask for a stream (fap, au, arkit, mesh, audio, video, schedule); returns what its values mean.
+
+        Raises:
+            ClientError: there is no such stream, or it cannot be had.
+        """
+        return await self.ask("subscribe", stream=stream, **fields)
+
+    async def state(self) -> dict[str, Any]:
+        """What plays, which action units are up, which layers ask for them."""
+        return await self.ask("state")
+
+    async def play(self, bml: str) -> BlockProgress:
+        """Send BML and wait for the end of its last block, which is returned.
+
+        Raises:
+            ClientError: the block was refused, or the connection ended.
+        """
+        until = await self._follow(bml)
+        await self._wait(lambda: until.over)
+        return until.end()
+
+    @contextlib.asynccontextmanager
+    async def speech(self, id: str, **opening: Any) -> AsyncIterator[Speech]:
+        """A speech that is said while its text comes: `async with client.speech("s") as speech`.
+
+        Leaving the block says that nothing follows, and waits for nothing; an exception stops the speech.
+
+        Args:
+            id: of the block that others can name; the syncs of its text are `ID:ID:sync` there.
+            opening: composition, character, language of the message `speech`.
+        """
+        speech = Speech(id, self.control, self._wait, self._check, opening)
+        self._mail.follow(speech.heard)
+        try:
+            yield speech
+        except BaseException:
+            with contextlib.suppress(Exception):  # the first one counts
+                await speech.stop()
+                await speech.close()
+            raise
+        await speech.close()
+
+    async def feedback(self) -> AsyncIterator[Feedback]:
+        """Feedback as it comes, until the connection ends; each is given to one iterator."""
+        with contextlib.suppress(ClientError):
+            while True:
+                await self._wait(lambda: bool(self._mail.feedback))
+                yield self._mail.feedback.popleft()
+
+    async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
+        """Feedback up to the end (or the refusal) of a block: by default the last one that was sent."""
+        until = Until(block or self._mail.last_block)
+        async for feedback in self.feedback():
+            yield feedback
+            until.tell(feedback)
+            if until.over:
+                return
+
+    async def frames(self, stream: str) -> AsyncIterator[Frame]:
+        """Frames of a stream as they come: WireFrame, or a dictionary where the encoding is JSON.
+
+        A WireFrame has in `told` what the service has told of its stream when it came. That changes while a
+        mesh runs, when its character gets another face; `vertices` of a mesh goes by it.
+        """
+        kept = self._mail.of(stream)
+        with contextlib.suppress(ClientError):
+            while True:
+                await self._wait(lambda: bool(kept))
+                yield kept.popleft()
+
+    async def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
+        """Play BML and save its last block as a film with sound (.mp4, .webm), as it was drawn live.
+
+        The service leaves out pictures it has no time for; the one before is shown instead of them.
+        (`realizer realize` draws every one.)
+
+        Args:
+            look: size, camera, light, background, character, as `subscribe` takes them for video.
+
+        Raises:
+            ClientError: the block was refused, or there are no pictures.
+            FileNotFoundError: the folder is not there; nothing is played.
+            RealizerError: PyAV is not installed, or the suffix is no film's.
+        """
+        from realizer.client.record import record
+
+        return await record(self, Path(path), bml, fps, look)
+
+    async def close(self) -> None:
+        """Say goodbye."""
+        await self._socket.close()
+        await self._reader
+
+    async def _follow(self, bml: str) -> Until:
+        """Send BML; how far its last block is."""
+        if blank(bml):
+            raise ClientError("wanted <bml>, got nothing", "refused")
+        self._mail.sent(bml)
+        until = Until(self._mail.last_block)
+        self._mail.follow(until)
+        await self._post(bml)
+        return until
+
+    async def _post(self, text: str) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            await self._socket.send(text)
+        except ConnectionClosed:
+            await self._wait(lambda: False)  # until the reader knows why
+
+    async def _read(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            while True:
+                message = await self._socket.recv()
+                self._mail.put(message)
+                async with self._news:
+                    self._news.notify_all()
+        except ConnectionClosed as closed:
+            self._why = closed.rcvd.reason if closed.rcvd is not None else ""
+        finally:
+            self._ended = True
+            async with self._news:
+                self._news.notify_all()
+
+    async def _wait(self, there: Any) -> None:
+        async with self._news:
+            await self._news.wait_for(lambda: there() or self._ended)
+        if not there():
+            self._check()
+
+    def _check(self) -> None:
+        if self._ended:
+            raise ClientError("the connection has ended" + (f": {self._why}" if self._why else ""))

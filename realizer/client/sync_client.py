@@ -1,0 +1,147 @@
+"""A connection to the service without an event loop of yours: one runs in a thread."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Coroutine, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from bml_schema.feedback import BlockProgress, Feedback
+from realizer.client.async_client import Client
+from realizer.client.message_router import ClientError, Frame
+from realizer.client.speech import SyncSpeech
+
+__all__ = ["SyncClient"]
+
+T = TypeVar("T")
+
+
+class SyncClient:
+    """An open connection; made by `with connect(...)`. What it does is `Client`'s, which see, errors too.
+
+    It reads in its own thread, so that a program that computes for a while is no slow client.
+    """
+
+    def __init__(self, opening: AbstractAsyncContextManager[Client]) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="realizer client", daemon=True)
+        self._thread.start()
+        self._opening = opening
+        try:
+            self._client = self._do(_entered(opening))
+        except BaseException:
+            self._end()
+            raise
+
+    @property
+    def url(self) -> str:
+        """Where it is connected to."""
+        return self._client.url
+
+    @property
+    def welcome(self) -> Mapping[str, Any]:
+        """What the service said first."""
+        return self._client.welcome
+
+    @property
+    def session(self) -> str:
+        """The session's name, which others may join."""
+        return self._client.session
+
+    @property
+    def errors(self) -> list[dict[str, Any]]:
+        """What the service refused of messages that have no answer."""
+        return self._client.errors
+
+    def send(self, bml: str) -> None:
+        """Send one or more BML documents."""
+        self._do(self._client.send(bml))
+
+    def control(self, type: str, **fields: Any) -> None:
+        """Send a control message that has no answer."""
+        self._do(self._client.control(type, **fields))
+
+    def ask(self, type: str, **fields: Any) -> dict[str, Any]:
+        """Send a control message and wait for its answer."""
+        return self._do(self._client.ask(type, **fields))
+
+    def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
+        """Ask for a stream; returns what its values mean."""
+        return self._do(self._client.subscribe(stream, **fields))
+
+    def state(self) -> dict[str, Any]:
+        """What plays, which action units are up, which layers ask for them."""
+        return self._do(self._client.state())
+
+    def play(self, bml: str) -> BlockProgress:
+        """Send BML and wait for the end of its last block, which is returned."""
+        return self._do(self._client.play(bml))
+
+    @contextmanager
+    def speech(self, id: str, **opening: Any) -> Iterator[SyncSpeech]:
+        """A speech that is said while its text comes, as `Client.speech` without `async`."""
+        live = self._client.speech(id, **opening)
+        speech = SyncSpeech(self._do(_entered(live)), self._do)
+        try:
+            yield speech
+        except BaseException as error:
+            self._do(_left(live, error))
+            raise
+        self._do(_left(live, None))
+
+    def feedback(self) -> Iterator[Feedback]:
+        """Feedback as it comes, until the connection ends."""
+        return self._each(self._client.feedback())
+
+    def until_end(self, block: str | None = None) -> Iterator[Feedback]:
+        """Feedback up to the end (or the refusal) of a block: by default the last one that was sent."""
+        return self._each(self._client.until_end(block))
+
+    def frames(self, stream: str) -> Iterator[Frame]:
+        """Frames of a stream as they come, until the connection ends."""
+        return self._each(self._client.frames(stream))
+
+    def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
+        """Play BML and save its last block as a film with sound."""
+        return self._do(self._client.film(path, bml, fps=fps, **look))
+
+    def close(self) -> None:
+        """Say goodbye. Once more does nothing."""
+        if self._loop.is_closed():
+            return
+        try:
+            self._do(_left(self._opening, None))
+            self._do(self._loop.shutdown_asyncgens())
+        finally:
+            self._end()
+
+    def _each(self, items: AsyncIterator[T]) -> Iterator[T]:
+        while (item := self._do(_next(items))) is not None:
+            yield item
+
+    def _do(self, work: Coroutine[Any, Any, T]) -> T:
+        if self._loop.is_closed():
+            work.close()
+            raise ClientError("the connection has ended: it was closed here")
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+    def _end(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+
+async def _next(items: AsyncIterator[T]) -> T | None:
+    return await anext(items, None)
+
+
+async def _entered(manager: AbstractAsyncContextManager[T]) -> T:
+    return await manager.__aenter__()
+
+
+async def _left(manager: AbstractAsyncContextManager[Any], error: BaseException | None) -> None:
+    trace = None if error is None else error.__traceback__
+    await manager.__aexit__(None if error is None else type(error), error, trace)

@@ -1,0 +1,73 @@
+"""A face in; which of its vertices units move, and where in the skin what grows on it has its roots, out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float64, Int32
+from realizer.face.model import Face
+
+__all__ = ["grown", "roots", "skin"]
+
+# Whatever else a face is built from moves with the head alone, or grows on the skin.
+MOVED, GROWN = ("skin", "hair"), ("brows", "lashes")
+NEAR = 0.0015  # m; what is nearer to the skin than this grows there
+AROUND = 16  # triangles looked at, those whose middles are nearest
+
+
+def skin(face: Face) -> Bool:
+    """(n,) the vertices that units move themselves; what has grown on the skin goes with that."""
+    mine = np.zeros(len(face.vertices), bool)
+    for part in MOVED:
+        if part in face.parts:
+            mine[slice(*face.parts[part])] = True
+    return mine
+
+
+def grown(face: Face) -> list[tuple[int, int, Int32, Float64]]:
+    """The parts that grow on the skin: first and last vertex, and what `roots` says of them."""
+    return [(*face.parts[part], *roots(face, part)) for part in GROWN if part in face.parts]
+
+
+def roots(face: Face, part: str) -> tuple[Int32, Float64]:
+    """Three vertices of skin for each vertex of the part, (n, 3), and their shares, (n, 3).
+
+    What stands off, a lash's tip, goes with the part's vertex on the skin that is nearest along the part.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import dijkstra
+    from scipy.spatial import cKDTree
+    from trimesh import triangles
+
+    low, high = face.parts["skin"]
+    skin = face.triangles[((face.triangles >= low) & (face.triangles < high)).all(axis=1)]
+    corners = face.vertices[skin].astype(np.float64)
+    first, last = face.parts[part]
+    at = face.vertices[first:last].astype(np.float64)
+    near = np.asarray(cKDTree(corners.mean(axis=1)).query(at, min(AROUND, len(skin)))[1]).reshape(len(at), -1)
+    many = np.repeat(at, near.shape[1], axis=0)
+    nearest: Any = triangles.closest_point
+    shares: Any = triangles.points_to_barycentric
+    places = nearest(corners[near.ravel()], many).reshape(*near.shape, 3)
+    off = np.linalg.norm(places - at[:, None], axis=2)
+    best = off.argmin(axis=1)
+    each = np.arange(len(at))
+    hit, place, off = near[each, best], places[each, best], off[each, best]
+    share = np.clip(shares(corners[hit], place), 0, 1)
+    # What is nowhere near the skin has its own nearest place there, all the same.
+    mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
+    a, b = np.concatenate([mine[:, [0, 1]], mine[:, [1, 2]], mine[:, [2, 0]]]).T
+    grown = np.flatnonzero(off < NEAR)
+    root = each.copy()
+    if len(grown) and len(a):
+        long = np.linalg.norm(at[a] - at[b], axis=1) + 1e-9
+        # Edges of two triangles count once.
+        _, once = np.unique(np.minimum(a, b).astype(np.int64) * len(at) + np.maximum(a, b), return_index=True)
+        graph = coo_matrix((long[once], (a[once], b[once])), (len(at),) * 2).tocsr()
+        away, _, source = dijkstra(
+            graph, directed=False, indices=grown, min_only=True, return_predecessors=True
+        )
+        root[np.isfinite(away)] = source[np.isfinite(away)]
+    return skin[hit[root]], np.asarray(share[root] / share[root].sum(axis=1)[:, None])

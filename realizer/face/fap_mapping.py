@@ -1,0 +1,39 @@
+"""A face's name and a user's file in, the mapping of AUs to FAPs in force out: the one place that asks."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.core.errors import FaceError, TableError
+from realizer.tables.mappings import own_file, read_mapping
+
+__all__ = ["mapping_of"]
+
+
+def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
+    """What action units ask of FAPs: an action unit is as the file says, else as the face, else as the table.
+
+    Args:
+        face: name of a face folder; its `au_to_fap.csv` or `au_to_fap.txt` says what it has of its own.
+        file: a user's own mapping, in either form.
+
+    Raises:
+        FaceError: no such face, or its own file cannot be used; with the line.
+        TableError: the user's file cannot be used; with the line.
+    """
+    from realizer.face.load import folder_of
+
+    return _mapping(folder_of(face), file)
+
+
+@lru_cache(maxsize=16)
+def _mapping(folder: Path, file: Path | None) -> FapMapping:
+    mapping = standard()
+    try:
+        if own := own_file(folder):
+            mapping = mapping.replaced(read_mapping(own), str(own))
+    except TableError as error:
+        raise FaceError(str(error)) from None
+    return mapping.replaced(read_mapping(file), str(file)) if file else mapping

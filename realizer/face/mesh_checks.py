@@ -1,0 +1,131 @@
+"""A face's mesh in, what is wrong with its surface out: holes, turned triangles, values out of range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64, Int32
+
+__all__: list[str] = []
+
+NEEDED = ("skin", "left_eye", "right_eye")  # parts that every face has
+COLLAR = 1  # the clean cut at the bust's end is the hole that every head may have
+AT_EYE = 0.024  # m from an eyeball's middle; there skin may end at the lids
+AT_MOUTH = 0.045  # m from the lips' middle; there skin may end behind the lips
+TURNED = 0.02  # of a part's triangles: fewer than that are turned by mistake, more is another way to build it
+
+Parts = Mapping[str, tuple[int, int]]
+
+
+def value_faults(mesh: Mapping[str, Any]) -> list[str]:
+    """Values that no mesh.npz may hold; each names its array."""
+    vertices, triangles, n = mesh["vertices"], mesh["triangles"], len(mesh["vertices"])
+    faults = []
+    for name, array in (("vertices", vertices), ("triangles", triangles), ("colours", mesh["colours"])):
+        if array.shape[1] != 3:
+            faults.append(f"{name}: wanted 3 columns, got {array.shape[1]}; build the face again")
+    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(bad):
+        faults.append(f"vertices: {len(bad)} are not finite, the first is {bad[0]}; build the face again")
+    if len(triangles) and (triangles.min() < 0 or triangles.max() >= n):
+        faults.append(
+            f"triangles: wanted indices 0..{n - 1}, got {triangles.min()}..{triangles.max()}; build again"
+        )
+    for name in ("colours", "occlusion", "gloss"):
+        array = mesh[name]
+        if len(array) != n:
+            faults.append(f"{name}: wanted {n} rows, one a vertex, got {len(array)}; build the face again")
+        if len(array) and not (np.isfinite(array).all() and array.min() >= 0 and array.max() <= 255):
+            faults.append(f"{name}: wanted 0..255, got {array.min():g}..{array.max():g}; scale it")
+        elif array.dtype != np.uint8:
+            faults.append(f"{name}: wanted bytes (uint8) 0..255, got {array.dtype}; store it as uint8")
+    return faults
+
+
+def range_faults(parts: Mapping[str, Any], n: int | None) -> list[str]:
+    """Parts of face.toml that are missing, or no ranges of the mesh's n vertices (None: not known)."""
+    faults = [f"parts: wanted {name!r}, got none" for name in NEEDED if name not in parts]
+    for name, ends in parts.items():
+        whole = isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, int) for end in ends)
+        if not whole or not 0 <= ends[0] < ends[1] or (n is not None and ends[1] > n):
+            most = "the number of vertices" if n is None else n
+            faults.append(f"parts: {name}: wanted [first, last + 1] in 0..{most}, got {ends}")
+    return faults
+
+
+def surface_faults(vertices: Float64, triangles: Int32, parts: Parts, mouth: Any) -> list[str]:
+    """Open edges where there must be none, and triangles that look the wrong way.
+
+    Args:
+        vertices: (n, 3) metres; triangles: (m, 3).
+        mouth: (3,) the middle between the lips, or None where that is not known.
+    """
+    faults = []
+    for name, (first, last) in parts.items():
+        mine = triangles[((triangles >= first) & (triangles < last)).all(axis=1)]
+        if len(mine):
+            faults += [f"{name}: {fault}" for fault in _turned(mine)]
+    mine = triangles[((triangles >= parts["skin"][0]) & (triangles < parts["skin"][1])).all(axis=1)]
+    eyes = [vertices[slice(*parts[name])].mean(axis=0) for name in ("left_eye", "right_eye") if name in parts]
+    return faults + [f"skin: {fault}" for fault in _holes(vertices, mine, eyes, mouth)]
+
+
+def _turned(triangles: Int32) -> list[str]:
+    """Triangles whose neighbours all go round the other way."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    owner = np.tile(np.arange(len(triangles)), 3)
+    _, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    twice = counts[inverse.ravel()] > 1
+    amount = np.bincount(owner[twice], minlength=len(triangles))
+    # The one that is turned shares all its edges so, those beside it one each.
+    wrong = np.flatnonzero(amount >= 2)
+    if not len(wrong) or len(wrong) > max(TURNED * len(triangles), 3):
+        return []
+    corners = triangles[wrong[0]].tolist()
+    return [
+        f"{len(wrong)} triangles are inverted, one has the vertices {corners}: go round it the other way, "
+        "counter-clockwise seen from outside"
+    ]
+
+
+def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> list[str]:
+    """Rims of the skin beside the bust's end, the lids and the inside of the mouth."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
+    pairs, counts = np.unique(edges, axis=0, return_counts=True)
+    rim = pairs[counts == 1]
+    if not len(rim):
+        return []
+    names, index = np.unique(rim, return_inverse=True)
+    index = index.reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(index)), (index[:, 0], index[:, 1])), (len(names),) * 2)
+    count, label = connected_components(graph, directed=False)
+    lowest = label[int(np.argmin(vertices[names, 1]))]
+    open_ = []
+    for k in range(count):
+        mine = names[label == k]
+        at = vertices[mine]
+        lids = any(np.linalg.norm(at - eye, axis=1).max() < AT_EYE for eye in eyes)
+        inside = (
+            mouth is not None
+            and np.linalg.norm(at - mouth, axis=1).max() < AT_MOUTH
+            and (at[:, 2].mean() < mouth[2])
+        )
+        if k != lowest and not lids and not inside:
+            open_.append((int(mine[0]), int((label[index[:, 0]] == k).sum()), at.mean(axis=0)))
+    return [
+        f"it has {len(open_)} holes beside the bust's end: "
+        + "; ".join(
+            f"{edges} open edges at vertex {vertex}, {np.round(place, 3).tolist()}"
+            for vertex, edges, place in open_[:4]
+        )
+        + (" ..." if len(open_) > 4 else "")
+        + "; close it" * bool(open_)
+    ] * bool(open_)

@@ -1,0 +1,364 @@
+"""A GLB head with ARKit's shapes in, a face folder out, and what was found, is missing and is unsure."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.core.errors import FaceError
+from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack, unpack
+from realizer.face.features import Point, write_features
+from realizer.face.load import load_face
+from realizer.facebuild.arkit.au_measurements import measured_units
+from realizer.facebuild.arkit.fields import Grown, shape_fields
+from realizer.facebuild.arkit.gltf import Gltf
+from realizer.facebuild.arkit.jaw import drag_of, joint_of
+from realizer.facebuild.arkit.mesh_merge import Surface, cut, joined
+from realizer.facebuild.arkit.mouth_coordinates import mouth_of
+from realizer.facebuild.arkit.orientation import pose_of, stood
+from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_of, behind, sort_parts
+from realizer.facebuild.arkit.points import points_of
+from realizer.facebuild.arkit.scene import read_pieces
+from realizer.facebuild.au.measure import write_shapes
+from realizer.facebuild.mpeg4.build import apply_zones
+from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
+from realizer.facebuild.mpeg4.rigid import sliding
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person.skin_colours import occlusion
+from realizer.facebuild.submesh import vertex_normals
+from realizer.tables.arkit_names import canonical, nearest, shapes
+
+__all__ = ["Report", "import_head", "look_at"]
+
+# Where surfaces shine: skin, hair, wet things. A file's roughness is for other lights.
+GLOSS = {
+    "skin": 0.16, "brows": 0.05, "lashes": 0.0, "left_eye": 1.0, "right_eye": 1.0, "upper_teeth": 0.75,
+    "lower_teeth": 0.75, "tongue": 0.35, "hair": 0.10, "beard": 0.08, "shirt": 0.0, "other": 0.1,
+}  # fmt: skip
+DIRECTIONS, CELL = 48, 0.003  # of the baked occlusion: enough for vertices millimetres apart
+DRESSED = ("brows", "lashes", "beard")  # parts that go with the skin under them
+INSIDE = ("upper_teeth", "lower_teeth", "tongue")
+LINED = ("brows", "lashes", *INSIDE)  # cast no shadow: thin, or behind closed lips
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an import found.
+
+    Attributes:
+        found: what was made of the file; missing: what it lacks, and what does not work without it.
+        unsure: what to look at.
+    """
+
+    found: tuple[str, ...]
+    missing: tuple[str, ...]
+    unsure: tuple[str, ...]
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        kinds = (("found", self.found), ("missing", self.missing), ("unsure", self.unsure))
+        return tuple(f"{kind}: {word}" for kind, words in kinds for word in words)
+
+
+@dataclass(frozen=True, eq=False)
+class _Head:
+    """A head that has been read, stood up and parted."""
+
+    surface: Surface
+    ranges: dict[str, tuple[int, int]]
+    painted: bool
+    gltf: Gltf
+    report: Report
+
+
+def look_at(path: Path) -> Report:
+    """What `import_head` would find, without writing anything.
+
+    Raises:
+        FaceError: the file cannot be read, or has no shapes of a face.
+    """
+    return _read(path).report
+
+
+def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
+    """Make a face folder of a GLB or glTF head with ARKit-named morph targets.
+
+    Args:
+        path: the file; folder: the folder to write; name: the face's, the folder's if None.
+
+    Raises:
+        FaceError: the file cannot be read, has no shapes of a face, or no skin, eyes or mouth.
+    """
+    head = _read(path)
+    surface, ranges = head.surface, head.ranges
+    folder.mkdir(parents=True, exist_ok=True)
+    _write_head(folder / "face.toml", name or folder.name, head)
+    points, guesses = points_of(surface, ranges, head.painted)
+    write_features(folder / "features.csv", points)
+    _write_mesh(folder / "mesh.npz", surface, ranges, points)
+    made, words = _write_fields(folder, head, points)
+    report = head.report
+    found = (*report.found, f"{len(made)} FAPs move by its shapes, the others by zones", *words)
+    unsure = report.unsure
+    try:
+        measured = measured_units(load_face(folder.name, folder.parent), surface)
+    except FaceError as error:
+        measured, unsure = {}, (*unsure, f"no shapes for the model of action units: {error}")
+    if measured:
+        write_shapes(folder / "au_shapes.npz", measured)
+        found = (*found, f"{len(measured)} action units for realizer faces fit {folder.name}")
+    if guesses:
+        unsure = (*unsure, f"feature points that are guessed, look at them: {', '.join(guesses)}")
+    return Report(found, report.missing, unsure)
+
+
+def _read(path: Path) -> _Head:
+    gltf = Gltf(path)
+    pieces = read_pieces(gltf)
+    own = list(dict.fromkeys(name for piece in pieces for name in piece.moves))
+    if not pieces:
+        raise FaceError(f"{path}: wanted a head, found no triangles; export the head's meshes")
+    if not own:
+        raise FaceError(
+            f"{path}: wanted morph targets with ARKit's names (jawOpen, eyeBlinkLeft, ...), found none; "
+            "export the head with its shape keys"
+        )
+    foreign = [name for name in own if canonical(name) is None]
+    if len(foreign) == len(own):
+        guesses = [f"{name} ({' or '.join(nearest(name))}?)" if nearest(name) else name for name in own[:12]]
+        raise FaceError(
+            f"{path}: wanted morph targets with ARKit's names (jawOpen, eyeBlinkLeft, ...), got "
+            f"{', '.join(guesses)}{' ...' if len(own) > 12 else ''}; rename them"
+        )
+    try:
+        surface = joined(pieces)
+        bad = np.flatnonzero(~np.isfinite(surface.vertices).all(axis=1))
+        if len(bad) or not all(np.isfinite(move).all() for move in surface.moves.values()):
+            raise FaceError("wanted finite places and moves, got NaN or infinity; export the head again")
+        pose = pose_of(surface)
+        surface = stood(surface, pose)
+        surface = cut(surface, surface.vertices[:, 1] - FLOOR)
+        surface = cut(surface, ASIDE - np.abs(surface.vertices[:, 0]))
+        parts = sort_parts(surface)
+    except FaceError as error:
+        raise FaceError(f"{path}: {error}") from None
+    surface = surface.chosen(np.concatenate(list(parts.parts.values())))
+    ends = np.cumsum([0] + [len(index) for index in parts.parts.values()])
+    ranges = {name: (int(ends[k]), int(ends[k + 1])) for k, name in enumerate(parts.parts)}
+    fit = behind if parts.painted else ball_of
+    balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
+    surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
+    found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.words, *parts.words]
+    if foreign:
+        found.append(f"shapes of other names are left out: {', '.join(foreign)}")
+    missing = [
+        f"{row.name}: {row.without}"
+        for row in shapes().values()
+        if row.name not in surface.moves
+        and row.without != "nothing"
+        and (parts.painted or "eyeLook" not in row.name)
+    ]
+    missing += [
+        f"{part.replace('_', ' ')}: {without}"
+        for part, without in (
+            ("tongue", "FAPs 43 to 47 move nothing"),
+            ("lower_teeth", "nothing stands behind the open lips"),
+        )
+        if part not in ranges
+    ]
+    return _Head(
+        surface, ranges, parts.painted, gltf,
+        Report(tuple(found), tuple(missing), (*pose.unsure, *parts.unsure)),
+    )  # fmt: skip
+
+
+def _write_head(path: Path, name: str, head: _Head) -> None:
+    asset = head.gltf.json["asset"]
+    extras = asset.get("extras") if isinstance(asset.get("extras"), dict) else {}
+    author = str(extras.get("author") or asset.get("generator") or "its maker")
+    licence = str(extras.get("license") or asset.get("copyright") or "not stated: ask who made it")
+    lines = {"name": name, "source": f"{head.gltf.path.name}, by {author}", "licence": licence,
+             "says": f"Imported from {head.gltf.path.name}"}  # fmt: skip
+    path.write_text(
+        "\n".join(
+            [
+                *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in lines.items()),
+                "",
+                "[parts]  # first vertex, last + 1",
+                *(f"{part} = [{first}, {last}]" for part, (first, last) in head.ranges.items()),
+                "",
+            ]
+        ),
+        "utf-8",
+    )
+
+
+def _write_mesh(
+    path: Path, surface: Surface, ranges: dict[str, tuple[int, int]], points: dict[str, Point]
+) -> None:
+    at, n = surface.vertices, len(surface.vertices)
+    part = np.empty(n, object)
+    for name, ends in ranges.items():
+        part[slice(*ends)] = name
+    casts = ~np.isin(part[surface.triangles[:, 0]].astype(str), LINED)
+    ups = vertex_normals(at, surface.triangles)
+    sees = occlusion(at, ups, surface.triangles, surface.triangles[casts], DIRECTIONS, CELL)
+    light, gloss = 0.25 + 0.75 * sees, np.zeros(n)
+    for name, ends in ranges.items():
+        gloss[slice(*ends)] = GLOSS[name]
+        if name in INSIDE:
+            # Light reaches the front of an open mouth and not its back.
+            z = at[slice(*ends), 2]
+            light[slice(*ends)] = 0.10 + 0.85 * smooth(z.max() - z, 0.030, 0.002)
+    np.savez_compressed(
+        path,
+        vertices=at.astype(np.float32),
+        triangles=surface.triangles.astype(np.int32),
+        colours=_bytes(surface.colours),
+        occlusion=_bytes(light * 255),
+        gloss=_bytes(gloss * 255),
+    )
+
+
+def _write_fields(
+    folder: Path, head: _Head, points: dict[str, Point]
+) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Write fields.npz; which FAPs the shapes serve, and what there is to say."""
+    surface, ranges = head.surface, head.ranges
+    at, (first, last) = surface.vertices, ranges["skin"]
+    places = {name: point.place for name, point in points.items()}
+    apply_zones(folder, default_setup(at, surface.triangles, places, (first, last)))
+    with np.load(folder / "fields.npz") as file:
+        stored: dict[str, Any] = {name: file[name] for name in file.files}
+    rows = unpack(stored, len(at))
+    grown = _grown(surface, ranges, points, rows)
+    made = shape_fields(grown)
+    words = _jaw(grown, surface, ranges, rows, stored, points, made)
+    for fap, field in made.items():
+        rows[fap] = _dressed(at, ranges, field, rows[fap])
+    if head.painted:
+        rows |= _looks(surface, ranges)
+    fit = behind if head.painted else ball_of
+    eyes = [fit(at[slice(*ranges[part])]) for part in ("left_eye", "right_eye")]
+    lid, lid_eye, lid_radius = sliding(rows, at, ranges, eyes)
+    if head.painted:
+        lid, lid_eye, lid_radius = lid[:0], lid_eye[:0], lid_radius[:0]
+    np.savez_compressed(
+        folder / "fields.npz",
+        **(
+            stored
+            | pack(rows)
+            | {
+                "eye_centre": np.stack([centre for centre, _ in eyes]),
+                "lid": lid.astype(np.int32),
+                "lid_eye": lid_eye.astype(np.int32),
+                "lid_radius": lid_radius.astype(np.float32),
+            }
+        ),
+    )
+    return tuple(sorted(made)), words
+
+
+def _grown(
+    surface: Surface, ranges: dict[str, tuple[int, int]], points: dict[str, Point], rows: dict[int, Float64]
+) -> Grown:
+    at, (first, last) = surface.vertices, ranges["skin"]
+    skin = surface.chosen(np.arange(first, last))
+    places = {name: point.place for name, point in points.items()}
+    sides = split_sides(at, surface.triangles, places, (first, last))
+    upper = sides["upper_lip"] - first
+    lids = {}
+    for side, word in ((1, "left"), (-1, "right")):
+        lids[side] = np.zeros(last - first)
+        lids[side][sides[f"upper_lid_{word}"] - first] = 1
+    mouth = mouth_of(skin.vertices, skin.triangles, places, upper)
+    vertex = {name: point.vertex - first for name, point in points.items() if first <= point.vertex < last}
+    zones = {fap: field[first:last] for fap, field in rows.items()}
+    return Grown(skin.vertices, skin.triangles, skin.moves, places, vertex, mouth, lids, zones)
+
+
+def _jaw(
+    grown: Grown, surface: Surface, ranges: dict[str, tuple[int, int]], rows: dict[int, Float64],
+    stored: dict[str, Any], points: dict[str, Point], made: dict[int, Float64],
+) -> tuple[str, ...]:  # fmt: skip
+    """Rows of the opening, thrust and shift of the jaw where the head has shapes for them."""
+    first, last = ranges["skin"]
+    chin = points["2.1"].vertex
+    words: tuple[str, ...] = ()
+    opening = grown.move("jawOpen")
+    if opening is not None:
+        whole, usual = surface.move("jawOpen"), np.asarray(stored["jaw_pivot"], float)
+        # Teeth go whole with the bone; skin is dragged along by less.
+        bone = slice(*ranges.get("lower_teeth", (0, 0)))
+        bone = bone if np.abs(whole[bone]).max(initial=0) > 0.004 else slice(first, last)
+        pivot, told = joint_of(surface.vertices[bone], whole[bone], usual, grown.eyes)
+        words = (f"the jaw turns about {np.round(pivot, 3).tolist()}" + ("" if told else ", by proportions"),)
+        stored["jaw_pivot"] = pivot
+        # Without its part of the lips the shape is what FAP 3 asks for.
+        opens = np.zeros(len(surface.vertices))
+        opens[first:last] = drag_of(grown.skin, opening, pivot, chin - first) * (1 - grown.held)
+        opens[first:last] /= max(float(opens[chin]), 1e-6)
+        opens = np.clip(opens, 0, 1)
+        for part in ("lower_teeth", "tongue"):
+            if part in ranges:
+                opens[slice(*ranges[part])] = 1
+        opens = _dressed(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
+        arm = surface.vertices - pivot
+        for row, way in (
+            (JAW_COS, np.stack([0 * arm[:, 0], -arm[:, 1], -arm[:, 2]], 1)),
+            (JAW_SIN, np.stack([0 * arm[:, 0], -arm[:, 2], arm[:, 1]], 1)),
+            (JAW_DROP, np.broadcast_to([0, -1.0, 0], arm.shape)),
+        ):
+            rows[row + 1] = way * opens[:, None]
+    thrust = grown.move("jawForward")
+    aside = grown.move("jawRight", "jawLeft")
+    for fap, shape in (
+        (14, None if thrust is None else thrust * [0, 0, 1]),
+        (15, None if aside is None else (grown.moves["jawRight"] - grown.moves["jawLeft"]) * [1.0, 0, 0]),
+    ):
+        field = None if shape is None else grown.exact(fap, shape)
+        if field is not None:
+            made[fap] = field
+    return words
+
+
+def _dressed(at: Float64, ranges: dict[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
+    """A row with a field of the skin on it; brows and lashes go along, other parts keep what they have."""
+    from scipy.spatial import cKDTree
+
+    first, last = ranges["skin"]
+    out = np.array(row)
+    out[first:last] = field
+    tree = cKDTree(at[first:last])
+    for name in DRESSED:
+        if name in ranges:
+            mine = slice(*ranges[name])
+            off, near = tree.query(at[mine], 3)
+            share = 1 / np.maximum(off, 1e-5)
+            out[mine] = (field[near] * (share / share.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
+    return out
+
+
+def _looks(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int, Float64]:
+    """Rows of FAPs 23 to 26, metres a radian, of eyes that are no balls: the shapes that look about."""
+    rows = {}
+    for part, word, yaw, pitch, left in (
+        ("left_eye", "Left", 23, 25, "Out"), ("right_eye", "Right", 24, 26, "In"),
+    ):  # fmt: skip
+        right = "In" if left == "Out" else "Out"
+        _, radius = behind(surface.vertices[slice(*ranges[part])])
+        for fap, one, other in ((yaw, left, right), (pitch, "Down", "Up")):
+            move = (surface.move(f"eyeLook{one}{word}") - surface.move(f"eyeLook{other}{word}")) / 2
+            size = float(np.linalg.norm(move, axis=1).max())
+            angle = float(np.arcsin(np.clip(size / max(radius, 1e-6), 0.1, 0.9)))
+            rows[fap] = move / angle
+    return rows
+
+
+def _bytes(values: Any) -> Any:
+    return np.clip(np.rint(values), 0, 255).astype(np.uint8)

@@ -1,0 +1,142 @@
+"""Pieces of surface in, one mesh out: doubled vertices are one again, and shapes bear ARKit's names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float64, Int32
+from realizer.facebuild.arkit.scene import Piece
+from realizer.tables.arkit_names import canonical
+
+__all__ = ["Surface", "joined"]
+
+SAME = 2e-6  # of the size of all; vertices nearer than that, that move alike, are one
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A head as one mesh.
+
+    Attributes:
+        vertices: (n, 3); triangles: (m, 3).
+        colours: (n, 3) sRGB 0..255.
+        piece: (n,) which piece a vertex came from; names: of each piece's material, mesh and node.
+        textured: (n,) its colour comes from a picture.
+        moves: ARKit's name -> (n, 3), at weight 1.
+    """
+
+    vertices: Float64
+    triangles: Int32
+    colours: Float64
+    piece: Int32
+    names: tuple[tuple[str, str, str], ...]
+    textured: Bool
+    moves: Mapping[str, Float64]
+
+    def move(self, name: str) -> Float64:
+        """(n, 3) what a shape does; zeros where the head lacks it."""
+        return self.moves.get(name, np.zeros_like(self.vertices))
+
+    def chosen(self, vertices: Any) -> Surface:
+        """The surface of some vertices, in the order given, and the triangles that they alone make."""
+        index = np.asarray(vertices)
+        place = np.full(len(self.vertices), -1)
+        place[index] = np.arange(len(index))
+        corners = place[self.triangles]
+        return replace(
+            self,
+            vertices=self.vertices[index],
+            triangles=corners[(corners >= 0).all(axis=1)].astype(np.int32),
+            colours=self.colours[index],
+            piece=self.piece[index],
+            textured=self.textured[index],
+            moves={name: move[index] for name, move in self.moves.items()},
+        )
+
+
+def joined(pieces: Sequence[Piece]) -> Surface:
+    """The pieces as one surface; pieces that one looks through are left out."""
+    pieces = [piece for piece in pieces if not piece.glass]
+    counts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
+    total = int(counts[-1])
+    moves: dict[str, Float64] = {}
+    for piece, first in zip(pieces, counts, strict=False):
+        for own, move in piece.moves.items():
+            name = canonical(own)
+            if name is not None:
+                # Halves of one shape add up.
+                moves.setdefault(name, np.zeros((total, 3)))[first : first + len(move)] += move
+    whole = Surface(
+        vertices=np.concatenate([piece.vertices for piece in pieces]),
+        triangles=np.concatenate([p.triangles + f for p, f in zip(pieces, counts, strict=False)]),
+        colours=np.concatenate([piece.colours for piece in pieces]),
+        piece=np.repeat(np.arange(len(pieces)), np.diff(counts)).astype(np.int32),
+        names=tuple(piece.names for piece in pieces),
+        textured=np.repeat([piece.textured for piece in pieces], np.diff(counts)),
+        moves=moves,
+    )
+    return _welded(whole)
+
+
+def _welded(surface: Surface) -> Surface:
+    """Vertices on one place that move alike are one: files double them along every seam of a texture."""
+    size = float(np.ptp(surface.vertices, axis=0).max()) or 1.0
+    told = [surface.vertices, *surface.moves.values()]
+    key = np.rint(np.concatenate(told, axis=1) / (size * SAME)).astype(np.int64)
+    _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    group = group.ravel()
+    corners = group[surface.triangles]
+    flat = (
+        (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
+    )
+    corners = corners[~flat]
+    count = np.bincount(group)[:, None]
+    colours = np.stack([np.bincount(group, surface.colours[:, k]) for k in range(3)], 1) / count
+    whole = replace(
+        surface,
+        vertices=surface.vertices[first],
+        triangles=corners.astype(np.int32),
+        colours=colours,
+        piece=surface.piece[first],
+        textured=surface.textured[first],
+        moves={name: move[first] for name, move in surface.moves.items()},
+    )
+    # What no triangle has is nothing to see.
+    return whole.chosen(np.unique(corners))
+
+
+def components(triangles: Int32, n: int) -> Int32:
+    """(n,) number of the connected piece that each vertex belongs to."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]]).T
+    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), (n, n))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int32)
+
+
+def cut(surface: Surface, height: Float64) -> Surface:
+    """What lies where `height` (n,) is above zero, cut along the line of zeros."""
+    if (height > 0).all():
+        return surface
+    import scipy.sparse as sp
+
+    from realizer.facebuild.submesh import Patch
+
+    n = len(surface.vertices)
+    flat = Patch(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)
+    piece, mix = flat.clipped(height)
+    nearest = np.asarray(mix.argmax(axis=1)).ravel()
+    return replace(
+        surface,
+        vertices=np.asarray(mix @ surface.vertices),
+        triangles=piece.triangles,
+        colours=np.asarray(mix @ surface.colours),
+        piece=surface.piece[nearest],
+        textured=surface.textured[nearest],
+        moves={name: np.asarray(mix @ move) for name, move in surface.moves.items()},
+    )

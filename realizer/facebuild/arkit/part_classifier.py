@@ -1,0 +1,227 @@
+"""A head as one mesh in, its parts out: by the names that it bears, and by what moves with what."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float64
+from realizer.core.errors import FaceError
+from realizer.facebuild.arkit.mesh_merge import Surface, components
+from realizer.tables import read_csv
+
+__all__ = ["Sorted", "sort_parts"]
+
+ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
+BALL = (0.006, 0.022)  # m, radii of eyeballs
+EYEBALL = 0.012  # m, the radius of people's eyes
+AT_EYE = 0.016  # m; a ball that has its middle so near to where the lids close is an eye
+FLOOR, ASIDE = -0.31, 0.24  # m; the bust ends there
+LOOKS = ("eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut")
+ORDER = (
+    "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "beard",
+    "hair", "shirt", "other",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Sorted:
+    """Which vertices are what.
+
+    Attributes:
+        parts: name -> (k,) vertices, in the order that the face folder keeps them.
+        painted: the eyes are no balls of their own; they are part of the skin's mesh.
+        words: what was found; unsure: what to look at.
+    """
+
+    parts: dict[str, Any]
+    painted: bool
+    words: tuple[str, ...]
+    unsure: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Rule:
+    part: str
+    pattern: str
+
+
+@cache
+def _rules() -> tuple[_Rule, ...]:
+    return read_csv(files(__package__).joinpath("parts.csv").read_text("utf-8"), _Rule, "parts.csv")
+
+
+def part_of(names: tuple[str, ...]) -> str:
+    """What the names of a material, a mesh and a node say; "" where they say nothing.
+
+    A name that says skin is a last resort: whole heads are called so, with all that is in them.
+    """
+    weak = ""
+    for name in names:
+        rule = next((rule for rule in _rules() if re.search(rule.pattern, name.lower())), None)
+        if rule is not None and rule.part != "skin":
+            return rule.part
+        weak = weak or (rule.part if rule is not None else "")
+    return weak
+
+
+def sort_parts(surface: Surface) -> Sorted:
+    """The parts of a head that stands upright in metres, its origin between the eyes.
+
+    Raises:
+        FaceError: no skin that the shapes move, or no eyes.
+    """
+    n = len(surface.vertices)
+    label = components(surface.triangles, n)
+    said = [part_of(names) for names in surface.names]
+    total = np.sum([np.linalg.norm(move, axis=1) for move in surface.moves.values()], axis=0)
+    moved = np.bincount(label, total)
+    if not moved.any():
+        raise FaceError("wanted shapes that move the skin, got none that moves a vertex")
+    of = np.full(n, -1)  # index into names
+    names = [*ORDER, "glass", "eye", "teeth", ""]
+    unsure = []
+    main = int(np.argmax(moved))
+    for k in range(label.max() + 1):
+        mine = np.flatnonzero(label == k)
+        # Where one piece of surface has several materials, the word of most of it counts.
+        votes = np.bincount([names.index(said[p]) for p in surface.piece[mine]], minlength=len(names))
+        part = names[int(np.argmax(votes))]
+        if part in ("", "skin"):
+            part = "skin" if k == main else _by_shape(surface, mine, part)
+        of[mine] = names.index(part)
+    parts = {name: np.flatnonzero(of == names.index(name)) for name in names if name}
+    words = []
+    if len(parts["glass"]):
+        words.append("left out what lies over the eyes to be seen through")
+    parts |= _eyes(surface, parts.pop("eye"))
+    painted = not len(parts["left_eye"]) or not len(parts["right_eye"])
+    if painted:
+        parts |= _painted(surface, parts)
+        words.append("the eyes are no balls of their own: the eyeLook shapes turn them")
+    upper, lower, doubt = _teeth(surface, parts.pop("teeth"))
+    parts["upper_teeth"], parts["lower_teeth"] = upper, lower
+    unsure += doubt
+    parts.pop("glass")
+    keep = _bust(surface)
+    parts = {name: parts[name][keep[parts[name]]].astype(np.int32) for name in ORDER}
+    if len(parts["other"]):
+        unsure.append(
+            f"{len(parts['other'])} vertices are of no known part, they turn with the head: name their "
+            "material hair, brows, lashes, teeth, tongue, eye, shirt or skin"
+        )
+    parts = {name: index for name, index in parts.items() if len(index)}
+    words.insert(0, ", ".join(f"{name} {len(index)}" for name, index in parts.items()) + " vertices")
+    return Sorted(parts, painted, tuple(words), tuple(unsure))
+
+
+def _by_shape(surface: Surface, mine: Any, said: str) -> str:
+    """What a piece without a telling name is."""
+    at = surface.vertices[mine]
+    middle = (at.min(axis=0) + at.max(axis=0)) / 2
+    if is_ball(at) and abs(middle[1]) < AT_EYE and 0.015 < abs(middle[0]) < 0.055 and middle[2] > -0.05:
+        return "eye"
+    if said == "skin":
+        return "skin"
+    mouth = _place(surface, "mouth")
+    if mouth is not None:
+        inside = (np.abs(at[:, 0]) < 0.035) & (at[:, 2] < mouth[2] + 0.006)
+        if inside.all() and abs(middle[1] - mouth[1]) < 0.035 and middle[2] > mouth[2] - 0.07:
+            return "tongue" if _amount(surface, mine, "tongueOut") > 0.002 else "teeth"
+    moved = max((_amount(surface, mine, name) for name in surface.moves), default=0.0)
+    return "skin" if moved > 0.004 and len(mine) > 200 else "other"
+
+
+def is_ball(at: Float64) -> bool:
+    """Whether vertices (n, 3), metres, lie on the best part of a ball of an eye's size."""
+    if len(at) < 12:
+        return False
+    centre, radius = ball_of(at)
+    off = np.abs(np.linalg.norm(at - centre, axis=1) - radius)
+    return bool(BALL[0] < radius < BALL[1] and np.percentile(off, 80) < ROUND * radius)
+
+
+def behind(at: Float64) -> tuple[Float64, float]:
+    """Centre and radius of the ball that would lie behind an eye (n, 3) that is part of the skin."""
+    middle = np.asarray((at.min(axis=0) + at.max(axis=0)) / 2)
+    return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
+
+
+def ball_of(at: Float64) -> tuple[Float64, float]:
+    """Centre and radius of the ball that fits vertices best."""
+    rows = np.c_[2 * at, np.ones(len(at))]
+    fit = np.linalg.lstsq(rows, (at**2).sum(axis=1), rcond=None)[0]
+    return fit[:3], float(np.sqrt(max(fit[3] + fit[:3] @ fit[:3], 1e-12)))
+
+
+def _place(surface: Surface, word: str) -> Float64 | None:
+    """Where the shapes of that word move most."""
+    moves = [move for name, move in surface.moves.items() if name.startswith(word) and move.any()]
+    if not moves:
+        return None
+    weight = np.sum([(move**2).sum(axis=1) for move in moves], axis=0)
+    return np.asarray((surface.vertices * weight[:, None]).sum(axis=0) / weight.sum())
+
+
+def _amount(surface: Surface, mine: Any, name: str) -> float:
+    return float(np.linalg.norm(surface.move(name)[mine], axis=1).max(initial=0))
+
+
+def _eyes(surface: Surface, mine: Any) -> dict[str, Any]:
+    x = surface.vertices[mine, 0]
+    return {"left_eye": mine[x > 0], "right_eye": mine[x < 0]}
+
+
+def _painted(surface: Surface, parts: dict[str, Any]) -> dict[str, Any]:
+    """The skin's vertices that look about: eyes that hang together with the face."""
+    out: dict[str, Any] = {}
+    skin = np.zeros(len(surface.vertices), bool)
+    skin[parts["skin"]] = True
+    for name, side in (("left_eye", "Left"), ("right_eye", "Right")):
+        looks = [np.linalg.norm(surface.move(stem + side), axis=1) for stem in LOOKS]
+        amount = np.max(looks, axis=0) * skin
+        if amount.max() <= 0:
+            raise FaceError(
+                f"wanted the {name.replace('_', ' ')}: a ball of its own, a material named eye, or the "
+                f"shapes eyeLook...{side}; got none: name the eyes' materials or meshes eye"
+            )
+        out[name] = np.flatnonzero(amount > 0.3 * amount.max()).astype(np.int32)
+    taken = np.concatenate(list(out.values()))
+    return out | {"skin": np.setdiff1d(parts["skin"], taken).astype(np.int32)}
+
+
+def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
+    """Upper and lower teeth: the lower ones go with the jaw."""
+    if not len(mine):
+        return mine, mine, []
+    drop = np.linalg.norm(surface.move("jawOpen")[mine], axis=1)
+    labels = components(surface.chosen(mine).triangles, len(mine))
+    if drop.max() > 0.004:
+        mean = np.bincount(labels, drop) / np.bincount(labels)
+        lower: Bool = mean[labels] > 0.5 * drop.max()
+        return mine[~lower], mine[lower], []
+    # The file's jaw is a bone or stands still: the names say, or else the height.
+    names = [" ".join(names).lower() for names in surface.names]
+    low = np.array([bool(re.search(r"lower|bottom|_lo", name)) for name in names])[surface.piece[mine]]
+    if low.any() and not low.all():
+        return mine[~low], mine[low], []
+    height = surface.vertices[mine, 1]
+    tops = np.bincount(labels, height) / np.bincount(labels)
+    lower = tops[labels] < (height.min() + height.max()) / 2
+    return (
+        mine[~lower],
+        mine[lower],
+        ["jawOpen does not move the teeth: parted by their height, look at them"],
+    )
+
+
+def _bust(surface: Surface) -> Bool:
+    """(n,) what belongs to head and shoulders; hands and feet do not."""
+    at = surface.vertices
+    keep: Bool = (at[:, 1] > FLOOR) & (np.abs(at[:, 0]) < ASIDE)
+    return keep

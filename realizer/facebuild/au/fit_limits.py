@@ -1,0 +1,107 @@
+"""How far a fitted unit may move anything: the places of a face that are watched in, what goes too far out.
+
+A fit sees landmarks, not what lies between and behind them: there a sum of Gaussians can grow to metres and
+no table shows it. So no vertex of the face, hidden ones too, goes much further than the furthest landmark;
+nor does what lies between them, where a mesh of another topology may have its vertices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.face.au.functions import density
+from realizer.face.au.model import Model, Mouth, UnitModel
+from realizer.face.au.mouth import shares
+from realizer.face.model import Face
+from realizer.facebuild.au.measure import Measured
+
+__all__ = ["FURTHEST", "Watched", "furthest", "overshoot", "runaways", "watched"]
+
+PARTS = ("skin", "lashes", "brows", "hair")  # what units move
+FURTHEST = 1.3  # times d_max: further no vertex goes
+FREE = 1.1  # times d_max; up to here a fit pays nothing,
+STEEP = 10.0  # and from here on this times what it overshoots, squared
+REACH = 1e-3  # share of a half that counts as belonging to it
+
+
+class Watched:
+    """Places of a face where a fit is held.
+
+    Attributes:
+        at: (n, 3) metres, all on the left (x >= 0).
+        upper: (n,) how far each belongs to the upper half, as the face's topology has it.
+        plane: (n,) and as the mouth's plane does.
+    """
+
+    def __init__(self, at: Float64, upper: Float64, plane: Float64) -> None:
+        self.at, self.upper, self.plane = at, upper, plane
+
+    def of(self, half: str) -> Float64:
+        """The places (k, 3) that a half's motion has any part in: "whole", "upper" or "lower"."""
+        if half == "whole":
+            return self.at
+        most, least = np.maximum(self.upper, self.plane), np.minimum(self.upper, self.plane)
+        return self.at[most > REACH if half == "upper" else least < 1 - REACH]
+
+
+def watched(face: Face, mouth: Mouth, between: bool = False) -> Watched:
+    """Every vertex that units move, mirrored onto the left.
+
+    Args:
+        between: the middles of the skin's triangles and of their edges too.
+    """
+    mine = np.concatenate([np.arange(*face.parts[part]) for part in PARTS if part in face.parts])
+    every, half = face.vertices.astype(np.float64), shares(face, mouth)
+    at, upper = every[mine], half[mine]
+    if between:
+        first, last = face.parts["skin"]
+        skin = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)]
+        for some in (skin, skin[:, :2], skin[:, 1:], skin[:, ::2]):
+            at = np.concatenate([at, every[some].mean(axis=1)])
+            upper = np.concatenate([upper, half[some].mean(axis=1)])
+    plane = mouth.upper(at)
+    # The left, and of the right what has no twin there.
+    at = at * np.where(at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
+    _, once = np.unique(np.rint(np.c_[at * 1e5, upper, plane]), axis=0, return_index=True)
+    return Watched(at[once], upper[once], plane[once])
+
+
+def furthest(unit: UnitModel, mouth: Mouth, places: Watched) -> tuple[float, Float64]:
+    """How far, in metres, a unit moves the place that it moves most, and which that is, (3,)."""
+    both = [unit.displacement(places.at, mouth, upper) for upper in (places.upper, places.plane)]
+    long = np.maximum(*(np.linalg.norm(moves, axis=1) for moves in both))
+    worst = int(np.argmax(long))
+    return float(long[worst]), places.at[worst]
+
+
+def overshoot(gaussians: Float64, at: Float64) -> tuple[Float64, Float64]:
+    """What a density costs by going too far: residuals (k,), and their derivatives (k, parameters).
+
+    Args:
+        gaussians: (g, 10), heights in d_max.
+        at: (n, 3) in the functions' coordinates; k of them lie beyond what is free.
+    """
+    value, slopes = density(gaussians, at)
+    over = np.abs(value) > FREE
+    sign = STEEP * np.sign(value[over])
+    return np.abs(sign) * (np.abs(value[over]) - FREE), sign[:, None] * slopes[over]
+
+
+def runaways(face: Face, model: Model, measured: Mapping[int, Measured]) -> tuple[str, ...]:
+    """A sentence for each unit that moves a vertex of the face further than `FURTHEST` times d_max."""
+    places = watched(face, model.mouth)
+    out = []
+    for au, one in measured.items():
+        if au in model.units:
+            d_max = float(np.linalg.norm(one.moves[one.seen], axis=1).max())
+            far, where = furthest(model.units[au], model.mouth, places)
+            if far > FURTHEST * d_max:
+                x, y, z = (1000 * where).round(1).tolist()
+                out.append(
+                    f"AU{au} moves the place {x}, {y}, {z} mm by {1000 * far:.1f} mm, "
+                    f"and nothing was measured to move more than {1000 * d_max:.1f}"
+                )
+    return tuple(out)

@@ -1,0 +1,177 @@
+"""Displacement fields in, the same out without triangles that turn over when they are played."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float32, Float64, Int32
+from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS
+from realizer.face.contours import CONTOURS, Contours, contours_of, together
+from realizer.face.deform import jaw_pose
+from realizer.face.model import Fapu
+from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, borne, company
+from realizer.tables import faps
+
+__all__: list[str] = []
+
+ROUNDS = 60
+PASSES = 2  # neighbours that were mended change what a field has to fit
+STILL = 1e-4
+SHARE = 0.5  # of the way to the mean of the triangles that turn over, each round
+
+
+# The lips' fields add up to one along a lip, so what softens one of them has to soften all.
+LIPS = frozenset({*range(4, 14), *range(51, 61), 16, 17})
+JAW = (JAW_COS + 1, JAW_SIN + 1, JAW_DROP + 1)
+
+
+def turned(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
+    """(m,) which triangles face away from where they faced at rest: turned past the angle of this cosine."""
+    before, after = _ups(rest[triangles]), _ups(now[triangles])
+    sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    away: Bool = np.asarray((before * after).sum(axis=1) < cosine * sizes)
+    return away
+
+
+def untangled(
+    fields: Float64,
+    at: Float64,
+    triangles: Int32,
+    plays: Sequence[tuple[Float64, Any, float]],
+    fixed: Collection[int],
+) -> Float64:
+    """The fields, softened alike around the triangles that they turn over, until they turn none over.
+
+    Args:
+        fields: (g, n, 3) metres for each metre that is asked; at: (n, 3) metres; triangles: (m, 3).
+        plays: (g,) metres (signed) by which the fields are played, each with what moves along then,
+            (n, 3), and the cosine of the turn that counts.
+        fixed: vertices that keep their move.
+    """
+    out = fields.copy()
+    free = np.ones(len(at), bool)
+    free[list(fixed)] = False
+    for _ in range(ROUNDS):
+        bad = np.zeros(len(triangles), bool)
+        for amounts, along, cosine in plays:
+            bad |= turned(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
+        if not bad.any():
+            break
+        # A triangle that moves as one cannot turn over.
+        corners = triangles[bad]
+        count = np.bincount(corners.ravel(), minlength=len(at))
+        loose = np.flatnonzero((count > 0) & free)
+        step = np.empty((len(out), len(loose), 3))
+        for k, field in enumerate(out):
+            pulled = np.zeros_like(at)
+            np.add.at(pulled, corners.ravel(), np.repeat(field[corners].mean(axis=1), 3, axis=0))
+            step[k] = SHARE * (pulled[loose] / count[loose, None] - field[loose])
+        if np.abs(step).max(initial=0.0) < STILL:
+            break  # what is left comes from what moves along
+        out[:, loose] += step
+    return out
+
+
+def without_flips(
+    fields: Mapping[int, Float64],
+    at: Float64,
+    triangles: Int32,
+    points: Mapping[str, int],
+    fapu: Fapu,
+    pivot: Float64,
+    twin: Int32,
+) -> dict[int, Float64]:
+    """Fields of FAPs that turn no triangle over; feature points keep their moves.
+
+    Each is played as far as a face must bear, with the contour of the lips that it drags along or that goes
+    with it, and with all that the action unit asks for that asks most of it.
+
+    Args:
+        fields: row number (`basis`) -> (n, 3); at: (n, 3) metres; triangles: (m, 3).
+        points: feature point -> vertex; pivot: (3,), where the jaw turns.
+        twin: (n,) each vertex's mirror image, itself where it has none.
+    """
+    out = {number: np.array(field, np.float64) for number, field in fields.items()}
+    contours = contours_of(
+        {name: np.asarray(at[vertex], np.float32) for name, vertex in points.items()}, fapu
+    )
+    chin = at[points["2.1"], 1:] - pivot[1:]
+    fixed = np.zeros(len(at), bool)
+    fixed[list(points.values())] = True
+    for _ in range(PASSES):
+        for asked_by, mended in _groups(out):
+            mine = np.any([np.abs(out[n]).any(axis=1) for n in mended], axis=0)
+            near = triangles[mine[triangles].any(axis=1)]
+            if not len(near):
+                continue
+            here, local = np.unique(near, return_inverse=True)
+            rest = sorted(set(out) - set(mended))
+            fixed_fields = np.stack([out[n][here] for n in rest])
+            plays = []
+            for values, cosine in _played(asked_by, contours):
+                metres = _metres(values, fapu, chin)
+                along = np.tensordot(metres[np.array(rest) - 1], fixed_fields, 1)
+                plays.append((metres[np.array(mended) - 1], along, cosine))
+            soft = untangled(
+                np.stack([out[n][here] for n in mended]),
+                at[here], local.reshape(near.shape), plays, np.flatnonzero(fixed[here]).tolist(),
+            )  # fmt: skip
+            for number, field in zip(mended, soft, strict=True):
+                out[number][here] = field
+        out = even(out, twin)
+    return out
+
+
+def _groups(fields: Mapping[int, Float64]) -> list[tuple[list[int], list[int]]]:
+    """FAPs that are played, with the rows that are softened alike: a FAP with its twin, all lips, the jaw."""
+    table = faps()
+    left = [n for n in sorted(fields) if n <= FAPS and n not in LIPS]
+    pairs = sorted({tuple(sorted({n, table[n - 1].mirror})) for n in left})
+    jaw = [([OPEN_JAW], [n for n in JAW if n in fields])]
+    lips = sorted(LIPS & set(fields))
+    groups = [*jaw, *((list(pair), list(pair)) for pair in pairs), (lips, lips)]
+    return [(asked, mended) for asked, mended in groups if mended]
+
+
+def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, float]]:
+    """FAP values (68,) that every one of the FAPs must bear, each with the cosine of the turn that counts."""
+    table, out = faps(), []
+    partner = {**CONTOURS, **{outer: inner for inner, outer in CONTOURS.items()}}
+    for number in numbers:
+        for sign in (1, -1) if table[number - 1].least < 0 else (1,):
+            asked = np.zeros((3, FAPS), np.float32)
+            asked[:2, number - 1] = sign * borne(number, sign)
+            asked[1, partner.get(number, number) - 1] = asked[0, number - 1]
+            for fap, value in company(number, sign).items():
+                asked[2, fap - 1] = value
+            alone, paired, accompanied = together(contours, asked)
+            out += [(alone, 0.0), (paired, 0.0), (accompanied, ROLLED)]
+    return out
+
+
+def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
+    """(73,): what the rows are multiplied by under FAP values (68,)."""
+    out = np.zeros(ROWS)
+    out[:FAPS] = values * [fapu.metres(row.unit) for row in faps()]
+    turn, slid = jaw_pose({"chin": chin}, out[OPEN_JAW - 1])
+    out[[JAW_COS, JAW_SIN, JAW_DROP]] = 1 - np.cos(turn), np.sin(turn), slid
+    out[OPEN_JAW - 1] = 0
+    return out
+
+
+def even(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]:
+    """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
+    table, flip = faps(), np.array([-1.0, 1.0, 1.0])
+    out = {}
+    for number, field in fields.items():
+        mirror, sign = (table[number - 1].mirror, table[number - 1].sign) if number <= FAPS else (number, 1)
+        out[number] = (field + sign * fields[mirror][twin] * flip) / 2
+    return out
+
+
+def _ups(corners: Float64) -> Float64:
+    a, b, c = corners.transpose(1, 0, 2)
+    return np.asarray(np.cross(b - a, c - a))

@@ -1,0 +1,74 @@
+"""The base mesh with its identity and shapes: what every displacement field is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from realizer.core.array_types import Float64
+from realizer.face.features import fapu_of
+from realizer.face.model import Fapu
+from realizer.facebuild.person.makehuman import BaseMesh
+
+__all__: list[str] = []
+
+Shape = Callable[[str], Float64]
+UP, LEFT, FORWARD = np.array([0, 1.0, 0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
+
+
+class Ground:
+    """What all fields are made from.
+
+    Attributes:
+        at: (n, 3) metres, the base mesh with its identity.
+        points: feature point -> base vertex.
+        shape: name of a face unit -> (n, 3) metres.
+        average: (n, n) sparse; a vertex's neighbours and itself in equal parts.
+    """
+
+    def __init__(self, mesh: BaseMesh, at: Float64, points: Mapping[str, int], shape: Shape) -> None:
+        self.mesh, self.at, self.points, self.shape = mesh, at, points, shape
+        n = len(at)
+        quads = mesh.quads["body"]
+        a = np.concatenate([quads[:, k] for k in range(4)])
+        b = np.concatenate([quads[:, (k + 1) % 4] for k in range(4)])
+        near = sp.csr_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (n, n))
+        near.data[:] = 1
+        near = near + sp.eye_array(n, format="csr")
+        self.average = sp.csr_matrix(sp.diags_array(1 / np.asarray(near.sum(axis=1)).ravel()) @ near)
+        self.body = np.zeros(n, bool)
+        self.body[np.unique(quads)] = True
+
+    def point(self, name: str) -> Float64:
+        """Where a feature point lies, (3,) metres."""
+        return np.asarray(self.at[self.points[name]])
+
+    def fapu(self) -> Fapu:
+        """The person's distances; pupils stand before the middle of the lids."""
+        places = {name: np.asarray(self.at[vertex], np.float32) for name, vertex in self.points.items()}
+        for name, high, low in (("3.5", "3.1", "3.3"), ("3.6", "3.2", "3.4")):
+            places[name] = np.asarray((places[high] + places[low]) / 2, np.float32)
+        return fapu_of(places)
+
+    def smoothed(self, field: Float64, times: int = 1) -> Float64:
+        """A field on the body with its kinks softened."""
+        for _ in range(times):
+            field = np.asarray(self.average @ field)
+        return field
+
+    def ellipsoid(self, centre: Any, radii: Any, plateau: float = 0.0) -> Float64:
+        """Influence (n,) of an ellipsoid: 1 at the centre, 0 outside (Paul 2010, 4.3.3)."""
+        away = np.linalg.norm((self.at - np.asarray(centre)) / np.asarray(radii), axis=1)
+        away = np.clip((away - plateau) / (1 - plateau), 0, 1)
+        return np.where(self.body, (1 + np.cos(np.pi * away)) / 2, 0.0)
+
+
+def scaled(field: Float64, vertex: int, direction: Any) -> Float64:
+    """The field with a move of exactly 1 along the direction at the vertex."""
+    here = float(field[vertex] @ np.asarray(direction))
+    if abs(here) < 1e-9:
+        raise ValueError(f"a field that leaves its feature point's vertex {vertex} still cannot be scaled")
+    return np.asarray(field / here)

@@ -1,0 +1,156 @@
+"""A person and their recipe in, the parts of their bust out, with baked light."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float64
+from realizer.facebuild import parts
+from realizer.facebuild.parts import Part, smooth
+from realizer.facebuild.person import clothing, skin_colours
+from realizer.facebuild.person.appearance import look_of
+from realizer.facebuild.person.brows import brow, lashes
+from realizer.facebuild.person.hair import hair, scalp_of, shadow, style_of
+from realizer.facebuild.person.lids import Lid
+from realizer.facebuild.person.lips import Lips
+from realizer.facebuild.person.person import Person
+from realizer.facebuild.person.recipe import Recipe
+from realizer.facebuild.person.scalp import Scalp
+from realizer.facebuild.submesh import Patch, vertex_normals
+
+__all__: list[str] = []
+
+ORDER = (
+    "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
+    "shirt",
+)  # fmt: skip
+# Behind closed lips, or too thin: they cast no shadow.
+SHADOWLESS = ("upper_teeth", "lower_teeth", "tongue", "brows", "lashes")
+MARGIN = 0.08  # m below the floor that the body is cut at by whole triangles first
+# Metres from the middle of the closed lips (2.2): how far the biting edges lie behind it and above it.
+BITE = {"upper_teeth": (0.0068, -0.0012), "lower_teeth": (0.0098, 0.0014)}
+RED_RINGS = 9  # of the lips' rings, from inside to just beyond the border of the red
+LOWER_ARCH = 0.0015  # m that the lower arch is narrower at each side
+TONGUE = np.array([0, -0.0085, -0.0055])  # m that the tongue rests lower and further back than in the data
+
+
+def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> list[Part]:
+    """The parts in the order that a face's vertices have, with baked occlusion."""
+    ground, look = person.ground, recipe.colours
+    at, n = ground.at, len(ground.at)
+    points = {name: ground.point(name) for name in ground.points}
+    body = Patch.of_quads(ground.mesh.quads["body"], n)
+    body = body.kept((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
+    body = body.clipped(body.positions(at)[:, 1] - person.floor)[0]
+    own = look_of(recipe.look)
+    dressed = clothing.under_collar(
+        body.positions(at), points["2.1"], person.face, own.collar_low, own.collar_point
+    )
+    skin = body.clipped(0.012 - dressed)[0]
+    # A vertex more between any two along the lips: they bend most.
+    single = np.diff(skin.mix.indptr) == 1
+    place = np.full(n, -1)
+    place[skin.mix.indices[skin.mix.indptr[:-1][single]]] = np.flatnonzero(single)
+    skin = skin.threaded([place[ring].tolist() for ring in lips.rings[:RED_RINGS]])
+    style = style_of(recipe.hair)
+    scalp = scalp_of(skin, at, points, style)
+    colours, gloss = skin_colours.paint_skin(ground, lips, [lid.rings for lid in lids], look, own)
+    roots = shadow(scalp, style, at)[:, None]
+    colours = colours * (1 - roots) + np.array(look["hair"], float) * roots
+    tints, shine = np.asarray(skin.mix @ colours), np.asarray(skin.mix @ gloss)
+    ring = np.where(lips.inside, 0, len(lips.rings) + 2.0)
+    for k, loop in enumerate(lips.rings):
+        ring[loop] = k
+    strength = own.lips * (1 - 0.25 * own.age)
+    skin_colours.paint_lips(
+        tints,
+        shine,
+        skin.mix @ ring,
+        skin.mix @ lips.u,
+        skin.mix @ (lips.is_upper * 1.0),
+        look["lips"],
+        strength,
+    )
+    made = [Part("skin", skin, skin.positions(at), skin.triangles, tints, shine)]
+    made += [brow(skin, at, tints, points, side, look["brows"], own) for side in (1, -1)]
+    for lid, (centre, _) in zip(lids, person.balls, strict=True):
+        made.append(lashes(at, lid, centre, look["skin"], look["lashes"], own))
+    for name, side, (centre, radius) in zip(("left_eye", "right_eye"), (1, -1), person.balls, strict=True):
+        made.append(parts.eyeball(name, centre, radius, look, -side))
+    made += _teeth(person, recipe)
+    made.append(_tongue(person, recipe))
+    made += hair(scalp, style, look)
+    made.append(clothing.shirt(body, at, dressed, look["shirt"]))
+    made = sorted(made, key=lambda part: ORDER.index(part.name))
+    _bake(made)
+    stays = np.zeros(n, bool)
+    stays[list(ground.points.values())] = True
+    stays[lips.fade > 0.5] = True
+    made = [_spared(part, person, scalp, stays) for part in made]
+    _line_mouth(made[0], person, lips, look)
+    return made
+
+
+def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[float]]) -> None:
+    patch = skin.patch
+    assert patch is not None
+    assert skin.occlusion is not None
+    deep = person.ground.point("2.2")[2] - skin.vertices[:, 2]
+    # Right behind the corners it stays dark: seen from the side, closed lips show a hair of it.
+    corners = smooth(np.abs(lips.u), 0.70, 0.92) * smooth(lips.fade, 0.45, 0.75)
+    share = patch.mix @ (lips.inside * (1 - corners))
+    skin_colours.paint_mouth(skin.colours, skin.gloss, skin.occlusion, share, deep, colours)
+
+
+def _spared(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
+    """What is hidden or plain goes; feature points, lips and the mouth behind them stay."""
+    if part.name not in ("skin", "tongue", "shirt") or part.patch is None:
+        return part
+    single = np.diff(part.patch.mix.indptr) == 1
+    keep = single & stays[part.patch.mix.indices[part.patch.mix.indptr[:-1]]]
+    chin = float(person.ground.point("2.1")[1])
+    return clothing.spared(part, keep, scalp.off_ear(part.vertices) < 0, chin, person.floor)
+
+
+def _teeth(person: Person, recipe: Recipe) -> list[Part]:
+    bite = person.ground.point("2.2")
+    width, depth = person.arch
+    made = []
+    for name, (back, rise) in BITE.items():
+        front = np.array([0, bite[1] + rise, bite[2] - back])
+        narrow = LOWER_ARCH if name == "lower_teeth" else 0
+        made.append(parts.teeth(name, front, width - narrow, depth, recipe.colours))
+    return made
+
+
+def _tongue(person: Person, recipe: Recipe) -> Part:
+    ground = person.ground
+    tongue = Patch.of_quads(ground.mesh.quads["helper-tongue"], len(ground.at))
+    tongue = tongue.moved(np.repeat(TONGUE[None], len(tongue), 0))
+    place = tongue.positions(ground.at)
+    # Darker in the groove along the middle and at the sides.
+    across = np.abs(place[:, 0]) / np.abs(place[:, 0]).max()
+    shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
+    colours: Float64 = np.array(recipe.colours["tongue"], float) * shade[:, None]
+    deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
+    light = 0.60 * smooth(deep, 0.58, 0.0) + 0.06
+    return Part("tongue", tongue, place, tongue.triangles, colours, np.full(len(place), 0.35), light)
+
+
+def _bake(made: list[Part]) -> None:
+    """Occlusion of every part that has none."""
+    count = np.cumsum([0] + [len(part.vertices) for part in made])
+    vertices = np.concatenate([part.vertices for part in made])
+    ups = np.concatenate([vertex_normals(part.vertices, part.triangles) for part in made])
+    casts = np.concatenate(
+        [
+            part.triangles + first
+            for part, first in zip(made, count, strict=False)
+            if part.name not in SHADOWLESS
+        ]
+    )
+    sees = skin_colours.occlusion(vertices, ups, casts)
+    for part, first in zip(made, count, strict=False):
+        if part.occlusion is None:
+            mine = sees[first : first + len(part.vertices)]
+            part.occlusion = 0.25 + 0.75 * mine

@@ -1,0 +1,263 @@
+"""Displacement fields of the FAPs on the base mesh: identity and expression shapes in, one field a FAP out.
+
+Every field is scaled so that its feature point moves one metre for each metre asked, in the FAP's direction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
+from realizer.facebuild.fix_flipped import even, without_flips
+from realizer.facebuild.parts import smooth
+from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
+from realizer.facebuild.person.lids import lid_fields
+from realizer.facebuild.person.lips import Lips, lip_fields
+
+__all__: list[str] = []
+
+BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
+PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
+SINKS = 0.35, 0.70  # how far the tongue's back and tip sink with the jaw: a tongue is lifted, or none is seen
+CLIMB = 0.4  # metres that the tongue's tip rises for each metre forwards
+SLACK = 30  # times that the throat's part in the jaw is softened
+LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
+
+
+def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:
+    """Row number (FAP number, or 70..73: `basis`) -> (n, 3) field on the base mesh; and what the lips are."""
+    lips = Lips(ground)
+    fields = lip_fields(ground, lips)
+    fields |= _jaw(ground, lips, jaw_pivot)
+    fields |= lid_fields(ground)
+    fields |= _brows(ground)
+    fields |= _cheeks(ground, lips)
+    fields |= _nose(ground, lips)
+    fields |= _ears(ground)
+    fields |= _tongue(ground)
+    return _untangled(ground, _mirrored(ground, fields), jaw_pivot), lips
+
+
+def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> dict[int, Float64]:
+    """The fields without triangles of the skin that turn over."""
+    quads = ground.mesh.quads["body"]
+    near = quads[(ground.at[quads, 1] > LOWEST).all(axis=1)]
+    triangles = np.concatenate([near[:, [0, 1, 2]], near[:, [0, 2, 3]]]).astype(np.int32)
+    return without_flips(
+        fields, ground.at, triangles, ground.points, ground.fapu(), pivot, ground.mesh.mirror()
+    )
+
+
+def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
+    """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
+    return even(fields, ground.mesh.mirror())
+
+
+def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
+    # How far the chin drags each vertex of the skin: the CC0 shape of an opening jaw, measured by its fall.
+    shape = ground.shape("jawOpen")
+    chin = ground.points["2.1"]
+    drag = np.clip(np.linalg.norm(shape, axis=1) / np.linalg.norm(shape[chin]), 0, 1)
+    drag = np.where(ground.body, drag, 0)
+    drag = ground.smoothed(drag, 2)
+    under = smooth(drag, 0.0, 0.9) * 0.5 + drag * 0.5
+    # Below and behind the chin the skin is slack: it folds over a longer way.
+    throat = smooth(ground.at[:, 1], ground.point("2.1")[1] + 0.001, ground.point("2.1")[1] - 0.012)
+    under += throat * (ground.smoothed(under, SLACK) - under)
+    drag = under / under[chin]
+    drag = np.minimum(drag, 1)
+    along = _along_tongue(ground)
+    tongue = (along >= 0) * 1.0
+    opens = drag * (1 - lips.around) + tongue * np.interp(along, (0, 1), SINKS)
+    arm = ground.at - pivot
+    turn_cos, turn_sin = np.zeros_like(arm), np.zeros_like(arm)
+    # Turned by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
+    turn_cos[:, 1:] = -arm[:, 1:]
+    turn_sin[:, 1], turn_sin[:, 2] = -arm[:, 2], arm[:, 1]
+    # Thrust and shift take the lower lip along; the upper one stays.
+    # The corners, shared by both, go 0.4 of the way.
+    # The lips are stretched between: a shelf at the corner would show.
+    lip = np.where(
+        lips.is_upper, 0.4 * smooth(np.abs(lips.u), 0.4, 1.0), 1 - 0.6 * smooth(np.abs(lips.u), 0.2, 1.0)
+    )
+    slides = drag * (1 - lips.lips + lips.lips * lip) + tongue
+    slides /= slides[chin]
+    return {
+        JAW_COS + 1: turn_cos * opens[:, None],
+        JAW_SIN + 1: turn_sin * opens[:, None],
+        JAW_DROP + 1: -opens[:, None] * UP,
+        14: slides[:, None] * FORWARD,
+        15: -slides[:, None] * LEFT,
+    }
+
+
+def _brows(ground: Ground) -> dict[int, Float64]:
+    at, points = ground.at, ground.points
+    raise_ = sum(
+        (ground.shape(name) for name in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")),
+        np.zeros_like(at),
+    )
+    raise_ = np.where(ground.body[:, None], raise_, 0)
+    stations = [ground.point(name) for name in ("4.1", "4.3", "4.5")]
+    across = np.array([p[0] for p in stations])
+    line = [raise_[points[name], 1] for name in ("4.1", "4.3", "4.5")]
+    # 1 all along the brow, falling off above and below as the shape does.
+    local = np.interp(np.abs(at[:, 0]), across, line)
+    profile = raise_ / local[:, None]
+    profile[:, 1] = np.clip(profile[:, 1], 0, 1.25)
+    profile[:, 0] = 0
+    profile[:, 2] = np.clip(profile[:, 2], -0.6, 0.6)
+    # The lid's edge does not follow the brow: FAPs 19 and 20 own it.
+    calm = 1 - np.maximum(
+        ground.ellipsoid(ground.point("3.1"), (0.024, 0.0095, 0.03), 0.5),
+        ground.ellipsoid(ground.point("3.2"), (0.024, 0.0095, 0.03), 0.5),
+    )
+    profile = ground.smoothed(profile * calm[:, None], 2)
+    out = {}
+    for side, (names, numbers) in {
+        1: (("4.1", "4.3", "4.5"), (31, 33, 35)),
+        -1: (("4.2", "4.4", "4.6"), (32, 34, 36)),
+    }.items():
+        inner, middle, outer = _stations(at[:, 0] * side, across)
+        for number, name, share in zip(numbers, names, (inner, middle, outer), strict=True):
+            out[number] = scaled(profile * share[:, None], points[name], UP)
+    _soften(ground, out, [points[f"4.{k}"] for k in range(1, 7)], [31, 32, 33, 34, 35, 36])
+    for number, name, side in ((37, "4.1", 1), (38, "4.2", -1)):
+        x = at[:, 0] * side
+        reach = ground.ellipsoid(ground.point(name), (0.036, 0.024, 0.03)) * smooth(x, 0.0, across[0])
+        field = reach[:, None] * (-side * LEFT + 0.15 * FORWARD) * calm[:, None]
+        out[number] = scaled(ground.smoothed(field, 1), points[name], -side * LEFT)
+    return out
+
+
+def _stations(x: Float64, across: Float64) -> tuple[Float64, Float64, Float64]:
+    """(n,) each: how much of a side's inner, middle and outer brow a place at x has; 1 at its own station.
+
+    A bent strip, not a chain of straight ones: the curve through the stations has no corner anywhere, and at
+    the other side's inner end it is still.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    a, b, c = across
+    knots = np.array([-a, a, b, c])
+    out = []
+    for station in range(3):
+        value = np.zeros(4)
+        value[1 + station] = 1
+        slope = np.zeros(4)
+        slope[1:3] = (value[2:] - value[:2]) / (knots[2:] - knots[:2])
+        spline = CubicHermiteSpline(knots, value, slope * BEND)
+        out.append(np.asarray(spline(np.clip(x, -a, c)), np.float64))
+    return out[0], out[1], out[2]
+
+
+def _soften(
+    ground: Ground, fields: dict[int, Float64], points: list[int], numbers: list[int], times: int = 2
+) -> None:
+    """Take the kinks off fields of one way, and mix them so that each leaves the others' points alone."""
+    soft = np.stack([ground.smoothed(fields[number], times) for number in numbers])
+    mixed = np.linalg.solve(soft[:, points, 1].T, np.eye(len(points)))
+    for k, number in enumerate(numbers):
+        fields[number] = np.tensordot(mixed[:, k], soft, 1)
+
+
+def _halves(ground: Ground, shape: Float64) -> dict[int, Float64]:
+    """A shape's left (1) and right (-1) half, joined smoothly at the middle."""
+    return {side: shape * smooth(ground.at[:, 0] * side, -0.008, 0.008)[:, None] for side in (1, -1)}
+
+
+def _cheeks(ground: Ground, lips: Lips) -> dict[int, Float64]:
+    points, out = ground.points, {}
+    free = (1 - lips.lips)[:, None]
+    far = smooth(lips.away, 0.0, 0.032)[:, None]
+    for side, half in _halves(ground, ground.shape("cheekPuff") * far).items():
+        number, name = (39, "5.1") if side > 0 else (40, "5.2")
+        size = ground.smoothed(np.where(ground.body, np.linalg.norm(half, axis=1), 0), 2)
+        # A cheek is blown up from inside the mouth: away from there, not along one line.
+        away = ground.at - (ground.point(name) - PUFFED_FROM * np.array([side, 1, 1]))
+        away /= np.maximum(np.linalg.norm(away, axis=1), 0.010)[:, None]
+        out[number] = scaled(size[:, None] * away, points[name], side * LEFT)
+    for side, (number, name, shape) in {
+        1: (41, "5.3", "cheekSquintLeft"),
+        -1: (42, "5.4", "cheekSquintRight"),
+    }.items():
+        lifted = np.where(ground.body[:, None], ground.shape(shape), 0) * free
+        eye = ground.point("3.3" if side > 0 else "3.4")
+        lifted = (
+            lifted * (1 - ground.ellipsoid(eye + np.array([0, 0.004, 0]), (0.026, 0.018, 0.03), 0.2))[:, None]
+        )
+        mound = ground.ellipsoid(ground.point(name), (0.034, 0.026, 0.036))[:, None] * (UP + 0.35 * FORWARD)
+        here = lifted[points[name], 1]
+        mixed = mound + 0.5 * (lifted / here if here > 1e-4 else 0)
+        # The lid's edge belongs to other FAPs.
+        rest = 1 - ground.ellipsoid(eye + np.array([0, 0.002, 0]), (0.030, 0.014, 0.03), 0.30)
+        out[number] = scaled(ground.smoothed(mixed * free * rest[:, None], 3), points[name], UP)
+    return out
+
+
+def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
+    points, free = ground.points, (1 - lips.lips)[:, None]
+    out = {}
+    for number, name, side, base in ((61, "9.1", 1, "9.5"), (62, "9.2", -1, "9.4")):
+        # A nostril widens away from its middle, not along one line (Paul 2010, 4.4.3).
+        wing = ground.point(name)
+        nostril = (wing + ground.point(base)) / 2
+        reach = ground.ellipsoid(wing - 0.002 * side * LEFT, (0.015, 0.014, 0.018), 0.1) * smooth(
+            ground.at[:, 0] * side, 0.000, 0.009
+        )
+        spread = (ground.at - nostril) / np.linalg.norm(wing - nostril)
+        way = 0.5 * side * LEFT + 0.5 * np.clip(spread, -1.2, 1.2)
+        out[number] = scaled(ground.smoothed(reach[:, None] * way, 2), points[name], side * LEFT)
+    tip = ground.point("9.3")
+    reach = ground.ellipsoid(tip - [0, 0.001, 0.008], (0.025, 0.024, 0.032), 0.35)[:, None]
+    out[63] = scaled(ground.smoothed(reach * (UP + 0.1 * FORWARD) * free, 1), points["9.3"], UP)
+    reach = ground.ellipsoid(tip - [0, -0.004, 0.008], (0.026, 0.030, 0.032), 0.2)[:, None]
+    out[64] = scaled(ground.smoothed(reach * -LEFT * free, 1), points["9.3"], -LEFT)
+    return out
+
+
+def _ears(ground: Ground) -> dict[int, Float64]:
+    points, out = ground.points, {}
+    for side, names in {1: ("10.1", "10.3", 65, 67), -1: ("10.2", "10.4", 66, 68)}.items():
+        top, back, up, pull = names
+        centre = (ground.point(top) + ground.point("10.5" if side > 0 else "10.6")) / 2
+        reach = ground.ellipsoid(centre + np.array([0.006 * side, 0, -0.004]), (0.024, 0.048, 0.032), 0.60)
+        reach = ground.smoothed(reach, 1)[:, None]
+        out[up] = scaled(reach * UP, points[top], UP)
+        # Pulled out, the ear swings about its front edge.
+        swing = reach * smooth(centre[2] - ground.at[:, 2], -0.016, 0.010)[:, None]
+        out[pull] = scaled(swing * side * LEFT, points[back], side * LEFT)
+    return out
+
+
+def _along_tongue(ground: Ground) -> Float64:
+    """(n,) 0 at the tongue's back, 1 at its tip; -1 on all that is no tongue."""
+    mine = np.unique(ground.mesh.quads["helper-tongue"])
+    depth = ground.at[mine, 2]
+    along = np.full(len(ground.at), -1.0)
+    along[mine] = (depth - depth.min()) / np.ptp(depth)
+    return along
+
+
+def _tongue(ground: Ground) -> dict[int, Float64]:
+    at, along = ground.at, _along_tongue(ground)
+    mine = along >= 0
+    along = np.maximum(along, 0)
+    tip, body = ground.points["6.1"], ground.points["6.2"]
+    bend = smooth(along, 0.35, 1.0) * along
+    arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * mine
+    edge = smooth(along, 0.30, 0.65) * mine
+    # Rolled by a about its middle line: the borders rise, whichever side they are on.
+    turn_cos, turn_sin = np.zeros_like(at), np.zeros_like(at)
+    turn_cos[:, 0] = -at[:, 0] * edge
+    turn_sin[:, 1] = np.abs(at[:, 0]) * edge
+    return {
+        43: scaled(bend[:, None] * -LEFT, tip, -LEFT),
+        44: scaled(bend[:, None] * UP, tip, UP),
+        # On its way out it climbs over the lower teeth.
+        45: scaled((along**1.5)[:, None] * (FORWARD + CLIMB * UP), tip, FORWARD),
+        46: scaled(arch[:, None] * UP, body, UP),
+        TONGUE_COS + 1: turn_cos,
+        TONGUE_SIN + 1: turn_sin,
+    }

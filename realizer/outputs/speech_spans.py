@@ -1,0 +1,54 @@
+"""A realization in, the spans of what is said and the instants of sync points out, on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from realizer.playback.active_block import Speaking
+    from realizer.realization import Realization
+    from realizer.speech.utterance import Phoneme, Word
+
+__all__ = ["Span", "phonemes", "points", "words"]
+
+LEAST = 0.001  # s; shorter is a rounding error of who told the times
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Seconds from the start of the realization, and what is there; blanks in `text` are single."""
+
+    start: float
+    end: float
+    text: str
+
+
+def words(speaking: Speaking) -> Iterator[Span]:
+    """The words of one utterance, in order, as far as it sounds."""
+    return _heard(speaking, ((word, word.text) for word in speaking.utterance.words))
+
+
+def phonemes(speaking: Speaking) -> Iterator[Span]:
+    """Its phonemes, as they are written in IPA; pauses are left out."""
+    return _heard(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
+
+
+def points(realization: Realization) -> tuple[tuple[float, str], ...]:
+    """(seconds, "block:behaviour:point") of every sync point, by time, then by name."""
+    found = (
+        (schedule.start + float(time), f"{schedule.block}:{behaviour}:{point}")
+        for schedule in realization.schedules
+        for behaviour, times in schedule.times.items()
+        for point, time in zip(schedule.points[behaviour], times, strict=True)
+    )
+    return tuple(sorted(found))
+
+
+def _heard(speaking: Speaking, told: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
+    for part, text in told:
+        start = speaking.start + part.start
+        end = min(speaking.start + part.end, speaking.until)
+        if end - start >= LEAST and text.strip():
+            yield Span(start, end, " ".join(text.split()))

@@ -1,0 +1,341 @@
+"""One accepted block: its plan laid on the session clock, and what is done to it while it waits or plays."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bml_schema import Block, SyncRef, without
+from realizer.animation.channel import Channel, Gain, Layer, later
+from realizer.animation.crossfade import joined
+from realizer.behaviours.kind import Kind, World
+from realizer.core.array_types import Float64
+from realizer.playback.block_planner import Plan
+from realizer.playback.character import RELAX, Shift
+from realizer.playback.feedback_events import State
+from realizer.playback.references import abroad
+from realizer.playback.resources import claims
+from realizer.scheduling.timing import Schedule
+from realizer.speech.utterance import Utterance
+
+__all__ = ["Playing", "Speaking", "Wait"]
+
+# Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
+HUSH = 0.12  # s
+# Times that differ by less are the same, solved again.
+SAME = 1e-9  # s
+# A word that lacks no more than this has sounded to its end.
+HEARD = 1e-4  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Speaking:
+    """An utterance that sounds from `start` on, cut off (with a short fade) at `until` if that is sooner."""
+
+    start: float
+    until: float
+    utterance: Utterance
+    character: int
+    gains: tuple[Gain, ...] = ()
+
+    def whole(self, now: float) -> bool:
+        """Whether it has sounded to its end."""
+        return min(self.until, now) >= self.start + self.utterance.duration - HEARD
+
+    def words(self, now: float) -> list[str]:
+        """The words that have sounded to their end."""
+        heard = min(self.until, now) - self.start + HEARD
+        return [word.text for word in self.utterance.words if word.end <= heard]
+
+
+@dataclass(frozen=True, eq=False)
+class Wait:
+    """A block does not start before another one has ended, or subsides."""
+
+    block: Playing
+    subsiding: bool = False
+
+    @property
+    def until(self) -> float:
+        return self.block.subsides if self.subsiding else self.block.end
+
+
+@dataclass(eq=False)
+class Playing:
+    """A block that was accepted, until it has ended and its last frames are past.
+
+    Attributes:
+        plan: its schedule has the start; inf while that is not known (it was not activated).
+        world: what it was planned with.
+        character: whose face it moves.
+        number: order of acceptance.
+        order: at one instant it reports before blocks of a higher one.
+        floor: it does not start sooner, seconds on the session clock.
+        waits: nor before these; empty once it has started.
+        followers: the blocks that wait for it.
+        stopped: when it was cut off.
+        abroad: its references into other blocks.
+        first: its schedule as it was when the block was accepted.
+        channels, shifts, speech: by behaviour, on the session clock; empty while the start is not known.
+    """
+
+    plan: Plan
+    kinds: Mapping[str, Kind]
+    world: World
+    character: int
+    number: int
+    floor: float
+    waits: list[Wait] = field(default_factory=list)
+    state: State = State.LURKING
+    stopped: float | None = None
+    channels: dict[str, tuple[Channel, ...]] = field(default_factory=dict)
+    shifts: dict[str, Shift] = field(default_factory=dict)
+    speech: dict[str, Speaking] = field(default_factory=dict)
+    followers: list[Playing] = field(default_factory=list)
+    order: int = 0
+    abroad: tuple[SyncRef, ...] = field(init=False)
+    first: Schedule = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.first = self.plan.schedule
+        self.abroad = abroad(self.block)
+        for wait in self.waits:
+            wait.block.followers.append(self)
+
+    @property
+    def block(self) -> Block:
+        return self.plan.block
+
+    @property
+    def schedule(self) -> Schedule:
+        return self.plan.schedule
+
+    @property
+    def latest(self) -> Schedule:
+        """What has become of `first`, with the warnings of both."""
+        first = self.first
+        if self.start == float("inf"):
+            return first
+        more = tuple(w for w in self.schedule.warnings if w not in first.warnings)
+        return replace(self.schedule, warnings=first.warnings + more)
+
+    @property
+    def begun(self) -> bool:
+        return self.state in (State.IN_EXEC, State.SUBSIDING)
+
+    @property
+    def done(self) -> bool:
+        return self.state in (State.DONE, State.INTERRUPTED, State.REVOKED)
+
+    @property
+    def waiting(self) -> bool:
+        """It was not started yet."""
+        return self.state in (State.PENDING, State.LURKING)
+
+    @property
+    def start(self) -> float:
+        """When it starts or did, seconds on the session clock; inf while that is not known."""
+        return self.schedule.start
+
+    @property
+    def end(self) -> float:
+        """When its end is due."""
+        return self.schedule.end if self.stopped is None else self.stopped
+
+    def said(self, now: float) -> str | None:
+        """Where its speech was cut off: all words that have sounded to their end; None where it was not."""
+        spoken = [b for b in self.world.utterances if b in self.first.times]
+        heard = [self.speech[b] for b in spoken if b in self.speech]
+        if len(heard) == len(spoken) and all(s.whole(now) for s in heard):
+            return None
+        order = sorted(heard, key=lambda s: s.start)
+        return " ".join(word for s in order for word in s.words(now))
+
+    @property
+    def gone(self) -> float:
+        """When nothing of it is to be seen any more."""
+        return self.end + (RELAX if self.state is State.INTERRUPTED else 0.0)
+
+    @property
+    def subsides(self) -> float:
+        """When every behaviour is past its relax, or its end where it has no relax."""
+        if self.stopped is not None:
+            return self.stopped
+        last = 0.0
+        for points, times in zip(self.schedule.points.values(), self.schedule.times.values(), strict=True):
+            last = max(last, float(times[points.index("relax") if "relax" in points else -1]))
+        return self.start + last
+
+    @property
+    def earliest(self) -> float:
+        """When it may start: inf while it is not activated, or waits for one that is not."""
+        if self.state is State.PENDING:
+            return float("inf")
+        return max([self.floor, *(wait.until for wait in self.waits)])
+
+    def await_too(self, wait: Wait) -> None:
+        """Wait for one more block."""
+        self.waits.append(wait)
+        wait.block.followers.append(self)
+
+    def lay(self, plan: Plan, start: float) -> None:
+        """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
+        if plan.block is not self.block:
+            self.abroad = abroad(plan.block)
+        if start != plan.schedule.start:
+            late = start - plan.schedule.start
+            held = tuple(claim.shifted(late) for claim in plan.claims)
+            plan = replace(plan, schedule=replace(plan.schedule, start=start), claims=held)
+        self.plan = plan
+        self.channels, self.shifts, self.speech = {}, {}, {}
+        if start == float("inf"):
+            return
+        for behaviour, times in self.schedule.times.items():
+            node = self.block[behaviour]
+            kind = self.kinds[node.tag]
+            own = self._placed(behaviour, plan.channels.get(behaviour, ()))
+            begin, end = start + float(times[0]), start + float(times[-1])
+            if kind.region is not None:
+                self.shifts[behaviour] = Shift.of(begin, end, kind.region, own)
+            elif own:
+                self.channels[behaviour] = own
+            sound = kind.sound(node, self.world)
+            if sound is not None:
+                whole = end - begin >= sound.duration - 1e-6
+                self.speech[behaviour] = Speaking(
+                    begin, float("inf") if whole else end, sound, self.character
+                )
+
+    def unfinished(self, now: float) -> set[str]:
+        """The behaviours whose end has not passed."""
+        return {b for b, times in self.schedule.times.items() if self.start + float(times[-1]) > now}
+
+    def retime(self, schedule: Schedule, now: float) -> list[str]:
+        """Take other times for what has not passed; what is shown goes on without a jump.
+
+        Args:
+            schedule: of the same block from the same start; what passed before `now` is as it was.
+
+        Returns:
+            The behaviours whose times are others.
+        """
+        changed = [
+            b
+            for b, times in schedule.times.items()
+            if not np.allclose(times, self.schedule.times[b], rtol=0.0, atol=SAME)
+        ]
+        if not changed:
+            return []
+        times = {b: schedule.times[b] if b in changed else t for b, t in self.schedule.times.items()}
+        before = self.schedule
+        own = replace(before, times=times)
+        self.plan = replace(self.plan, schedule=own)
+        for behaviour in changed:
+            node = self.block[behaviour]
+            shown = self.kinds[node.tag].expand(node, times[behaviour], self.world)
+            new = self._placed(behaviour, shown)
+            begun = self.start + float(before.times[behaviour][0]) < now
+            region = self.kinds[node.tag].region
+            if region is not None:
+                old = self.shifts[behaviour].channels
+                begin, end = (self.start + float(times[behaviour][k]) for k in (0, -1))
+                self.shifts[behaviour] = Shift.of(begin, end, region, joined(old, new, now) if begun else new)
+            elif new:
+                old = self.channels.get(behaviour, ())
+                self.channels[behaviour] = joined(old, new, now) if begun else new
+            if behaviour in self.speech and not begun:
+                late = float(times[behaviour][0]) - float(before.times[behaviour][0])
+                heard = self.speech[behaviour]
+                self.speech[behaviour] = replace(heard, start=heard.start + late, until=heard.until + late)
+        self.plan = replace(self.plan, claims=tuple(claims(self.block, own, self.kinds, self.world)))
+        return changed
+
+    def respeak(self, behaviour: str, utterance: Utterance, now: float) -> None:
+        """Take another utterance of a speech; its points that have passed stay where they were.
+
+        The schedule is as before: `retime` gives it the times that follow.
+        """
+        self.world = replace(self.world, utterances={**self.world.utterances, behaviour: utterance})
+        node = self.block[behaviour]
+        wanted = self.kinds[node.tag].timing(node, self.world)
+        was = dict(zip(self.schedule.points[behaviour], self.schedule.times[behaviour], strict=True))
+        local = now - self.start
+        at: list[float] = []
+        new = np.concatenate([[0.0], np.cumsum(wanted.preferred)])
+        for point, time in zip(wanted.points, new + was["start"], strict=True):
+            passed = was.get(point, np.inf)
+            # What has not passed comes when the voice says, but not before now.
+            at.append(float(passed) if passed <= local else max(float(time), local if at else float(time)))
+        gaps = np.diff(np.maximum.accumulate(at))
+        timing = replace(wanted, preferred=gaps, least=gaps)
+        points = {**self.schedule.points, behaviour: wanted.points}
+        times = {**self.schedule.times, behaviour: np.array([was.get(p, np.nan) for p in wanted.points])}
+        self.plan = replace(
+            self.plan,
+            timings={**self.plan.timings, behaviour: timing},
+            schedule=replace(self.schedule, points=points, times=times),
+        )
+        if behaviour in self.speech:
+            self.speech[behaviour] = replace(self.speech[behaviour], utterance=utterance)
+
+    def _placed(self, behaviour: str, channels: Sequence[Channel]) -> tuple[Channel, ...]:
+        """Channels of a behaviour on the session clock."""
+        return later(channels, self.start, f"{self.block.id}:{behaviour}")
+
+    def cut(self, behaviours: Collection[str], now: float, *, ends: bool = False) -> None:
+        """End behaviours at `now`: what is shown relaxes without a jump, what has not begun never comes.
+
+        Of their sync points those that have passed stay; relax comes at once and the end when the face has
+        relaxed (at once with `ends`, where the whole block is cut off).
+        """
+        points, times = dict(self.schedule.points), dict(self.schedule.times)
+        never: list[str] = []
+        for behaviour in behaviours:
+            names, at = points[behaviour], times[behaviour]
+            local = now - self.start
+            if local <= at[0]:
+                never.append(behaviour)
+                for table in (points, times, self.channels, self.speech):
+                    table.pop(behaviour, None)
+            elif local < at[-1]:
+                points[behaviour], times[behaviour] = self._cut_times(behaviour, names, at, local, ends)
+                self.channels[behaviour] = tuple(
+                    c.faded(now, now + (HUSH if c.layer is Layer.SPEECH else RELAX))
+                    for c in self.channels.get(behaviour, ())
+                )
+                if behaviour in self.speech:
+                    heard = self.speech[behaviour]
+                    self.speech[behaviour] = replace(heard, until=min(heard.until, now))
+        left = tuple(c for c in self.plan.claims if c.behaviour not in behaviours)
+        timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
+        schedule = replace(self.schedule, points=points, times=times)
+        # A block that waits may be planned anew.
+        block = without(self.block, never).block if never and self.waiting else self.block
+        self.plan = replace(self.plan, block=block, schedule=schedule, claims=left, timings=timings)
+
+    def _cut_times(
+        self, behaviour: str, names: tuple[str, ...], at: Float64, local: float, ends: bool
+    ) -> tuple[tuple[str, ...], Float64]:
+        kept = {name: float(time) for name, time in zip(names, at, strict=True) if time <= local}
+        if "relax" in names:
+            kept.setdefault("relax", local)
+        shown = "relax" in names or behaviour in self.channels or behaviour in self.shifts
+        relax = 0.0 if ends else HUSH if behaviour in self.speech else RELAX if shown else 0.0
+        kept["end"] = min(local + relax, float(at[-1]))
+        return tuple(kept), np.array(list(kept.values()))
+
+    def scale(self, behaviour: str, gains: Collection[Gain], *, sound: bool) -> None:
+        """Let the sound of a behaviour, or all that it shows, become stronger or weaker."""
+        if sound and behaviour in self.speech:
+            heard = self.speech[behaviour]
+            self.speech[behaviour] = replace(heard, gains=(*heard.gains, *gains))
+        elif not sound:
+            own = self.channels.get(behaviour, ())
+            self.channels[behaviour] = tuple(replace(c, gains=(*c.gains, *gains)) for c in own)
+
+    def moving(self) -> Iterator[Channel]:
+        """Its channels that are not base states."""
+        for own in self.channels.values():
+            yield from own

@@ -1,0 +1,50 @@
+"""Blocks that were announced and are not here yet, and what was done to them meanwhile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bml_schema import Block
+from realizer.playback.active_block import Wait
+
+__all__ = ["Expected", "Fate"]
+
+
+@dataclass(eq=False)
+class Fate:
+    """What was done to a block before it came.
+
+    Attributes:
+        revoked: it was ended; that was told.
+        activated: it need not wait for activation.
+        waits: what was put before it.
+    """
+
+    block: Block
+    revoked: bool = False
+    activated: bool = False
+    waits: list[Wait] = field(default_factory=list)
+
+
+class Expected:
+    """The announced blocks of a session, by id."""
+
+    def __init__(self) -> None:
+        self._fates: dict[str, Fate] = {}
+
+    def __len__(self) -> int:
+        return len(self._fates)
+
+    def __contains__(self, id: str) -> bool:
+        return id in self._fates
+
+    def add(self, block: Block) -> None:
+        self._fates[block.id] = Fate(block)
+
+    def fate(self, id: str) -> Fate | None:
+        """Of a block that is still to come."""
+        return self._fates.get(id)
+
+    def arrive(self, block: Block) -> Fate:
+        """A block is here, or will not come: what was done to it until now."""
+        return self._fates.pop(block.id, None) or Fate(block)

@@ -1,0 +1,83 @@
+"""What is due when: the events of all blocks, in the order of report."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Iterator
+
+from realizer.playback.active_block import Playing
+from realizer.playback.feedback_events import Event, Phase, State, events
+
+__all__ = ["Calendar"]
+
+# Entries of blocks that were dropped or moved may wait beside those that count, as many and so many more.
+SPARE = 16
+
+
+class Calendar:
+    """Events that have not happened."""
+
+    def __init__(self) -> None:
+        self._first: Event | None = None
+        # Number of a block -> its events, the first one last.
+        self._events: dict[int, list[Event]] = {}
+        # A heap of the first event of each block, and of others that count no more.
+        self._firsts: list[Event] = []
+
+    @property
+    def next(self) -> float | None:
+        """When the first is due; None where there is none."""
+        return None if self._first is None else self._first.time
+
+    def due(self, now: float) -> Iterator[Event]:
+        """Take what is due out, in order; what is put in meanwhile comes in its turn."""
+        while (first := self._first) is not None and first.time <= now:
+            events = self._events[first.block]
+            events.pop()
+            if events:
+                heapq.heapreplace(self._firsts, events[-1])
+            else:
+                heapq.heappop(self._firsts)
+                del self._events[first.block]
+            self._look()
+            yield first
+
+    def put(self, playing: Playing, only: Collection[tuple[str, str]] | None = None) -> None:
+        """Put in what is still to happen in a block; of its sync points all, or `only` (behaviour, sync)."""
+        number, order = playing.number, playing.order
+        due = events(playing.block, playing.schedule, order, number)
+        if only is not None:
+            due = [e for e in due if (e.name, e.sync) in only]
+        subsides, end = playing.subsides, playing.end
+        if playing.waiting:
+            due.append(Event(playing.start, order, Phase.START, block=number))
+        if playing.state is not State.SUBSIDING and subsides < end:
+            due.append(Event(subsides, order, Phase.SUBSIDES, block=number))
+        due.append(Event(end, order, Phase.END, block=number))
+        due.sort(reverse=True)
+        self._events[number] = due
+        heapq.heappush(self._firsts, due[-1])
+        if len(self._firsts) > 2 * len(self._events) + SPARE:
+            self._firsts = [events[-1] for events in self._events.values()]
+            heapq.heapify(self._firsts)
+        self._look()
+
+    def pending(self, playing: Playing) -> set[tuple[str, str]]:
+        """The sync points of a block that have not passed, as (behaviour, sync)."""
+        return {(e.name, e.sync) for e in self._events.get(playing.number, ()) if e.name}
+
+    def drop(self, playing: Playing) -> None:
+        """Take out all that is still to happen in a block."""
+        if self._events.pop(playing.number, None) is not None:
+            self._look()
+
+    def _look(self) -> None:
+        """Find what comes first; what was dropped is taken off the top."""
+        self._first = None
+        while self._firsts:
+            first = self._firsts[0]
+            events = self._events.get(first.block)
+            if events and events[-1] is first:
+                self._first = first
+                return
+            heapq.heappop(self._firsts)

@@ -1,0 +1,119 @@
+"""Blocks that play in, as the scheduler sees them beside a new one: what refers to what, what has passed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from bml_schema import Block, SyncRef
+from realizer.playback.active_block import Playing, Wait
+from realizer.playback.block_links import before
+from realizer.playback.block_store import ANTICIPATORS
+from realizer.playback.references import abroad, references
+from realizer.scheduling import Member
+
+__all__ = ["anticipated", "lead", "member", "touched"]
+
+FOREVER = float("inf")
+
+
+def touched(block: Block, alive: Iterable[Playing], now: float, waits: Iterable[Wait] = ()) -> list[Playing]:
+    """The blocks that are solved together with one, by references to sync points that have not passed.
+
+    Of two blocks of which one waits for the other only one can move at a time, or the second would flee from
+    the first for ever: what such a block says of the other's points is taken as it is.
+
+    Args:
+        block: a new one, or one whose times have changed.
+        alive: the other blocks that play or wait.
+        waits: what the block waits for.
+
+    Returns:
+        Those of `alive` that are connected to the block by any chain, in order.
+    """
+    by_id = {p.block.id: p for p in alive if p.start < FOREVER}
+    named = [(block.id, abroad(block)), *((id, p.abroad) for id, p in by_id.items() if p.abroad)]
+    beside: dict[str, set[str]] = {}
+    for own, refs in named:
+        for ref in refs:
+            other = by_id.get(ref.block or "")
+            if other is not None and not _passed(ref, other, now):
+                beside.setdefault(own, set()).add(other.block.id)
+                beside.setdefault(other.block.id, set()).add(own)
+    found: set[str] = set()
+    names = [block.id]
+    while names:
+        for name in beside.get(names.pop(), ()):
+            if name not in found:
+                found.add(name)
+                names.append(name)
+    if not found:
+        return []
+    apart = before(waits)
+    together: list[Playing] = []
+    for name, p in by_id.items():
+        if name in found and name != block.id and id(p) not in apart:
+            behind = before(p.waits)
+            if not any(id(other) in behind or id(p) in before(other.waits) for other in together):
+                together.append(p)
+    return together
+
+
+def _passed(ref: SyncRef, playing: Playing, now: float) -> bool:
+    """Whether a point is past, or nobody's."""
+    sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
+    try:
+        time = playing.schedule.at(ref.behaviour or "", sync or "")
+    except KeyError:
+        return True
+    return playing.start + time <= now
+
+
+def member(playing: Playing, origin: float, now: float) -> Member:
+    """A block that plays, on the clock of a block that starts at `origin`; what has passed is held."""
+    late = playing.start - origin
+    passed: dict[str, dict[str, float]] = {}
+    for behaviour in playing.plan.timings:
+        points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
+        when = {
+            point: float(time) + late
+            for point, time in zip(points, times, strict=True)
+            if playing.start + float(time) <= now
+        }
+        if when:
+            passed[behaviour] = when
+    return Member(
+        playing.block,
+        playing.plan.timings,
+        start=late,
+        earliest=max(late, now - origin),
+        passed=passed,
+        firm=True,
+    )
+
+
+def anticipated(block: Block) -> set[str]:
+    """The anticipators that a block is tied to."""
+    return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
+
+
+def lead(playing: Playing, id: str, sync: str, now: float) -> float:
+    """The soonest that an anticipated point can be: what leads up to it in a behaviour takes its least time.
+
+    Returns:
+        Seconds on the session clock; `now` where nothing of the block is tied to the point, or it has passed.
+    """
+    soonest = now
+    for node in playing.block.behaviours:
+        timing = playing.plan.timings.get(node.id)
+        for point, ref in node.syncs.items():
+            if timing is None or (ref.block, ref.behaviour, ref.sync) != (ANTICIPATORS, id, sync):
+                continue
+            times = playing.start + playing.schedule.times[node.id]
+            gaps = timing.preferred if timing.rigid else timing.least
+            last = timing.points.index(point)
+            if times[last] > now:
+                first = int(np.searchsorted(times, now, side="right"))  # the first point that has not passed
+                soonest = max(soonest, now + float(gaps[first:last].sum()) - ref.offset)
+    return soonest

@@ -1,0 +1,86 @@
+"""A way of drawing in, a canvas out: OpenGL where a graphics card is, otherwise the processor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+from realizer.core.array_types import Float32, UInt8
+from realizer.core.errors import RenderError
+from realizer.face.model import Face
+from realizer.render.cameras import Camera
+from realizer.render.light import Light
+
+__all__ = ["WAYS", "Drawer", "open_canvas"]
+
+WAYS = ("auto", "gl", "onboard")
+# Files that Linux shows where a graphics card may be used. Without one, OpenGL is drawn by the processor too,
+# half as fast as we do.
+CARDS = ("dri/renderD*", "nvidia[0-9]*", "dxg")
+
+
+class Drawer(Protocol):
+    """What every canvas can do."""
+
+    def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
+        """(h, w, 3) uint8, (h, w, 4) where transparent, of (n, 3) vertices and unit normals."""
+
+    def close(self) -> None:
+        """Free what it holds."""
+
+
+def open_canvas(
+    face: Face,
+    size: tuple[int, int],
+    camera: Camera,
+    light: Light,
+    background: str | None = None,
+    way: str = "auto",
+) -> tuple[str, Drawer]:
+    """The way that was taken, and its canvas.
+
+    Args:
+        background: as `realizer.render.backdrop.backdrop` takes it.
+        way: one of WAYS; "auto" takes what is faster here, and the other one where that is missing.
+
+    Raises:
+        RenderError: no such way, or it is missing here; the text says what to install.
+    """
+    if way not in WAYS:
+        raise RenderError(f"drawing: wanted one of {', '.join(WAYS)}, got {way!r}")
+    faults = []
+    for name in _order(Path("/dev")) if way == "auto" else (way,):
+        try:
+            return name, OPENERS[name](face, size, camera, light, background)
+        except RenderError as error:
+            faults.append(str(error))
+    raise RenderError("; or: ".join(faults))
+
+
+def _order(devices: Path) -> tuple[str, ...]:
+    card = any(any(devices.glob(pattern)) for pattern in CARDS)
+    return ("gl", "onboard") if card else ("onboard", "gl")
+
+
+def _gl(face: Face, size: tuple[int, int], camera: Camera, light: Light, background: str | None) -> Drawer:
+    from realizer.render.opengl import Canvas
+
+    return Canvas(face, size, camera, light, background)
+
+
+def _onboard(
+    face: Face, size: tuple[int, int], camera: Camera, light: Light, background: str | None
+) -> Drawer:
+    from realizer.render.raster import ready
+    from realizer.render.software import OnboardCanvas
+
+    if fault := ready():
+        raise RenderError(fault)
+    return OnboardCanvas(face, size, camera, light, background)
+
+
+OPENERS: Mapping[str, Callable[[Face, tuple[int, int], Camera, Light, str | None], Drawer]] = {
+    "gl": _gl,
+    "onboard": _onboard,
+}

@@ -1,0 +1,173 @@
+"""Pictures and captions in, one contact sheet out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realizer.core.array_types import UInt8
+
+if TYPE_CHECKING:
+    from PIL import Image, ImageDraw, ImageFont
+
+    Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
+__all__ = ["Cell", "Group", "album", "sheet"]
+
+PAPER, INK, FAINT = (24, 26, 29), (235, 236, 238), (150, 156, 163)
+GAP = 6  # pixels between pictures
+WIDE = 2700  # pixels; about as wide as an album becomes
+LINES = 4  # of notes, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """Pictures of one size side by side, a title below them, and notes in small lines."""
+
+    pictures: Sequence[UInt8]
+    title: str
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Cells under a heading; `columns` where they make a table."""
+
+    heading: str
+    cells: Sequence[Cell]
+    columns: int | None = None
+
+
+def sheet(
+    pictures: Sequence[UInt8],
+    titles: Sequence[str],
+    notes: Sequence[Sequence[str]] | None = None,
+    columns: int | None = None,
+) -> UInt8:
+    """(h, w, 3) uint8: the pictures in rows, a title under each, and its notes in small lines.
+
+    Args:
+        pictures: (h, w, 3) uint8 each, all of one size; at least one.
+        titles: a short line each, such as a time or the name of a FAP.
+        notes: lines each, such as sync points; cut to the picture's width. A line too many becomes "+2".
+        columns: None makes the sheet about as wide as it is high, half as much again.
+
+    Raises:
+        ValueError: no pictures.
+    """
+    notes = notes if notes is not None else [()] * len(pictures)
+    cells = [Cell((p,), title, said) for p, title, said in zip(pictures, titles, notes, strict=True)]
+    form = _Form(cells)
+    columns = columns or columns_for(len(cells), form.width, form.height)
+    return _page([Group("", cells, columns)], form, columns, None)
+
+
+def album(groups: Sequence[Group], legend: UInt8 | None = None, says: str = "") -> UInt8:
+    """(h, w, 3) uint8: each group's heading and below it its cells in rows; an even number of columns.
+
+    Args:
+        groups: their cells all have as many pictures, of one size; at least one cell.
+        legend: (h, w, 3) picture that stands at the right above everything, beside `says`.
+        says: what the album shows; the line at the top.
+
+    Raises:
+        ValueError: no cells.
+    """
+    form = _Form([cell for group in groups for cell in group.cells])
+    columns = max(2, 2 * round(WIDE / (form.width + GAP) / 2))
+    most = max(min(group.columns or columns, len(group.cells)) for group in groups)
+    return _page(groups, form, min(columns, max(2, most)), (says, legend))
+
+
+def columns_for(count: int, width: int, height: int) -> int:
+    """Columns that make the whole about 3:2."""
+    best: float = (1.5 * count * height / width) ** 0.5
+    return min(count, max(1, round(best)))
+
+
+class _Form:
+    """How large cells of a kind are, and their letters."""
+
+    def __init__(self, cells: Sequence[Cell]) -> None:
+        if not cells:
+            raise ValueError("pictures: wanted at least one, got none")
+        self.picture = cells[0].pictures[0].shape[:2]
+        height, width = self.picture
+        self.width = len(cells[0].pictures) * width
+        self.small, self.large = max(9, width // 20), max(11, width // 16)
+        if len(cells[0].pictures) > 1:  # room for a larger hand
+            self.small, self.large = max(10, width // 15), max(12, width // 12)
+        self.lines = min(LINES, max(len(cell.notes) for cell in cells))
+        self.height = height + int(self.large * 1.5) + int(self.lines * self.small * 1.3) + GAP
+        self.title, self.note = _font(self.large), _font(self.small)
+
+    def put(self, image: Image.Image, pen: ImageDraw.ImageDraw, cell: Cell, x: int, y: int) -> None:
+        from PIL import Image
+
+        height, width = self.picture
+        for k, picture in enumerate(cell.pictures):
+            image.paste(Image.fromarray(np.ascontiguousarray(picture)), (x + k * width, y))
+        y += height + 2
+        pen.text((x + 2, y), _cut(cell.title, self.title, self.width), INK, self.title)
+        y += int(self.large * 1.5)
+        for line in _fold(cell.notes, self.lines):
+            pen.text((x + 2, y), _cut(line, self.note, self.width), FAINT, self.note)
+            y += int(self.small * 1.3)
+
+
+def _page(groups: Sequence[Group], form: _Form, columns: int, top: tuple[str, UInt8 | None] | None) -> UInt8:
+    from PIL import Image, ImageDraw
+
+    heading = _font(int(form.large * 1.5))
+    room = int(form.large * 2.6)  # of a heading
+    step = (form.width + GAP, form.height + GAP)
+    width = columns * step[0] + GAP
+    places: list[tuple[Cell, int, int]] = []
+    heads: list[tuple[str, int]] = []
+    y = GAP + (room if top else 0)
+    for group in groups:
+        if group.heading:
+            heads.append((group.heading, y))
+            y += room
+        across = min(group.columns or columns, columns)
+        for k, cell in enumerate(group.cells):
+            places.append((cell, GAP + k % across * step[0], y + k // across * step[1]))
+        y += -(-len(group.cells) // across) * step[1]
+    image = Image.new("RGB", (width, y), PAPER)
+    pen = ImageDraw.Draw(image)
+    if top:
+        words, legend = top
+        if legend is not None:
+            image.paste(Image.fromarray(legend), (width - GAP - legend.shape[1], GAP))
+        left = width - 4 * GAP - (0 if legend is None else legend.shape[1])
+        pen.text((GAP + 2, GAP), _cut(words, heading, left), INK, heading)
+    for words, at in heads:
+        pen.line((GAP, at + 2, width - GAP, at + 2), FAINT)
+        pen.text((GAP + 2, at + form.large // 2), _cut(words, heading, width - 2 * GAP), INK, heading)
+    for cell, x, at in places:
+        form.put(image, pen, cell, x, at)
+    return np.asarray(image)
+
+
+def _fold(lines: Sequence[str], most: int) -> list[str]:
+    if len(lines) <= most:
+        return list(lines)
+    return [*lines[: most - 1], f"{lines[most - 1]} +{len(lines) - most}"]
+
+
+def _font(size: int) -> Font:
+    from PIL import ImageFont
+
+    # Pillow brings it along: no font of the machine, same bytes everywhere.
+    return ImageFont.load_default(size)
+
+
+def _cut(text: str, font: Font, width: int) -> str:
+    if font.getlength(text) <= width:
+        return text
+    while text and font.getlength(text + "...") > width:
+        text = text[:-1]
+    return text + "..."

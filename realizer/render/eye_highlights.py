@@ -1,0 +1,84 @@
+"""A face in; the small lights on its eyes out, as vertices that follow each frame's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Int32
+from realizer.face.model import Face
+from realizer.render.light import Light, unit
+
+__all__ = ["Glints"]
+
+EYES = ("left_eye", "right_eye")
+ROUND = 10  # corners
+LIFT = 1.004  # of the eye's radius: above its surface, below the lids
+
+
+class Glints:
+    """A cap of `ROUND` triangles on each eye, white; the eye turns under it, closed lids hide it.
+
+    Eyes have too few vertices to shade anything so small.
+    """
+
+    def __init__(self, face: Face, light: Light, towards_camera: Float32) -> None:
+        middle = unit(unit(light.key.direction) + light.glint * towards_camera)
+        aside = unit(np.cross([0, 1, 0], middle))
+        above = np.cross(middle, aside)
+        turn = np.linspace(0, 2 * np.pi, ROUND, endpoint=False)[:, None]
+        edge = np.cos(light.glint_width) * middle + np.sin(light.glint_width) * (
+            np.cos(turn) * aside + np.sin(turn) * above
+        )
+        self._directions = np.vstack([middle, edge]).astype(np.float32)
+        self._eyes = [_Ball(face, *face.parts[name]) for name in EYES if name in face.parts]
+        corner = np.arange(ROUND)
+        cap = np.stack([np.zeros(ROUND, np.int64), 1 + corner, 1 + (corner + 1) % ROUND], axis=1)
+        caps = [cap + k * (ROUND + 1) for k in range(len(self._eyes))]
+        self.triangles: Int32 = np.concatenate([np.zeros((0, 3), np.int64), *caps]).astype(np.int32)
+
+    def to_json(self) -> dict[str, Any]:
+        """The eyes as plain numbers, for whoever draws the face's vertices and its own glints.
+
+        A cap's middle is towards key + `Light.glint` x the camera, its edge `Light.glint_width` away; its
+        points lie `radius` from the centre, which is the sum of the weights times the vertices from `first`.
+        """
+        return {
+            "corners": ROUND,
+            "eyes": [
+                {
+                    "first": ball.first,
+                    "weights": [round(float(w), 6) for w in ball.weights],
+                    "radius": round(float(ball.radius) * LIFT, 7),
+                }
+                for ball in self._eyes
+            ],
+        }
+
+    def __call__(self, vertices: Float32) -> Float32:
+        """(n, 3) float32 metres, of the head's (n_vertices, 3)."""
+        caps = [ball.centre(vertices) + self._directions * ball.radius * LIFT for ball in self._eyes]
+        return np.concatenate([np.zeros((0, 3), np.float32), *caps]).astype(np.float32)
+
+
+class _Ball:
+    """An eyeball's radius, and its centre as a fixed mixture of its vertices: true however it moves."""
+
+    def __init__(self, face: Face, first: int, last: int) -> None:
+        points = face.vertices[first:last].astype(np.float64)
+        middle = points.mean(axis=0)
+        # |p - c|^2 = r^2 is linear in c and r^2 - c^2, about the mean for the sake of the numbers.
+        local = points - middle
+        columns = np.hstack([2 * local, np.ones((len(local), 1))])
+        found = np.linalg.lstsq(columns, (local**2).sum(axis=1), rcond=None)[0]
+        centre = found[:3]
+        mixture = np.vstack([local.T, np.ones(len(local))])
+        self.weights: Float32 = np.linalg.lstsq(mixture, [*centre, 1.0], rcond=None)[0].astype(np.float32)
+        # Where eyes bulge over the iris, the bulge counts.
+        self.radius = np.float32(np.linalg.norm(local - centre, axis=1).max())
+        self.first, self._range = first, slice(first, last)
+
+    def centre(self, vertices: Float32) -> Float32:
+        centre: Float32 = self.weights @ vertices[self._range]
+        return centre

@@ -1,0 +1,87 @@
+"""What the drawing process and its owner say to each other, and the memory they share."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import tempfile
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+
+from realizer.core.array_types import Float32, UInt8
+from realizer.face.model import Face
+
+__all__ = ["Draw", "Encode", "Failed", "Open", "Pixels"]
+
+
+@dataclass(frozen=True)
+class Open:
+    """The first message: what to draw, and the file under both sides' memory. Answered with the way taken."""
+
+    face: str | Face
+    size: tuple[int, int]
+    camera: str
+    memory: str
+    slots: int
+    light: str | None
+    way: str
+    background: str | None
+    deformer: str | None = None
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Draw poses (n, k) into the slots from `first` on; answered with n."""
+
+    rows: Float32
+    first: int
+
+
+@dataclass(frozen=True)
+class Encode:
+    """Draw one pose (k,); answered with the bytes of a file of that form: "jpeg", "png" or "webp"."""
+
+    row: Float32
+    form: str
+    quality: int
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The answer to any message that went wrong; the process ends after it."""
+
+    says: str
+
+
+Message = Open | Draw | Encode
+
+
+class Pixels:
+    """(slots, h, w, 3 or 4) uint8 in memory that two processes map.
+
+    A file that is unlinked as soon as both have it open, so a killed process leaves nothing behind;
+    `multiprocessing.shared_memory` would leave its segment, or a warning about it.
+    """
+
+    def __init__(self, path: str, slots: int, size: tuple[int, int], channels: int = 3) -> None:
+        width, height = size
+        with Path(path).open("r+b") as file:
+            self._map = mmap.mmap(file.fileno(), slots * height * width * channels)
+        self.array: UInt8 = np.frombuffer(self._map, np.uint8).reshape(slots, height, width, channels)
+
+    @staticmethod
+    def create(slots: int, size: tuple[int, int], channels: int = 3) -> str:
+        """Path of a new file of the right length, in memory where the system has such a folder."""
+        folder = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+        handle, path = tempfile.mkstemp(prefix="realizer-", dir=folder)
+        with os.fdopen(handle, "wb") as file:
+            file.truncate(slots * size[0] * size[1] * channels)
+        return path
+
+
+def connection(descriptor: int, *, writes: bool) -> Connection:
+    """A message pipe over its own copy of a descriptor."""
+    return Connection(os.dup(descriptor), readable=not writes, writable=writes)

@@ -1,0 +1,216 @@
+"""Poses in, pixels or encoded pictures out, by a drawing process that is started and replaced here."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from functools import cached_property
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float32, UInt8
+from realizer.core.errors import RenderError
+from realizer.face.model import Face
+from realizer.render.drawing_process import DRAW, Child
+
+__all__ = ["Renderer"]
+
+HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
+HALF_BYTES = 32 << 20  # and at most this much of it
+
+
+class Renderer:
+    """Draws a face, in a process of its own that holds the GL context.
+
+    The process starts at the first picture, or at `start`, and dies with us. If it crashes, the call that
+    noticed raises RenderError and the next call starts a new one. May be called from any thread, one call at
+    a time.
+    """
+
+    def __init__(
+        self,
+        face: str | Face = "default",
+        size: tuple[int, int] = (512, 512),
+        camera: str = "front",
+        *,
+        light: str | None = None,
+        background: str | None = None,
+        alpha: bool = False,
+        way: str | None = None,
+        deformer: str | None = None,
+    ) -> None:
+        """Nothing starts yet.
+
+        Args:
+            face: name of a face folder, or a Face (then it is sent over).
+            size: width, height in pixels.
+            camera: a preset, or a camera of the face.
+            light: a preset; None is what REALIZER_LIGHT says, or "portrait".
+            background: "#rrggbb" or "transparent"; None is what REALIZER_BACKGROUND says, or the light's own.
+            alpha: the caller takes pictures of four channels, should REALIZER_BACKGROUND say "transparent".
+            way: "gl", "onboard" or "auto"; None is what REALIZER_DRAW says, or "auto".
+            deformer: what moves a face that is named, "mpeg4" or "au"; None is what it says itself.
+        """
+        width, height = size
+        if not (1 <= width <= 8192 and 1 <= height <= 8192):
+            raise ValueError(f"size: wanted 1..8192 pixels each way, got {width}x{height}")
+        self.face, self.size, self.camera, self.deformer = face, size, camera, deformer
+        self.light, self._background, self._alpha = light, background, alpha
+        self.way = way or os.environ.get(DRAW) or "auto"
+        self._half = max(1, min(HALF, HALF_BYTES // (width * height * 4)))
+        self._lock = threading.Lock()
+        self._process: Child | None = None
+
+    def start(self) -> None:
+        """Start the process before there is anything to draw; what goes wrong in it is said at a picture.
+
+        Raises:
+            RenderError: `background` is none.
+        """
+        with self._lock:
+            self._started()
+
+    def draw(self, poses: Float32) -> UInt8:
+        """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, k) poses.
+
+        Args:
+            poses: as `face.deform` takes them: a column for each of `Face.takes`, or (n, 68) FAPs alone.
+
+        Raises:
+            ValueError: another shape.
+            FaceError: no such face.
+            RenderError: no GL, no such camera, or the process died; says what to do.
+        """
+        from realizer.render.backdrop import channels
+
+        rows = self._rows(poses)
+        pixels = np.empty((len(rows), self.size[1], self.size[0], channels(self.background)), np.uint8)
+        for k, picture in enumerate(self.frames(rows)):
+            pixels[k] = picture
+        return pixels
+
+    def frames(self, poses: Float32) -> Iterator[UInt8]:
+        """Each picture of (n, k) poses, (h, w, 3) uint8; the next ones are drawn while you use this one.
+
+        A picture is valid until the next one is asked for. Run the iterator to its end, or close it, before
+        you ask this renderer for anything else. Errors as `draw`.
+        """
+        from realizer.render.process_messages import Draw
+
+        rows = self._rows(poses)
+        pieces = [rows[i : i + self._half] for i in range(0, len(rows), self._half)]
+        with self._lock:
+            process = self._ready()
+            waiting = 0
+            try:
+                for k, piece in enumerate(pieces[:2]):
+                    process.send(Draw(piece, k * self._half))
+                    waiting += 1
+                for k, piece in enumerate(pieces):
+                    process.receive()
+                    waiting -= 1
+                    first = k % 2 * self._half
+                    yield from process.pixels.array[first : first + len(piece)]
+                    if k + 2 < len(pieces):
+                        process.send(Draw(pieces[k + 2], first))
+                        waiting += 1
+            except RenderError:
+                waiting = 0
+                self._drop()
+                raise
+            finally:
+                for _ in range(waiting):  # the caller left early: at most two answers are still to come
+                    process.receive()
+
+    def encoded(self, pose: Float32, form: str = "jpeg", quality: int = 85) -> bytes:
+        """The bytes of a picture of one pose, (k,).
+
+        Args:
+            form: "jpeg", "png" or "webp"; the latter two are transparent where the background is.
+            quality: 1..100, of a JPEG or a WebP.
+
+        Errors as `draw`.
+        """
+        from realizer.render.process_messages import Encode
+
+        (row,) = self._rows(np.asarray(pose)[None])
+        with self._lock:
+            process = self._ready()
+            try:
+                process.send(Encode(row, form, quality))
+                encoded: bytes = process.receive()
+            except RenderError:
+                self._drop()
+                raise
+        return encoded
+
+    @property
+    def background(self) -> str | None:
+        """What stands behind: None is the light's own gradient.
+
+        Raises:
+            RenderError: neither a colour nor "transparent".
+        """
+        from realizer.render.backdrop import colour_of
+
+        return colour_of(self._background, alpha=self._alpha)
+
+    @property
+    def pid(self) -> int | None:
+        """The drawing process, while there is one."""
+        return None if self._process is None else self._process.pid
+
+    def close(self) -> None:
+        """End the process. A later call would start a new one."""
+        with self._lock:
+            self._drop()
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _started(self) -> Child:
+        if self._process is None:
+            from realizer.render.backdrop import channels
+            from realizer.render.process_messages import Open, Pixels
+
+            slots = 2 * self._half
+            behind = self.background
+            path = Pixels.create(slots, self.size, channels(behind))
+            order = Open(
+                self.face, self.size, self.camera, path, slots, self.light, self.way, behind, self.deformer
+            )
+            self._process = Child(order)
+        return self._process
+
+    def _ready(self) -> Child:
+        process = self._started()
+        try:
+            process.open()
+        except BaseException:
+            self._drop()
+            raise
+        return process
+
+    def _drop(self) -> None:
+        if self._process is not None:
+            self._process.end()
+            self._process = None
+
+    def _rows(self, poses: Any) -> Float32:
+        from realizer.face.deform import whole
+
+        return whole(poses, self._takes)
+
+    @cached_property
+    def _takes(self) -> tuple[str, ...]:
+        from realizer.face.load import takes
+
+        return takes(self.face, deformer=self.deformer) if isinstance(self.face, str) else self.face.takes

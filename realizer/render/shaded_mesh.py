@@ -1,0 +1,64 @@
+"""A face, a camera and a light in; everything that is drawn out: points and colours, a frame at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.core.array_types import Float32, Int32
+from realizer.face.model import Face
+from realizer.render.cameras import Camera
+from realizer.render.eye_highlights import Glints
+from realizer.render.light import Light, Shader
+from realizer.render.wrinkles import Wrinkles
+
+__all__ = ["Figure"]
+
+
+class Figure:
+    """The head and what the renderer adds to it, lit: whoever draws triangles gets the same picture of it.
+
+    Attributes:
+        triangles: (m, 3) int32, counter-clockwise as seen; sheets are there both ways round.
+        points: (n, 3) float32 metres.
+        colours: (n, 3) float32 sRGB 0..1.
+    """
+
+    def __init__(self, face: Face, camera: Camera, light: Light) -> None:
+        self._glints = Glints(face, light, camera.towards)
+        self._wrinkles = Wrinkles(face)
+        self._shader = Shader(light, face.colours, face.occlusion, face.gloss, camera.towards)
+        count = len(face.vertices)
+        self._head = slice(0, count)
+        self._furrows = slice(count, count + self._wrinkles.count)
+        self._caps = slice(self._furrows.stop, None)
+        glints = self._glints(face.vertices)
+        furrows = np.zeros((self._wrinkles.count, 3), np.float32)
+        self.points: Float32 = np.concatenate([face.vertices, furrows, glints])
+        self.colours: Float32 = np.ones_like(self.points)
+        self.triangles: Int32 = np.concatenate(
+            [
+                _visible_triangles(face),
+                self._wrinkles.triangles + self._furrows.start,
+                self._glints.triangles + self._caps.start,
+            ]
+        ).astype(np.int32)
+
+    def pose(self, vertices: Float32, normals: Float32) -> None:
+        """Move `points` and `colours` to the head's (n_vertices, 3) vertices and unit normals."""
+        colours = self._shader(normals)
+        self.points[self._head], self.colours[self._head] = vertices, colours
+        self.points[self._furrows], self.colours[self._furrows] = self._wrinkles(vertices, normals, colours)
+        self.points[self._caps] = self._glints(vertices)
+
+
+# Parts with an inside that is never seen; all others (hair, clothes, lashes) may be sheets.
+SOLID = ("skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue")
+
+
+def _visible_triangles(face: Face) -> Int32:
+    """The triangles, those of sheets both ways round: culling what faces away saves a quarter."""
+    solid = np.zeros(len(face.vertices), bool)
+    for name in SOLID:
+        solid[slice(*face.parts.get(name, (0, 0)))] = True
+    sheets = face.triangles[~solid[face.triangles].all(axis=1)]
+    return np.concatenate([face.triangles, sheets[:, ::-1]])

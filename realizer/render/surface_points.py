@@ -1,0 +1,59 @@
+"""Places in a picture in; where they are on a face's skin out, to be carried along as it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from realizer.core.array_types import Float64, Int32
+from realizer.face.model import Face
+
+__all__ = ["on_skin"]
+
+
+def on_skin(
+    face: Face, places: Float64, right: Float64, towards: Float64, longest: float
+) -> tuple[Int32, Float64] | None:
+    """The triangle of skin at each place and the share of each corner: (n, 3) vertices, (n, 3) weights.
+
+    Args:
+        places: (n, 2) metres, along `right` and up.
+        right, towards: (3,) level unit vectors: the picture's x, and from the head to whoever looks.
+        longest: metres; skin whose edges there are longer (by their median) does not count.
+
+    Returns:
+        None where a place is beside the skin or the skin is too coarse.
+    """
+    skin = face.parts.get("skin", (0, len(face.vertices)))
+    low, high = places.min(axis=0), places.max(axis=0)
+    mine = face.triangles[((face.triangles >= skin[0]) & (face.triangles < skin[1])).all(axis=1)]
+    flat = np.stack([face.vertices @ right, face.vertices[:, 1]], axis=1)
+    depth = face.vertices @ towards
+    a, b, c = (flat[mine[:, k]] for k in range(3))
+    turn = _cross(b - a, c - a)
+    corners = flat[mine]
+    near = (
+        (turn > 1e-12) & (corners.max(axis=1) >= low).all(axis=1) & (corners.min(axis=1) <= high).all(axis=1)
+    )
+    mine, a, b, c, turn = mine[near], a[near], b[near], c[near], turn[near]
+    if not len(mine):
+        return None
+    p = places[:, None]
+    v = _cross(p - a, c - a) / turn
+    w = _cross(b - a, p - a) / turn
+    inside = (v >= -1e-6) & (w >= -1e-6) & (v + w <= 1 + 1e-6)
+    heights = depth[mine[:, 0]] * (1 - v - w) + depth[mine[:, 1]] * v + depth[mine[:, 2]] * w
+    best = np.where(inside, heights, -np.inf).argmax(axis=1)
+    row = np.arange(len(places))
+    if not inside[row, best].all():
+        return None
+    hit = mine[best]
+    edges = np.linalg.norm(face.vertices[hit] - face.vertices[np.roll(hit, 1, axis=1)], axis=2)
+    if np.median(edges) > longest:
+        return None
+    v, w = v[row, best], w[row, best]
+    return hit.astype(np.int32), np.stack([1 - v - w, v, w], axis=1)
+
+
+def _cross(a: Float64, b: Float64) -> Float64:
+    out: Float64 = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out

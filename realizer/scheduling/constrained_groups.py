@@ -1,0 +1,174 @@
+"""Groups of shapes that break an inequality in, their optimum that keeps all out; or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.scheduling.conflict import Link
+from realizer.scheduling.convex import Quadratic, kept, optimum, settled
+from realizer.scheduling.groups import Group
+from realizer.scheduling.model import LOOSE, TIGHT, Index, Model
+from realizer.scheduling.problem import ORIGIN, Relation
+from realizer.scheduling.rigid_clusters import Shapes
+
+__all__ = ["squeeze"]
+
+
+@dataclass(slots=True, eq=False)
+class _Squeeze:
+    """Groups as a convex problem; node 0 is the block's start, and one class of every group that can slide.
+
+    Attributes:
+        points: whose times are sought. number: (n,) the node of each point's class.
+        gaps, bounded, orders, starts: what the inequalities are, in this order: the least lengths of gaps,
+            the greatest of those that have one, orders, and first points of behaviours, not too soon.
+    """
+
+    quadratic: Quadratic
+    points: Index
+    number: Index
+    gaps: Index
+    bounded: Index
+    orders: list[Relation]
+    starts: Index
+
+    def start(self, shapes: Shapes) -> Float64:
+        """(size,) where the shapes are now."""
+        start = np.zeros(self.quadratic.size)
+        nodes = np.flatnonzero(self.number)
+        start[self.number[nodes]] = shapes.at[nodes]
+        return start
+
+    def keep(self, shapes: Shapes) -> tuple[Float64, list[int] | None]:
+        """From where the shapes are, times that keep every inequality, or the numbers of a cycle of them."""
+        return kept(self.quadratic, self.start(shapes))
+
+    def link(self, model: Model, k: int) -> Link:
+        """Inequality k, in terms of the problem."""
+        if k < len(self.gaps):
+            p = int(model.gap[self.gaps[k]])
+            return Link(p, p + 1, float(model.least[self.gaps[k]]))
+        k -= len(self.gaps)
+        if k < len(self.bounded):
+            p = int(model.gap[self.bounded[k]])
+            return Link(p + 1, p, -float(model.most[self.bounded[k]]))
+        k -= len(self.bounded)
+        if k < len(self.orders):
+            order = self.orders[k]
+            return Link(order.u, order.v, order.seconds, order)
+        point = int(self.starts[k - len(self.orders)])
+        return Link(ORIGIN, point, float(model.earliest[model.owner[point]]))
+
+
+def squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> list[list[Link]]:
+    """Put the points of some groups, in place, at the least cost that keeps gaps and orders.
+
+    Returns:
+        For each group that cannot keep them a cycle of inequalities; nothing is changed then.
+    """
+    # A group that can slide is brought to where its class of node 0 is at 0, as that node is.
+    begin = np.zeros(len(shapes.label))
+    for group in groups:
+        if not group.held:
+            begin[group.shapes] = shapes.at[_anchor(model, group)]
+    shapes.at -= begin[shapes.label[model.owner]]
+    whole = _squeeze(model, shapes, groups)
+    x = settled(whole.quadratic, whole.start(shapes))
+    if x is None:
+        cycles = [cycle for group in groups if (cycle := _impossible(model, shapes, group))]
+        if cycles:
+            return cycles
+        # Least gaps may have given way.
+        whole = _squeeze(model, shapes, groups)
+        x = settled(whole.quadratic, whole.start(shapes))
+    if x is None:
+        level, _ = whole.keep(shapes)
+        x = optimum(whole.quadratic, level)
+    shapes.at[whole.points] = x[whole.number[model.root[whole.points]]] + model.shift[whole.points]
+    return []
+
+
+def _impossible(model: Model, shapes: Shapes, group: Group) -> list[Link] | None:
+    """Why a group cannot keep its inequalities; None if it can, perhaps after least gaps have given way."""
+    one = _squeeze(model, shapes, [group])
+    _, cycle = one.keep(shapes)
+    if cycle and _yield_to_stated(model, one.gaps):
+        one = _squeeze(model, shapes, [group])
+        _, cycle = one.keep(shapes)
+    return [one.link(model, k) for k in cycle] if cycle else None
+
+
+def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
+    owner, root, shift = model.owner, model.root, model.shift
+    chosen, held = np.zeros(len(shapes.label), np.bool_), np.zeros(len(shapes.label), np.bool_)
+    for group in groups:
+        chosen[group.shapes] = True
+        held[group.shapes] = group.held
+    chosen, held = chosen[shapes.label], held[shapes.label]
+    points = model.points_of(chosen)
+    at_start = [ORIGIN, *(_anchor(model, group) for group in groups if not group.held)]
+    nodes = np.setdiff1d(root[points], at_start)
+    number = np.zeros(len(owner), np.intp)
+    number[nodes] = np.arange(1, len(nodes) + 1)
+
+    gaps = np.flatnonzero(chosen[owner[model.gap]])
+    orders = [order for group in groups for order in group.orders]
+    starts = model.first[held[:-1]]
+    begin, g = model.gap[gaps], len(gaps)
+    ends = gaps[model.most[gaps] < np.inf]
+    end = model.gap[ends] + 1
+    tail = np.concatenate([begin, end, [r.u for r in orders], np.zeros(len(starts))]).astype(np.intp)
+    head = np.concatenate([begin + 1, end - 1, [r.v for r in orders], starts]).astype(np.intp)
+    seconds = np.concatenate(
+        [model.least[gaps], -model.most[ends], [r.seconds for r in orders], model.earliest[owner[starts]]]
+    )
+    u, v, between = number[root[tail]], number[root[head]], shift[tail] - shift[head]
+    # What springs connect is a shape, or node 0 with all that is held or stands for it.
+    piece = np.zeros(len(nodes) + 1, np.intp)
+    labels = shapes.label[owner[nodes]]
+    still = shapes.held.copy()
+    still[[shapes.label[owner[p]] for p in at_start[1:]]] = True
+    free = ~still[labels]
+    piece[1:][free] = np.unique(labels[free], return_inverse=True)[1] + 1
+    quadratic = Quadratic(
+        len(nodes) + 1,
+        u[:g],
+        v[:g],
+        model.wanted[gaps] + between[:g],
+        model.stiffness[gaps],
+        u,
+        v,
+        seconds + between,
+        piece,
+    )
+    return _Squeeze(quadratic, points, number, gaps, ends, orders, starts)
+
+
+def _anchor(model: Model, group: Group) -> int:
+    """The class that stands for the block's start in a group that can slide."""
+    return int(model.root[model.first[group.shapes[0]]])
+
+
+def _yield_to_stated(model: Model, gaps: Index) -> bool:
+    """A length that the document itself states wins over the least gaps in it, but where they are bounded."""
+    changed = False
+    owners, firsts = np.unique(model.owner[model.gap[gaps]], return_index=True)
+    for b, k in zip(owners.tolist(), gaps[firsts].tolist(), strict=True):
+        first, last = int(model.first[b]), int(model.last[b])
+        if (model.most[k : k + last - first] < np.inf).any():
+            continue
+        seen: dict[int, int] = {}
+        for p in range(first, last + 1):
+            begin = seen.get(int(model.root[p]))
+            if begin is not None:
+                stretch = slice(k + begin - first, k + p - first)
+                stated = model.shift[p] - model.shift[begin]
+                if -LOOSE <= stated < model.least[stretch].sum() - TIGHT:
+                    model.least[stretch] = 0.0
+                    changed = True
+            seen[int(model.root[p])] = p
+    return changed

@@ -1,0 +1,147 @@
+"""A model and a cycle that cannot close in, the cycle of fewest statements through its points out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from realizer.scheduling.conflict import Clash, Link, Web
+from realizer.scheduling.model import LOOSE, Model
+from realizer.scheduling.problem import ORIGIN, Relation
+
+__all__ = ["shortest"]
+
+# Steps tried for one clash, some tens of milliseconds; enough for any that a person would read to the end.
+MOST_STEPS = 50_000
+
+# To which point, by how many seconds, and what says so.
+Step: TypeAlias = tuple[int, float, Relation | Link]
+
+
+def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[Clash]:
+    """A clash for each cycle of inequalities, each of the fewest statements that some cycle there has.
+
+    Such a cycle visits no point twice; so whichever statement is taken away, the others are a path and can
+    hold. No shorter one passes through any of its points; what clashes elsewhere is another clash.
+    """
+    ways = _Ways(model)
+    found = []
+    for cycle in cycles:
+        clash, left = web.cycle(cycle), MOST_STEPS
+        points = {end for r in clash.relations for end in (r.u, r.v)}
+        # Statements meet at points that relations name, or at the first point of what starts too soon.
+        points |= {end for link in cycle if link.u == ORIGIN or not points for end in (link.u, link.v)}
+        todo = sorted(points)
+        while todo and left > 0:
+            start = todo.pop()
+            steps, tried = ways.back_to(start, clash.statements - 1, left)
+            left -= tried
+            if steps:
+                steps = _simple(start, steps)
+                clash = web.clash(steps)
+                todo = sorted(point for point, _, _ in steps)
+        found.append(clash)
+    return found
+
+
+class _Ways:
+    """The steps from point to point that constraints, gaps and bounds are, as a graph of statements."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        problem = model.problem
+        self._stated: dict[int, list[Step]] = {}
+        for relation in problem.equalities:
+            self._stated.setdefault(relation.v, []).append((relation.u, relation.seconds, relation))
+            self._stated.setdefault(relation.u, []).append((relation.v, -relation.seconds, relation))
+        for order in problem.orders:
+            link = Link(order.u, order.v, order.seconds, order)
+            self._stated.setdefault(order.u, []).append((order.v, order.seconds, link))
+        n = len(problem.owner)
+        self._least, self._most = np.zeros(n), np.zeros(n)
+        self._least[model.gap + 1], self._most[model.gap + 1] = model.least, model.most
+        self._rigid = [timing.rigid for timing in problem.timings]
+        self._known: dict[int, list[Step]] = {}
+
+    def back_to(self, start: int, statements: int, steps: int) -> tuple[list[Step], int]:
+        """The steps of a positive cycle through a point of at most so many statements, the fewest there are.
+
+        Returns:
+            The steps, [] where there is no such cycle or it takes more steps than allowed to tell; and how
+            many steps were tried.
+        """
+        best, layer = {start: 0.0}, {start: 0.0}
+        came: list[dict[int, tuple[int, Step]]] = []
+        tried = 0
+        for _ in range(statements):
+            after: dict[int, float] = {}
+            came.append({})
+            for u, so_far in layer.items():
+                if (ways := self._known.get(u)) is None:
+                    ways = self._known[u] = list(self._from(u))
+                tried += len(ways)
+                for step in ways:
+                    v, seconds, _ = step
+                    total = so_far + seconds
+                    if v == start:
+                        if total > LOOSE:
+                            return _walk(came, u, step), tried
+                    elif total > best.get(v, -np.inf) + LOOSE / 100:
+                        best[v] = after[v] = total
+                        came[-1][v] = (u, step)
+                if tried > steps:
+                    return [], tried
+            layer = after
+        return [], tried
+
+    def _from(self, u: int) -> Iterator[Step]:
+        yield from self._stated.get(u, ())
+        model = self.model
+        if u == ORIGIN:
+            for first, earliest in zip(model.first.tolist(), model.earliest.tolist(), strict=True):
+                if earliest > -np.inf:
+                    yield first, earliest, Link(ORIGIN, first, earliest)
+            return
+        b = int(model.owner[u])
+        if self._rigid[b]:
+            return
+        seconds = 0.0
+        for v in range(u + 1, int(model.last[b]) + 1):
+            seconds += float(self._least[v])
+            yield v, seconds, Link(u, v, seconds)
+        seconds = 0.0
+        for v in range(u - 1, int(model.first[b]) - 1, -1):
+            seconds -= float(self._most[v + 1])
+            if seconds == -np.inf:
+                break
+            yield v, seconds, Link(u, v, seconds)
+
+
+def _simple(start: int, steps: list[Step]) -> list[Step]:
+    """A positive cycle among the steps of a positive walk from a point back to it that visits nothing twice.
+
+    The walk through one point that has the fewest steps may go round a cycle elsewhere and come back.
+    """
+    points, trail = [start], list[Step]()
+    for step in steps:
+        trail.append(step)
+        if step[0] in points:
+            begin = points.index(step[0])
+            ring = trail[begin:]
+            if sum(seconds for _, seconds, _ in ring) > LOOSE:
+                return ring
+            del trail[begin:], points[begin + 1 :]
+        else:
+            points.append(step[0])
+    return steps
+
+
+def _walk(came: list[dict[int, tuple[int, Step]]], at: int, last: Step) -> list[Step]:
+    """The steps that led to a point, layer by layer, and the one that closes the cycle."""
+    steps = [last]
+    for layer in reversed(came[:-1]):
+        at, step = layer[at]
+        steps.append(step)
+    return steps[::-1]

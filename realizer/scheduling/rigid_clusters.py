@@ -1,0 +1,200 @@
+"""A model in, its shapes out: behaviours that hold each other, at the least squares of their gaps.
+
+What hangs together without a contradiction keeps its preferred gaps; only the rest needs a solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float64
+from realizer.scheduling.model import Index, Model
+from realizer.scheduling.problem import ORIGIN
+from realizer.scheduling.union_find import Ties
+
+__all__ = ["Shapes", "hang", "settle", "shapes_of", "warm_up"]
+
+# Lengths that meet as closely as this count as fitting exactly.
+FITS = 1e-9  # s
+# From this many unknowns on a sparse factorisation is as fast; and OpenBLAS starts threads for a dense one of
+# 90, which costs hundreds of milliseconds where other work keeps the cores busy.
+SPARSE_FROM = 64
+
+
+@dataclass(slots=True, eq=False)
+class Shapes:
+    """Which behaviours hold each other, and where their points are.
+
+    Attributes:
+        label: (B + 1,) the shape of each behaviour, named by one of them; B is the block's start.
+        held: (B + 1,) bool by label: the shape is tied to a fixed time and cannot slide.
+        at: (n,) seconds: from the block's start for held shapes, from anywhere for others.
+    """
+
+    label: Index
+    held: Bool
+    at: Float64
+
+
+def shapes_of(model: Model) -> Shapes:
+    """The shapes of all behaviours, each at its least squares, inequalities aside."""
+    size = len(model.first)
+    tied = model.tied
+    # The first point of a behaviour is so long after the root of the class of one of its points.
+    ahead = (model.shift[tied] - model.chain[tied]).tolist()
+    knots = zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True)
+    ties, strained, held_at = hang(size, knots)
+    label, base = np.arange(size + 1), np.zeros(size + 1)
+    touched = _each(model.owner[model.tied], size)
+    label[touched] = [ties.find(b) for b in touched.tolist()]
+    base[touched] = [ties.shift[b] for b in touched.tolist()]
+    held = np.zeros(size + 1, np.bool_)
+    held[size] = True
+    fixed: dict[int, float] = {}
+    for b, time in held_at:
+        shape = ties.find(b)
+        start = time - ties.shift[b]
+        if abs(fixed.setdefault(shape, start) - start) > FITS:
+            strained.append(b)
+    if fixed:
+        names = list(fixed)
+        held[names] = True
+        moved = np.zeros(size + 1)
+        moved[names] = list(fixed.values())
+        base += moved[label]
+    at = base[model.owner] + model.chain
+    shapes = Shapes(label, held, at)
+    if strained:
+        bent = np.zeros(size + 1, np.bool_)
+        bent[[ties.find(b) for b in strained]] = True
+        _relax(model, shapes, bent[label])
+    return shapes
+
+
+def hang(
+    size: int, knots: Iterable[tuple[int, int, float]]
+) -> tuple[Ties, list[int], list[tuple[int, float]]]:
+    """Hang behaviours on each other at their preferred lengths.
+
+    Args:
+        size: how many there are.
+        knots: of each tied point its behaviour, the root of its class, and how long after that the first
+            point of the behaviour is.
+
+    Returns:
+        ties between behaviours (of their first points), the behaviours that do not fit, and for each point at
+        a fixed time (behaviour, seconds of its first point).
+    """
+    ties = Ties(size)
+    strained: list[int] = []
+    held: list[tuple[int, float]] = []
+    hook: dict[int, tuple[int, float]] = {}
+    for b, root, start in knots:
+        if root == ORIGIN:
+            held.append((b, start))
+            continue
+        if (hooked := hook.get(root)) is None:
+            hook[root] = b, start
+            continue
+        other, there = hooked
+        if abs(ties.tie(b, other, start - there)) > FITS:
+            strained.append(b)
+    return ties, strained, held
+
+
+def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
+    """Put the points of whole shapes, in place, where the sum of a (gap - preferred)^2 is least.
+
+    A stretch between two tied points is one spring, whatever lies between; so only tied points are unknowns.
+    """
+    owner, chain, slack = model.owner, model.chain, model.slack
+    knots = model.tied[chosen[owner[model.tied]]]
+    same = owner[knots[:-1]] == owner[knots[1:]]
+    p, q = knots[:-1][same], knots[1:][same]
+    length, give = chain[q] - chain[p], slack[q] - slack[p]
+    roots = model.root[knots]
+    nodes = _each(roots, len(owner))
+    number = np.empty(len(owner), np.intp)
+    number[nodes] = np.arange(len(nodes))
+    number = number[roots]
+    i, j = number[:-1][same], number[1:][same]
+    loose = i != j
+    # The block's start is at 0. In a shape that is not held any point can be: it is slid to its place later.
+    fixed = nodes == ORIGIN
+    labels = shapes.label[owner[knots]]
+    first = np.empty(len(shapes.label), np.intp)
+    first[labels[::-1]] = number[::-1]
+    fixed[first[labels[~shapes.held[labels]]]] = True
+    wanted = length - model.shift[q] + model.shift[p]
+    x = settle(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
+    time = x[number] + model.shift[knots]
+    # How much longer than preferred, for each unit of slack, after each knot; 0 after a behaviour's last one.
+    strain = np.zeros(len(knots))
+    strain[:-1][same] = (time[1:][same] - time[:-1][same] - length) / give
+    points = model.points_of(chosen)
+    place = np.searchsorted(knots, points, side="right") - 1
+    before = (place >= 0) & (owner[knots[place]] == owner[points])
+    place = np.where(before, place, np.minimum(place + 1, len(knots) - 1))
+    knot = knots[place]
+    pull = np.where(before, strain[place], 0.0)
+    shapes.at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
+
+
+def warm_up() -> None:
+    """Load what only large blocks need, a third of a second, which else the first of them would wait for."""
+    chain = np.arange(SPARSE_FROM)
+    ones, fixed = np.ones(SPARSE_FROM), np.zeros(SPARSE_FROM + 1, np.bool_)
+    fixed[0] = True
+    settle(chain, chain + 1, ones, ones, fixed, np.zeros(SPARSE_FROM + 1))
+
+
+def _each(numbers: Index, size: int) -> Index:
+    """Each of some numbers below a size once, ascending; np.unique takes several times as long for few."""
+    there = np.zeros(size, np.bool_)
+    there[numbers] = True
+    return np.flatnonzero(there)
+
+
+def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64) -> Float64:
+    """Where the sum of stiffness * (x[j] - x[i] - wanted)^2 is least.
+
+    Args:
+        i, j: (s,) the two nodes of each spring. wanted, stiffness: (s,).
+        fixed: (m,) bool; at least one node of each set that springs connect.
+        x: (m,) where the fixed nodes are.
+
+    Returns:
+        (m,) float64.
+    """
+    free = np.flatnonzero(~fixed)
+    n = len(free)
+    if not n:
+        return x
+    # Node n stands for all that are fixed, and falls away.
+    number = np.full(len(x), n)
+    all_free = np.arange(n)
+    number[free] = all_free
+    pull = stiffness * (wanted - (x[j] * fixed[j] - x[i] * fixed[i]))
+    i, j = number[i], number[j]
+    right = (np.bincount(j, pull, n + 1) - np.bincount(i, pull, n + 1))[:n]
+    between = (i < n) & (j < n)
+    one, other, stiff = i[between], j[between], -stiffness[between]
+    whole = (np.bincount(i, stiffness, n + 1) + np.bincount(j, stiffness, n + 1))[:n]
+    rows, columns = np.concatenate([one, other, all_free]), np.concatenate([other, one, all_free])
+    values = np.concatenate([stiff, stiff, whole])
+    if n < SPARSE_FROM:
+        matrix = np.bincount(rows * n + columns, values, n * n).reshape(n, n)
+        found = np.linalg.solve(matrix, right)
+    else:
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        sparse = csc_array((values, (rows, columns)), shape=(n, n))
+        factors = splu(sparse, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        found = factors.solve(right)
+    y = x.copy()
+    y[free] = found
+    return y

@@ -1,0 +1,154 @@
+"""What the service's port answers over HTTP: the page and what its tools ask, faces as GLB, its health."""
+
+from __future__ import annotations
+
+import functools
+import json
+import mimetypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import files
+from urllib.parse import parse_qs, unquote
+
+from realizer.core.errors import FaceError, RealizerError
+from realizer.core.settings import Settings
+
+__all__ = ["TEXT", "Answer", "Site"]
+
+JSON = "application/json; charset=utf-8"
+TEXT = "text/plain; charset=utf-8"
+NOT_BUILT = """The page was not bundled when this package was built.
+Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
+The WebSocket at /ws works without it.
+"""
+# The page loads nothing from elsewhere, and may talk to WebSockets only where it came from.
+POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "connect-src 'self' ws: wss:"
+)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One HTTP answer."""
+
+    status: int
+    media_type: str
+    body: bytes
+    headers: tuple[tuple[str, str], ...] = ()
+
+
+class Site:
+    """Answers GET requests; what is costly is made once.
+
+    Args:
+        health: what `/healthz` tells beside "ok".
+        settings: the service's; its light and background are how the page begins.
+    """
+
+    def __init__(self, health: Callable[[], dict[str, object]], settings: Settings | None = None) -> None:
+        self._health = health
+        self._settings = settings or Settings()
+        self._static = files("realizer.server").joinpath("static")
+
+    def answer(self, target: str) -> Answer:
+        """The answer to `GET target`. May block: reading a face takes a moment the first time."""
+        path, _, query = target.partition("?")
+        path = unquote(path)
+        if path == "/healthz":
+            return Answer(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
+        if path == "/asyncapi.json":
+            return Answer(200, JSON, files("realizer.server").joinpath("asyncapi.json").read_bytes())
+        if path == "/examples.json":
+            return Answer(200, JSON, _examples())
+        if path == "/vocabulary.json":
+            from realizer.server.http.vocabulary import vocabulary
+
+            return Answer(200, JSON, vocabulary())
+        if path in ("/feeling.json", "/pose.fap"):
+            return self._desk(path, {name: values[-1] for name, values in parse_qs(query).items()})
+        if path == "/look.json":
+            return self._look(parse_qs(query).get("face", ["default"])[0])
+        if path.startswith("/faces/"):
+            return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
+        return self._file("index.html" if path == "/" else path[1:])
+
+    def _desk(self, path: str, query: dict[str, str]) -> Answer:
+        from realizer.server.http import page_tools
+
+        try:
+            if path == "/feeling.json":
+                return Answer(200, JSON, page_tools.feeling(query.get("of", "")).encode())
+            pose = page_tools.pose(query.get("set", ""), query.get("face"), self._settings)
+            named = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
+            return Answer(200, "text/x-fap", pose.encode(), named)
+        except page_tools.DeskError as error:
+            return Answer(400, TEXT, f"{error}\n".encode())
+
+    def _face(self, name: str) -> Answer:
+        try:
+            return Answer(200, "model/gltf-binary", _glb(name), (("Cache-Control", "no-cache"),))
+        except FaceError as error:
+            return Answer(404, TEXT, f"{error}\n".encode())
+        except RealizerError as error:
+            return Answer(500, TEXT, f"{error}\n".encode())
+
+    def _look(self, name: str) -> Answer:
+        try:
+            return Answer(200, JSON, _look(name, self._settings.light, self._settings.background))
+        except FaceError as error:
+            return Answer(404, TEXT, f"{error}\n".encode())
+
+    def _file(self, name: str) -> Answer:
+        """A file of the bundle; only names in its one folder, so nothing else can be asked for."""
+        names = {f.name for f in self._static.iterdir()} if self._static.is_dir() else set()
+        if name in names and not name.startswith("."):
+            media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
+            if media_type.startswith("text/") or media_type.endswith("svg+xml"):
+                media_type += "; charset=utf-8"
+            headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", POLICY))
+            return Answer(200, media_type, self._static.joinpath(name).read_bytes(), headers)
+        if name == "index.html":
+            return Answer(503, TEXT, NOT_BUILT.encode())
+        return Answer(404, TEXT, f"/{name} is not here; there are / /ws /faces/NAME /healthz\n".encode())
+
+
+@functools.cache
+def _examples() -> bytes:
+    from realizer.examples import examples
+
+    rows = [
+        {"name": name, "title": name.replace("-", " ").capitalize(), "bml": text}
+        for name, text in examples().items()
+    ]
+    return json.dumps(rows, ensure_ascii=False).encode()
+
+
+@functools.lru_cache(8)
+def _look(name: str, light: str | None, background: str | None) -> bytes:
+    """How stills are lit and framed and what they add to a face, for whoever draws the mesh stream."""
+    from realizer.face.load import load_face
+    from realizer.render.cameras import camera_for
+    from realizer.render.eye_highlights import Glints
+    from realizer.render.light import preset, presets
+    from realizer.render.wrinkles import Wrinkles
+
+    face, chosen = load_face(name), preset(light)
+    camera = camera_for(face)
+    look = {
+        "light": chosen.to_json(),
+        "lights": {name: one.to_json() for name, one in presets().items()},
+        "background": background,
+        "camera": camera.to_json(),
+        "furrows": Wrinkles(face).to_json(),
+        "glints": Glints(face, chosen, camera.towards).to_json(),
+    }
+    return json.dumps(look, separators=(",", ":")).encode()
+
+
+@functools.lru_cache(8)
+def _glb(name: str) -> bytes:
+    from realizer.face.glb import to_glb
+    from realizer.face.load import load_face
+
+    return to_glb(load_face(name))

@@ -1,0 +1,67 @@
+"""Who has which face: the faces of one session's characters in, what is drawn and streamed of them out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from realizer.animation.fap.au_fap_mapping import FapMapping
+from realizer.core.errors import FaceError
+from realizer.core.settings import Settings
+from realizer.face.fap_mapping import mapping_of
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+
+__all__: list[str] = []
+
+
+class Faces:
+    """The faces of characters, which are told by their index.
+
+    Args:
+        settings: the face of who has been given none, and what moves faces.
+
+    Attributes:
+        given: index -> the face a client asked for, as it named it.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self.given: dict[int, str] = {}
+
+    def check(self, name: str) -> None:
+        """Whether it could be given: it is one of those that are listed.
+
+        Raises:
+            FaceError: there is none of that name, or it cannot be loaded.
+            TableError: its mapping cannot be used.
+        """
+        from realizer.face.load import face_name, list_faces
+
+        known = [info.name for info in list_faces()]
+        if face_name(name) not in known:
+            # Where the folders lie is no client's business.
+            raise FaceError(f"wanted one of {', '.join(known)}, got {name!r}")
+        self._load(name)
+        mapping_of(name, self._settings.mapping)
+
+    def name(self, index: int) -> str:
+        from realizer.face.load import face_name
+
+        return face_name(self.given.get(index, self._settings.face))
+
+    def of(self, index: int) -> Face:
+        """
+        Raises:
+            FaceError: it cannot be loaded.
+        """
+        return self._load(self.name(index))
+
+    def mapping(self, index: int) -> FapMapping:
+        """What its AUs ask of FAPs."""
+        return mapping_of(self.name(index), self._settings.mapping)
+
+    def _load(self, name: str) -> Face:
+        from realizer.face.load import load_face
+
+        return load_face(name, deformer=self._settings.deformer)

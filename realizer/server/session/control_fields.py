@@ -1,0 +1,88 @@
+"""What a control message names in; which of a session's characters, AUs, FAPs, feelings that is, out."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+from bml_schema import Emotion
+from realizer.animation.axis import AU_NAMES
+from realizer.behaviours import emotion
+from realizer.behaviours.kind import World
+from realizer.protocol.messages import Feeling, SetMessage
+from realizer.server.documents.limits import MAX_CHARACTERS
+from realizer.tables import faps
+
+if TYPE_CHECKING:
+    from realizer.server.session.session import Session
+
+__all__: list[str] = []
+
+
+class Wrong(Exception):
+    """A control message whose field `where` cannot be followed."""
+
+    def __init__(self, where: str, text: str) -> None:
+        super().__init__(text)
+        self.where = where
+
+
+def index_of(session: Session, character: str | None) -> int:
+    """Where a character stands in the session; it is added where it is new.
+
+    Raises:
+        Wrong: there are too many.
+    """
+    known = session.player.characters
+    if character not in (None, *known) and len(known) >= MAX_CHARACTERS:
+        raise Wrong("character", f"wanted at most {MAX_CHARACTERS} characters in a session")
+    return session.player.character_index(character)
+
+
+def held(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:
+    """AUs (0..1) and FAPs (FAPU) by name, as a message holds them; None lets go.
+
+    Args:
+        before: names of what is held.
+
+    Raises:
+        Wrong: it names what is none.
+    """
+    rows = faps()
+    values: dict[str, float | None] = {}
+    if message.aus is None:
+        values |= dict.fromkeys(name for name in before if name in AU_NAMES())
+    if message.faps is None:
+        values |= dict.fromkeys(name for name in before if name not in AU_NAMES())
+    for name, value in (message.aus or {}).items():
+        names = [n for n in (name, f"{name}L", f"{name}R") if n in AU_NAMES()]
+        if not names:
+            raise Wrong("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
+        values |= dict.fromkeys(names, value)
+    movable = {row.name for row in rows[2:]}
+    for name, value in (message.faps or {}).items():
+        if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
+            name = rows[int(name) - 1].name
+        if name not in movable:
+            raise Wrong("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
+        values[name] = value
+    return values
+
+
+def feeling_of(asked: Feeling | None) -> dict[str, float]:
+    """Name of AU -> 0..1; {} for none.
+
+    Raises:
+        Wrong: there is no such feeling.
+    """
+    if asked is None:
+        return {}
+    node = Emotion(id="set", **asked.model_dump())
+    said = node.fault() or next((fault.text for fault in emotion.check(node, World())), "")
+    if not said:
+        try:
+            return {target.name: value for target, value in emotion.values_of(node).items()}
+        except ValueError as off:
+            said = str(off)
+    field, _, rest = said.partition(": ")
+    raise Wrong(*((f"emotion.{field}", rest) if field in Feeling.model_fields else ("emotion", said)))

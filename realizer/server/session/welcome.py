@@ -1,0 +1,72 @@
+"""A session in, what it says to a client that says hello out: what there is, and what is too much."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from realizer.core.settings import Settings
+from realizer.expressions import library_of
+from realizer.protocol.messages import MAX_CONTROL, MAX_FPS, PICTURES, STREAMS, Capabilities, Limits, Welcome
+from realizer.server.documents.limits import MAX_CHARACTERS
+
+if TYPE_CHECKING:
+    from realizer.server.session.session import Session
+
+__all__: list[str] = []
+
+
+def greeting(session: Session, t: float) -> Welcome:
+    """What `hello` is answered with; `t` is seconds on the session clock."""
+    s = session.settings
+    return Welcome(
+        session=session.id,
+        time=t,
+        seq=session.log.newest,
+        capabilities=Capabilities(
+            streams={stream: list(encodings) for stream, encodings in STREAMS.items()},
+            pictures=list(PICTURES),
+            fps=s.fps,
+            **session.capabilities,
+        ),
+        limits=Limits(
+            message=s.max_message,
+            document=s.max_document,
+            control=MAX_CONTROL,
+            behaviours=s.max_behaviours,
+            elements=s.max_elements,
+            duration=s.max_duration,
+            speech=s.max_speech,
+            blocks=s.max_blocks,
+            characters=MAX_CHARACTERS,
+            connections=s.max_connections,
+            rate=s.max_rate,
+            picture=s.max_size,
+            pixels=s.max_pixels,
+            fps=MAX_FPS,
+            keep=s.keep,
+        ),
+    )
+
+
+def capabilities(settings: Settings) -> dict[str, Any]:
+    """What `welcome` tells beside streams; names, as documents and messages take them."""
+    from realizer.animation.axis import AU_NAMES
+    from realizer.behaviours import KINDS
+    from realizer.emotions.words import known_words
+    from realizer.face.load import list_faces, load_face
+    from realizer.render.cameras import camera_names
+    from realizer.render.light import presets
+    from realizer.speech import voices
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
+
+    return {
+        "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
+        "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},
+        "emotions": sorted(known_words()),
+        "expressions": sorted(library_of(settings.expressions)),
+        "aus": list(AU_NAMES()),
+        "faces": [face.name for face in list_faces()],
+        "voices": [voice.name for voice in voices() if voice.available],
+        "cameras": list(camera_names(load_face(settings.face, deformer=settings.deformer))),
+        "lights": list(presets()),
+    }

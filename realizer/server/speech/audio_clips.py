@@ -1,0 +1,238 @@
+"""Pieces of sound clips and what is told of their times in, recordings that documents name `clip:ID` out."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from realizer.behaviours.sound_file import RATES, read_sound
+from realizer.core.array_types import Int16
+from realizer.core.errors import RealizerError
+from realizer.protocol.messages import SpeechMessage, Timed
+from realizer.protocol.wire import ClipPiece
+from realizer.speech.recorded.viseme_names import sound_of
+from realizer.speech.utterance import Phoneme, Recording, Word
+
+__all__ = ["ClipError", "Clips"]
+
+MOST_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest go
+MOST_CLIPS = 1000  # of a session
+MOST_TIMES = 20_000  # words, or phonemes, of one clip
+
+
+class ClipError(RealizerError):
+    """A clip, or what is told of one, that cannot be used; `where` is the field."""
+
+    def __init__(self, where: str, text: str) -> None:
+        super().__init__(text)
+        self.where = where
+
+
+@dataclass(eq=False)
+class _Clip:
+    """What has come of one clip: `sound` is there when its last piece is."""
+
+    pieces: list[bytes] = field(default_factory=list)
+    rate: int = 0
+    sound: tuple[int, Int16] | None = None
+    text: str | None = None
+    words: list[Timed] = field(default_factory=list)
+    phonemes: list[Timed] = field(default_factory=list)
+    told: bool = True
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
+
+    def plain(self) -> dict[str, Any]:
+        """All of it, as JSON can hold it."""
+        sound = None
+        if self.sound is not None:
+            sound = {"rate": self.sound[0], "pcm": _text(self.sound[1].astype("<i2").tobytes())}
+        return {
+            "pieces": [_text(piece) for piece in self.pieces],
+            "rate": self.rate,
+            "sound": sound,
+            "text": self.text,
+            "words": [one.model_dump() for one in self.words],
+            "phonemes": [one.model_dump() for one in self.phonemes],
+            "told": self.told,
+        }
+
+    @classmethod
+    def of(cls, told: Mapping[str, Any]) -> _Clip:
+        """What `plain` told of."""
+        sound = None
+        if told["sound"] is not None:
+            pcm = np.frombuffer(base64.b64decode(told["sound"]["pcm"]), "<i2")
+            sound = int(told["sound"]["rate"]), pcm.astype(np.int16, copy=False)
+        words, phonemes = ([Timed(**one) for one in told[of]] for of in ("words", "phonemes"))
+        pieces = [base64.b64decode(piece) for piece in told["pieces"]]
+        return cls(pieces, told["rate"], sound, told["text"], words, phonemes, told["told"])
+
+
+class Clips:
+    """The sound clips of one session.
+
+    Attributes:
+        recordings: id -> what is whole: sound that has come to its end, with all that was told of it.
+    """
+
+    def __init__(self) -> None:
+        self.recordings: dict[str, Recording] = {}
+        self._clips: dict[str, _Clip] = {}
+        self._changed: set[str] = set()
+
+    @property
+    def ids(self) -> list[str]:
+        """Of all clips, whole or not, the oldest first."""
+        return list(self._clips)
+
+    def changes(self) -> dict[str, str | None]:
+        """Id -> JSON of each clip that has changed since `settle`, None of one that is gone."""
+        return {
+            id: json.dumps(clip.plain(), ensure_ascii=False) if (clip := self._clips.get(id)) else None
+            for id in sorted(self._changed)
+        }
+
+    def settle(self) -> None:
+        """What `changes` told of is kept."""
+        self._changed.clear()
+
+    def restore(self, clips: Iterable[tuple[str, str]]) -> None:
+        """Have the clips, id and JSON of each, that others have told of; the oldest first.
+
+        Raises:
+            KeyError, TypeError, ValueError: that is none.
+        """
+        for id, text in clips:
+            self._clips[id] = _Clip.of(json.loads(text))
+            self._publish(id, self._clips[id])
+
+    def take(self, piece: ClipPiece) -> None:
+        """One more piece of a clip.
+
+        Raises:
+            ClipError: out of order, too much, or no sound; the clip is as before then, or gone where it
+                could not be read.
+        """
+        where = f"clip:{piece.id}"
+        self._changed.add(piece.id)
+        clip = self._clips.get(piece.id)
+        if clip is None or (piece.number == 0 and clip.sound is not None):
+            clip = self._new(piece.id)
+        if piece.number == 0:
+            clip.pieces = []
+            clip.rate = piece.rate
+        if clip.sound is not None or piece.number != len(clip.pieces):
+            wanted = 0 if clip.sound is not None else len(clip.pieces)
+            raise ClipError(where, f"wanted piece {wanted}, got {piece.number}")
+        if piece.rate != clip.rate:
+            raise ClipError(where, f"wanted {clip.rate} Hz as in piece 0, got {piece.rate}")
+        if piece.rate and not RATES[0] <= piece.rate <= RATES[1]:
+            raise ClipError(where, f"wanted {RATES[0]}..{RATES[1]} Hz, or 0 for a file, got {piece.rate}")
+        if piece.rate and len(piece.sound) % 2:
+            raise ClipError(where, f"wanted samples of two bytes, got {len(piece.sound)} bytes")
+        if clip.size + len(piece.sound) > MOST_BYTES:
+            raise ClipError(where, f"wanted at most {MOST_BYTES} bytes, got {clip.size + len(piece.sound)}")
+        clip.pieces.append(piece.sound)
+        if piece.final:
+            self._whole(piece.id, clip)
+        self._make_room(piece.id)
+
+    def tell(self, message: SpeechMessage) -> None:
+        """What is said in a clip, and when.
+
+        Raises:
+            ClipError: no such viseme, times that go back, or too many of them.
+        """
+        assert message.clip is not None
+        phonemes = [*message.phonemes, *_sounds(message)]
+        self._changed.add(message.clip)
+        clip = self._clips.get(message.clip) or _Clip()
+        before: tuple[list[Timed], list[Timed], str | None]
+        before = ([], [], None) if clip.told else (clip.words, clip.phonemes, clip.text)
+        for name, old, new in (("words", before[0], message.words), ("phonemes", before[1], phonemes)):
+            times = [one.start for one in (*old[-1:], *new)]
+            if any(later < sooner for sooner, later in pairwise(times)):
+                raise ClipError(f"speech.{name}", "wanted times that rise, got some that go back")
+            if len(old) + len(new) > MOST_TIMES:
+                raise ClipError(f"speech.{name}", f"wanted at most {MOST_TIMES}, got more")
+        clip.words = [*before[0], *message.words]
+        clip.phonemes = [*before[1], *phonemes]
+        clip.text = before[2] if message.text is None else message.text
+        clip.told = message.final
+        self._clips[message.clip] = clip
+        self._publish(message.clip, clip)
+        self._make_room(message.clip)
+
+    def _new(self, id: str) -> _Clip:
+        self.recordings.pop(id, None)
+        self._clips[id] = _Clip()
+        return self._clips[id]
+
+    def _whole(self, id: str, clip: _Clip) -> None:
+        content, clip.pieces = b"".join(clip.pieces), []
+        try:
+            if clip.rate:
+                clip.sound = clip.rate, np.frombuffer(content, "<i2").astype(np.int16, copy=False)
+                if not len(clip.sound[1]):
+                    raise RealizerError("wanted sound, got none")
+            else:
+                heard = read_sound(content)
+                clip.sound = heard.rate, heard.pcm
+        except RealizerError as error:
+            del self._clips[id]
+            raise ClipError(f"clip:{id}", str(error)) from None
+        self._publish(id, clip)
+
+    def _publish(self, id: str, clip: _Clip) -> None:
+        self.recordings.pop(id, None)
+        if clip.sound is None or not clip.told:
+            return
+        rate, pcm = clip.sound
+        whole = len(pcm) / rate
+        words = tuple(Word(start, end, text) for start, end, text in _spans(clip.words, whole))
+        phonemes = tuple(Phoneme(start, end, ipa) for start, end, ipa in _spans(clip.phonemes, whole))
+        text = clip.text
+        if text is None and words:
+            text = " ".join(word.text for word in words)
+        self.recordings[id] = Recording(rate, pcm, text, words, phonemes)
+
+    def _make_room(self, newest: str) -> None:
+        """Forget the oldest clips where there are too many; what plays has its sound already."""
+        sizes = {id: clip.size for id, clip in self._clips.items()}
+        while sum(sizes.values()) > MOST_BYTES or len(sizes) > MOST_CLIPS:
+            oldest = next(id for id in sizes if id != newest)
+            del sizes[oldest], self._clips[oldest]
+            self._changed.add(oldest)
+            self.recordings.pop(oldest, None)
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def _sounds(message: SpeechMessage) -> list[Timed]:
+    """Visemes as sounds with such mouths."""
+    try:
+        return [
+            one.model_copy(update={"text": sound_of(message.viseme_set, one.text)}) for one in message.visemes
+        ]
+    except KeyError as error:
+        raise ClipError("speech.visemes", str(error.args[0])) from None
+
+
+def _spans(timed: Sequence[Timed], whole: float) -> list[tuple[float, float, str]]:
+    """(start, end, text): without an end up to the next one's start."""
+    starts = [*(one.start for one in timed[1:]), whole]
+    return [
+        (one.start, max(one.start, following if one.end is None else one.end), one.text)
+        for one, following in zip(timed, starts, strict=False)  # of none, only the end is left
+    ]

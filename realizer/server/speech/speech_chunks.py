@@ -1,0 +1,206 @@
+"""A piece of text with syncs, SSML and behaviours in it -> the block that says it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from xml.sax.saxutils import escape, quoteattr, unescape
+
+from bml_schema import Block, read
+from bml_schema.escape import legal
+from bml_schema.nodes import BMLA, BMLT, CORE, OWN
+from realizer.behaviours import VOCABULARY
+from realizer.server.speech.sentence_splitter import TAG
+from realizer.speech.ssml import EMPTY, SPOKEN
+
+__all__ = ["Piece", "clip_block", "text_block"]
+
+ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
+# A tag of which the rest never came.
+BROKEN = re.compile(r"</?(?:[\w.-]+:)?([A-Za-z][\w.-]+)(?:\s[^<>]*)?$")
+PREFIXES = {"bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
+# Elements beside behaviours that stand in a block and not in its text.
+BESIDE = frozenset({"constraint", "required"})
+SYNCS = frozenset({"sync", "mark", "bookmark"})
+QUOTES = {"&quot;": '"', "&apos;": "'"}
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """What is the same for all pieces of a speech, and the number of this one.
+
+    Attributes:
+        speech: the id of the speech, and of the behaviour that says it in each block.
+        number: 1, 2, ...
+        marks: sync of an earlier piece -> its block.
+    """
+
+    speech: str
+    number: int
+    character: str | None = None
+    language: str | None = None
+    marks: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def block(self) -> str:
+        return f"{self.speech}.{self.number}"
+
+    def document(self, inside: str) -> str:
+        """The block with what stands in it."""
+        declared = "".join(f" xmlns:{prefix}={quoteattr(name)}" for prefix, name in PREFIXES.items())
+        who = "" if self.character is None else f" characterId={quoteattr(self.character)}"
+        return f'<bml xmlns="{CORE}"{declared} id="{self.block}"{who}>{inside}</bml>'
+
+
+def text_block(text: str, piece: Piece) -> Block:
+    """The block that says a text.
+
+    <sync id="m"/> is a sync point of the behaviour, other SSML is handed to the voice. A behaviour needs no
+    id; one without a sync reference starts where it stands in the text. References to syncs of the speech are
+    `ID:m`, also to those of earlier pieces. What is no XML, or has syncs that cannot be, is spoken without
+    its tags. A tag that breaks off at the end is left out.
+    """
+    work = _Text(piece)
+    work.read(legal(text))
+    found = list(read(piece.document(work.inside()), VOCABULARY))
+    block = found[0] if len(found) == 1 and isinstance(found[0], Block) else None
+    if block is not None and (not work.spoken or any(node.id == piece.speech for node in block.behaviours)):
+        return block
+    plain = _Text(piece)
+    plain.say(TAG.sub(" ", legal(text)))
+    (spoken,) = read(piece.document(plain.inside()), VOCABULARY)
+    assert isinstance(spoken, Block)
+    if block is None:
+        return spoken
+    # The words count for more than what is wrong with their syncs, which is told all the same.
+    children = (*spoken.children, *block.children)
+    return replace(block, children=children, places={**block.places, **spoken.places})
+
+
+def clip_block(clip: str, piece: Piece) -> Block:
+    """The block that plays a clip as speech."""
+    sound = f"<bmlt:audiofile fileName={quoteattr('clip:' + clip)}/>"
+    said = f'<description priority="1" type="audio/x-clip">{sound}</description>'
+    (block,) = read(piece.document(f'<speech id="{piece.speech}">{said}</speech>'), VOCABULARY)
+    assert isinstance(block, Block)
+    return block
+
+
+class _Text:
+    """A text while it is read."""
+
+    def __init__(self, piece: Piece) -> None:
+        self.piece = piece
+        self.core: list[str] = []  # <text>
+        self.ssml: list[str] = []  # <speak>
+        self.behaviours: list[str] = []
+        self.spoken = False  # there is something that a voice could say
+        self.marked = False
+
+    def read(self, text: str) -> None:
+        """Take the text apart."""
+        at = 0
+        while (tag := TAG.search(text, at)) is not None:
+            self.say(text[at : tag.start()])
+            at = tag.end()
+            name = tag[2].rpartition(":")[2]
+            if tag[1]:
+                self._markup(tag, name)
+            elif name in _behaviours() or name in BESIDE:
+                at = tag.end() if tag[4] else _closed(text, tag)
+                self._behave(tag, text[tag.end() : at], name)
+            elif name in SYNCS:
+                values = dict(ATTRIBUTE.findall(tag[3]))
+                named = next((values[key] for key in ("id", "name", "mark") if key in values), None)
+                if named is not None:
+                    self._mark(unescape(named[1:-1], QUOTES), _written(values, {"ref"}))
+            else:
+                self._markup(tag, name)
+        rest = text[at:]
+        if (broken := BROKEN.search(rest)) and _known(broken[1]):
+            rest = rest[: broken.start()]
+        self.say(rest)
+
+    def say(self, text: str) -> None:
+        """Plain text; & and < need not be escaped in it."""
+        self.spoken |= any(map(str.isalnum, text))
+        written = escape(unescape(text, QUOTES))
+        self.core.append(written)
+        self.ssml.append(written)
+
+    def inside(self) -> str:
+        """What stands in the block."""
+        if not self.spoken and not self.marked:
+            return "".join(self.behaviours)
+        language = self.piece.language
+        spoken_in = "" if language is None else f" xml:lang={quoteattr(language)}"
+        said = f"<text{spoken_in}>{''.join(self.core)}</text>"
+        ssml = "".join(self.ssml)
+        if re.search(r"<(?!mark\b)", ssml):
+            speak = f'<speak xmlns=""{spoken_in}>{ssml}</speak>'
+            said += f'<description priority="1" type="application/ssml+xml">{speak}</description>'
+        return f'<speech id="{self.piece.speech}">{said}</speech>' + "".join(self.behaviours)
+
+    def _mark(self, name: str, more: str = "") -> None:
+        self.marked = True
+        self.core.append(f"<sync id={quoteattr(name)}{more}/>")
+        self.ssml.append(f"<mark name={quoteattr(name)}/>")
+
+    def _markup(self, tag: re.Match[str], name: str) -> None:
+        """SSML goes to the voice, without prefix; what nobody knows is left out."""
+        if name in SPOKEN or name in EMPTY:
+            self.ssml.append(f"<{tag[1]}{name}{tag[3]}{tag[4]}>")
+
+    def _behave(self, tag: re.Match[str], inner: str, name: str) -> None:
+        values = {key: self._referring(value) for key, value in ATTRIBUTE.findall(tag[3])}
+        if name not in BESIDE:
+            values.setdefault("id", f'"b{len(self.behaviours) + 1}"')
+            if not values.keys() & _behaviours()[name]:
+                values["start"] = f'"{self._here()}"'
+        head = f"<{tag[2]}" + "".join(f" {key}={value}" for key, value in values.items())
+        self.behaviours.append(f"{head}{tag[4]}>{self._referring(inner)}")
+
+    def _here(self) -> str:
+        """A reference to this place in the text."""
+        if not self.spoken:
+            return "0"
+        name = f"at-{self.piece.number}-{len(self.behaviours) + 1}"
+        self._mark(name)
+        return f"{self.piece.speech}:{name}"
+
+    def _referring(self, value: str) -> str:
+        """References to syncs of earlier pieces say in which block they are."""
+        speech = re.escape(self.piece.speech)
+
+        def place(found: re.Match[str]) -> str:
+            block = self.piece.marks.get(found[1])
+            return found[0] if block is None else f"{block}:{found[0]}"
+
+        return re.sub(rf"(?<![\w:.-]){speech}:([\w.-]+)", place, value)
+
+
+def _written(values: Mapping[str, str], names: Iterable[str]) -> str:
+    return "".join(f" {key}={values[key]}" for key in names if key in values)
+
+
+def _closed(text: str, tag: re.Match[str]) -> int:
+    """Behind the end tag of an element; the end of the text where there is none."""
+    depth = 1
+    for other in TAG.finditer(text, tag.end()):
+        if other[2] == tag[2] and not other[4]:
+            depth += -1 if other[1] else 1
+            if not depth:
+                return other.end()
+    return len(text)
+
+
+@cache
+def _behaviours() -> Mapping[str, frozenset[str]]:
+    """Name of a behaviour -> its sync points."""
+    return {tag.rpartition("}")[2]: frozenset(node.sync_points) for tag, node in VOCABULARY.items()}
+
+
+def _known(name: str) -> bool:
+    return name in SPOKEN or name in EMPTY or name in BESIDE or name in _behaviours()

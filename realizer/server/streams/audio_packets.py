@@ -1,0 +1,57 @@
+"""Sound out: the packets that a subscription is due at `now`, and when the next one is."""
+
+from __future__ import annotations
+
+import math
+
+from realizer.protocol.wire import FrameKind, pack
+from realizer.server.session.effects import Effect, Send
+from realizer.server.streams.audio_stream import AHEAD, PACKET
+from realizer.server.streams.connection import Connection, SoundSubscription
+from realizer.server.streams.frame_windows import EPSILON
+
+__all__: list[str] = []
+
+
+def send_packets(connection: Connection, s: SoundSubscription, now: float, effects: list[Effect]) -> None:
+    """Every packet whose time has come; those that a change of plans has made untrue are taken back."""
+    sound, current = s.sound, math.floor((now + EPSILON) / PACKET)
+    if s.revision != sound.player.revision:
+        s.revision = sound.player.revision
+        if (changed := _changed(s, current)) is not None:
+            effects.append(Send(connection.id, _packet(s, changed, b"", forget=True)))
+            s.next = changed
+    span = sound.span()
+    last = math.floor((now + AHEAD + EPSILON) / PACKET)
+    if span is None or s.next > last:
+        return
+    for number in range(max(s.next, current), last + 1):
+        pcm = sound.packet(number)
+        s.sent.append((number, pcm))
+        if pcm is None:
+            continue
+        if connection.slow:
+            connection.dropped += 1
+            continue
+        effects.append(Send(connection.id, _packet(s, number, pcm)))
+    s.next = last + 1
+
+
+def packets_due(s: SoundSubscription) -> float:
+    """When `send_packets` will next have something; infinite where nothing sounds."""
+    if s.revision != s.sound.player.revision:
+        return -math.inf
+    span = s.sound.span()
+    if span is None or span[1] <= s.next * PACKET:
+        return math.inf
+    return max(s.next * PACKET, math.floor(span[0] / PACKET) * PACKET) - AHEAD
+
+
+def _changed(s: SoundSubscription, current: int) -> int | None:
+    """The first packet that was sent ahead and would be another one now."""
+    ahead = sorted((number, pcm) for number, pcm in dict(s.sent).items() if number >= current)
+    return next((number for number, pcm in ahead if s.sound.packet(number) != pcm), None)
+
+
+def _packet(s: SoundSubscription, number: int, pcm: bytes, *, forget: bool = False) -> bytes:
+    return pack(FrameKind.SOUND, number, number * PACKET, pcm, character=s.index, forget=forget)

@@ -1,0 +1,97 @@
+"""A player's sound, computed ahead: packet n of it is a slice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from realizer.core.array_types import Float32
+from realizer.playback.audio_mix import CUT, heard
+from realizer.playback.player import Player, Speaking
+
+__all__: list[str] = []
+
+# A sound packet, and how far ahead of its time it is sent.
+PACKET = 0.02  # s
+AHEAD = 0.1  # s
+# Sound is made in blocks of so many seconds, of which so many are kept.
+BLOCK, BLOCKS = 4, 16
+
+
+class Sound:
+    """What a player says, in packets of 20 ms; packet n begins at n x 0.02 s on the session clock."""
+
+    def __init__(self, player: Player, rate: int, character: int | None) -> None:
+        self.player = player
+        self.rate = rate
+        self.character = character
+        self._samples = round(PACKET * rate)
+        self._cache: dict[tuple[int, int], tuple[Speaking, Float32]] = {}  # the latest at the end
+
+    def speaking(self) -> list[Speaking]:
+        """What sounds or will sound, in order of its start."""
+        return [
+            s
+            for s in self.player.speech()
+            if s.utterance.pcm is not None and self.character in (None, s.character)
+        ]
+
+    def span(self) -> tuple[float, float] | None:
+        """(first, last) seconds of all that sounds or will sound; None where nothing does."""
+        speaking = self.speaking()
+        if not speaking:
+            return None
+        return min(s.start for s in speaking), max(_end(s) for s in speaking)
+
+    def packet(self, number: int) -> bytes | None:
+        """The PCM of one packet; None in silence."""
+        first = number * self._samples
+        mix: Float32 | None = None
+        for speaking in self.speaking():
+            if _end(speaking) * self.rate <= first or speaking.start * self.rate >= first + self._samples:
+                continue
+            offset = round(speaking.start * self.rate)
+            piece = self._pcm(speaking, max(0, first - offset), max(0, first + self._samples - offset))
+            if not len(piece):
+                continue
+            if mix is None:
+                mix = np.zeros(self._samples, np.float32)
+            at = max(0, offset - first)
+            mix[at : at + len(piece)] += piece
+        if mix is None:
+            return None
+        return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
+
+    def _pcm(self, speaking: Speaking, first: int, last: int) -> Float32:
+        """Samples first .. last of a speech at the stream's rate, as a film has it; fewer at its end."""
+        size = BLOCK * self.rate
+        blocks = [self._block(speaking, n) for n in range(first // size, -(-last // size))]
+        whole = blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, np.float32), *blocks])
+        begin = first // size * size
+        return whole[first - begin : last - begin]
+
+    def _block(self, speaking: Speaking, number: int) -> Float32:
+        """`BLOCK` seconds of a speech: of one that lasts for minutes no more is made than is heard."""
+        key = (id(speaking), number)
+        known = self._cache.pop(key, None)
+        if known is None or known[0] is not speaking:
+            known = (speaking, self._made(speaking, number * BLOCK))
+        self._cache[key] = known
+        while len(self._cache) > BLOCKS:
+            del self._cache[next(iter(self._cache))]
+        return known[1]
+
+    def _made(self, speaking: Speaking, second: int) -> Float32:
+        utterance = speaking.utterance
+        assert utterance.pcm is not None
+        # A second more on either side, so that filters and fades are those of the whole.
+        first, rate = max(0, second - 1), utterance.sample_rate
+        pcm = utterance.pcm[first * rate : (second + BLOCK + 1) * rate]
+        part = replace(utterance, pcm=pcm, duration=len(pcm) / rate)
+        sound = heard(replace(speaking, start=speaking.start + first, utterance=part), self.rate)
+        return sound[(second - first) * self.rate : (second - first + BLOCK) * self.rate]
+
+
+def _end(speaking: Speaking) -> float:
+    return min(speaking.start + speaking.utterance.duration, speaking.until + CUT)

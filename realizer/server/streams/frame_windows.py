@@ -1,0 +1,245 @@
+"""A player's face, computed ahead: frame k of a rate is a slice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.animation.fap.conversion import to_fap
+from realizer.animation.frames import AUFrames, FAPFrames
+from realizer.animation.pose import poses
+from realizer.core.array_types import Float32, Float64, Int16, Int32
+from realizer.outputs.arkit import ARKIT_NAMES, arkit
+from realizer.playback.player import Player
+from realizer.protocol.wire import HEADER, PAYLOADS, FrameKind, json_frame, pack, pack_frames
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+
+__all__: list[str] = []
+
+# Frames computed in one call. 250 cost half as much again as 25; a longer window is thrown away more often,
+# when a plan changes.
+WINDOW = 10.0  # s
+# Meshes computed in one call: each costs as much as the frames of a whole window, so a few at a time.
+MESHES = 8
+KINDS = {stream: kind for kind, (stream, _) in PAYLOADS.items()}
+# What follows the 52 weights of a frame of the stream arkit, in radians.
+TURNS = (
+    *("headYaw", "headPitch", "headRoll"),
+    *("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch"),
+)
+# Rounding of k / fps, and of times that go from one clock to another and back, on a clock of days.
+EPSILON = 1e-6  # s
+
+
+def first_at(now: float, fps: float) -> int:
+    """The first frame whose time is not before `now`."""
+    return math.ceil((now - EPSILON) * fps)
+
+
+def last_at(now: float, fps: float) -> int:
+    """The newest frame whose time has come."""
+    return math.floor((now + EPSILON) * fps)
+
+
+class Strip:
+    """The messages of frames `first` .. `end - 1`, which are numbers, made at once: each is a slice."""
+
+    def __init__(
+        self, kind: FrameKind, first: int, times: Float64, rows: Float32 | Int32, character: int
+    ) -> None:
+        self.first, self.end = first, first + len(rows)
+        self._bytes, self._size = pack_frames(kind, first, times, rows, character=character)
+        self._dtype: np.dtype[Any] = rows.dtype
+
+    def __getitem__(self, frame: int) -> bytes:
+        at = (frame - self.first) * self._size
+        return self._bytes[at : at + self._size]
+
+    def row(self, frame: int) -> Float32 | Int32:
+        """(k,) what the message of a frame holds."""
+        row: Float32 | Int32 = np.frombuffer(self[frame], self._dtype, offset=HEADER.size)
+        return row
+
+
+class Window:
+    """Frames `first` .. `first + n - 1` of one character; each kind of them is made when first asked for.
+
+    Args:
+        aus: (times) -> the AUs at those times.
+    """
+
+    def __init__(
+        self,
+        first: int,
+        count: int,
+        fps: float,
+        aus: Callable[[Float64], AUFrames],
+        face: Callable[[], Face],
+        mapping: FapMapping,
+    ) -> None:
+        self.first = first
+        self.count = count
+        self.fps = fps
+        self._make = aus
+        self._aus: AUFrames | None = None
+        self._face = face
+        self._mapping = mapping
+        self._strips: dict[tuple[str, bool], Strip] = {}
+        self._latest: dict[tuple[str, str, bool, str | None], tuple[int, str | bytes]] = {}
+        self._meshes: Int16 | None = None
+        self._meshes_from = 0
+
+    @property
+    def aus(self) -> AUFrames:
+        """All that follows is made of these."""
+        if self._aus is None:
+            self._aus = self._make(np.arange(self.first, self.end) / self.fps)
+        return self._aus
+
+    def settle(self) -> None:
+        """What is streamed has been made: let go of what it was made of, which is several times as large."""
+        self._aus = None
+
+    @property
+    def end(self) -> int:
+        return self.first + self.count
+
+    @property
+    def faps(self) -> FAPFrames:
+        """In FAPU."""
+        return to_fap(self.aus, self._mapping)
+
+    def rows(self, stream: str, asked: bool = False) -> Float32 | Int32:
+        """(n, k) what a frame of fap, au or arkit holds, as the wire tells it.
+
+        Args:
+            asked: AUs as asked for, before the rules of co-occurrence.
+        """
+        match stream:
+            case "fap":
+                return self.faps.integers()
+            case "au":
+                return self.aus.asked if asked else self.aus.aus
+            case _:
+                shown = arkit(self.aus, self._mapping)
+                eyes = shown.eyes.reshape(len(shown.times), 4)
+                return np.concatenate([shown.weights, shown.head, eyes], axis=1)
+
+    @cached_property
+    def poses(self) -> Float32:
+        """(n, k) float32: what the face is drawn by."""
+        return poses(self.aus, self._face().takes, self._mapping)
+
+    def message(self, wanted: Wanted, frame: int) -> str | bytes:
+        """One of its frames as a WebSocket message."""
+        if wanted.encoding == "binary" and wanted.stream != "mesh":
+            return self.strip(wanted)[frame]
+        key = (wanted.stream, wanted.encoding, wanted.asked, wanted.name)
+        number, message = self._latest.get(key, (None, b""))
+        if number != frame:
+            message = self._made(wanted, frame)
+            self._latest[key] = (frame, message)
+        return message
+
+    def strip(self, wanted: Wanted) -> Strip:
+        """All of its messages of fap, au or arkit."""
+        known = self._strips.get((wanted.stream, wanted.asked))
+        if known is None:
+            rows = self.rows(wanted.stream, wanted.asked)
+            times = np.arange(self.first, self.end) / self.fps
+            known = Strip(KINDS[wanted.stream], self.first, times, rows, wanted.index)
+            self._strips[wanted.stream, wanted.asked] = known
+        return known
+
+    def _made(self, wanted: Wanted, frame: int) -> str | bytes:
+        """What is not made for the whole window at once: meshes, and all that is JSON."""
+        n, time = frame - self.first, frame / self.fps
+        row = self.mesh(n) if wanted.stream == "mesh" else self.strip(wanted).row(frame)
+        if wanted.encoding == "binary":
+            return pack(KINDS[wanted.stream], frame, time, row.tobytes(), character=wanted.index)
+        values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
+        return json_frame(wanted.stream, frame, time, values, wanted.name)
+
+    def mesh(self, row: int) -> Int16:
+        """(n_vertices, 3) int16 of one frame, counted from the first."""
+        from realizer.face.deform import deform
+        from realizer.face.surface import quantise
+
+        if self._meshes is None or not 0 <= row - self._meshes_from < MESHES:
+            face, self._meshes_from = self._face(), row - row % MESHES
+            poses = self.poses[self._meshes_from : self._meshes_from + MESHES]
+            self._meshes = np.ascontiguousarray(quantise(face, deform(face, poses)).astype("<i2"))
+        mesh: Int16 = self._meshes[row - self._meshes_from]
+        return mesh
+
+
+class Timeline:
+    """One character at one rate: frames in windows, dropped when the player's plan changes.
+
+    Args:
+        face: what is drawn; called when the first mesh or pose is asked for.
+        mapping: what its AUs ask of FAPs; called for each window.
+    """
+
+    def __init__(
+        self,
+        player: Player,
+        character: int,
+        fps: float,
+        face: Callable[[], Face],
+        mapping: Callable[[], FapMapping] = standard,
+    ) -> None:
+        self.player = player
+        self.character = character
+        self.fps = fps
+        self._face = face
+        self._mapping = mapping
+        self._window: Window | None = None
+        self._revision = -1
+
+    def window(self, first: int, last: int) -> Window:
+        """A window that holds frames first .. last, and more to come."""
+        window = self._window
+        if window is None or not self.current or first < window.first or last >= window.end:
+            count = max(math.ceil(WINDOW * self.fps), last - first + 1)
+
+            def aus(times: Float64) -> AUFrames:
+                return self.player.frames(times, self.character)
+
+            window = self._window = Window(first, count, self.fps, aus, self._face, self._mapping())
+            self._revision = self.player.revision
+        return window
+
+    @property
+    def current(self) -> bool:
+        """What was computed last is still what is planned."""
+        return self._revision == self.player.revision
+
+    def forget(self) -> None:
+        """Compute anew what comes next: the face has changed."""
+        self._window = None
+
+
+class Wanted(Protocol):
+    """What a subscription wants of a window.
+
+    `asked`: AUs as asked for, before the rules of co-occurrence; `name`: the character's, where it was given.
+    """
+
+    stream: str
+    encoding: str
+    index: int
+    name: str | None
+    asked: bool
+
+
+def arkit_names() -> list[str]:
+    """What the values of a frame of the stream arkit are."""
+    return [*ARKIT_NAMES(), *TURNS]

@@ -1,0 +1,123 @@
+"""The blocks of a session as they are planned in, messages of the stream `schedule` out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from realizer.charts.chart_data import line_of
+from realizer.charts.timeline import BlockLine
+from realizer.playback.active_block import Playing
+from realizer.playback.block_store import Cast
+from realizer.playback.feedback_events import State
+from realizer.playback.references import references
+from realizer.scheduling.timing import Schedule
+
+__all__: list[str] = []
+
+
+@dataclass(eq=False)
+class Seen:
+    """A block as it was last told.
+
+    Attributes:
+        others: ids of the blocks it refers to.
+        schedules: its own and those of `others`; whatever moves a block gives it a new one. Empty until it
+            is told.
+        text: all of it as JSON, made when it is first wanted.
+    """
+
+    playing: Playing
+    others: tuple[str, ...]
+    schedules: list[Schedule | None] = field(default_factory=list)
+    state: State | None = None
+    text: str | None = None
+
+
+class Plans:
+    """What became of blocks since they were looked at last, written once for all who get it."""
+
+    def __init__(self, cast: Cast) -> None:
+        self._cast = cast
+        self._seen: dict[int, Seen] = {}
+
+    def forget(self) -> None:
+        """Nobody looks any more."""
+        self._seen.clear()
+
+    def have_changed(self) -> bool:
+        """Whether `changes` would give something."""
+        schedules = self._schedules()
+        return any(p.number not in self._seen for p in self._cast.alive()) or any(
+            seen.state is not seen.playing.state or self._moved(seen, schedules)
+            for seen in self._seen.values()
+        )
+
+    def changes(self) -> list[tuple[int, str]]:
+        """(character index, JSON) of every block that was planned, moved, re-timed, cut, started or ended.
+
+        Of one whose times are as they were only its state, start and end are told. One that has ended is
+        told once more, and never again.
+        """
+        for playing in self._cast.alive():
+            if playing.number not in self._seen:
+                named = {ref.block for ref in references(playing.block) if ref.block is not None}
+                self._seen[playing.number] = Seen(playing, tuple(named - {playing.block.id}))
+        found: list[tuple[int, str]] = []
+        schedules = self._schedules()
+        for number, seen in list(self._seen.items()):
+            moved = self._moved(seen, schedules)
+            if moved or seen.state is not seen.playing.state:
+                seen.text, seen.state = None, seen.playing.state
+                seen.schedules = [seen.playing.schedule, *map(schedules, seen.others)]
+                text = self._text(seen) if moved else _json(self._line(seen).head())
+                found.append((seen.playing.character, text))
+            if seen.playing.done:
+                del self._seen[number]
+        return found
+
+    def whole(self, character: int | None) -> str:
+        """All blocks that play or wait, of one character or of all, as `changes` found them."""
+        wanted = (s for s in self._seen.values() if character in (None, s.playing.character))
+        return ",".join(self._text(seen) for seen in wanted)
+
+    def _moved(self, seen: Seen, schedules: Callable[[str], Schedule | None]) -> bool:
+        """Whether its own times are others, or those of a block it refers to."""
+        now = [seen.playing.schedule, *map(schedules, seen.others)]
+        return len(now) != len(seen.schedules) or any(
+            a is not b for a, b in zip(now, seen.schedules, strict=True)
+        )
+
+    def _schedules(self) -> Callable[[str], Schedule | None]:
+        """The id of a block -> its schedule now."""
+        newest = {playing.block.id: playing.schedule for playing in self._cast.all()}
+
+        return lambda id: newest[id] if id in newest else self._cast.schedule_of(id)
+
+    def _text(self, seen: Seen) -> str:
+        if seen.text is None:
+            seen.text = _json(self._line(seen).to_json())
+        return seen.text
+
+    def _line(self, seen: Seen) -> BlockLine:
+        return line_of(seen.playing, self._cast.schedule_of)
+
+
+def message(time: float, blocks: str, character: str | None, *, whole: bool) -> str:
+    """One message of the stream.
+
+    Args:
+        time: seconds on the session clock.
+        blocks: JSON, separated by commas.
+        character: whose blocks; None where those of all.
+        whole: these are all blocks; otherwise those that have changed.
+    """
+    head = {"type": "schedule", "time": round(time, 6), "whole": whole}
+    if character is not None:
+        head["character"] = character
+    return f'{_json(head)[:-1]},"blocks":[{blocks}]}}'
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

@@ -1,0 +1,70 @@
+"""An HTTP request in, who sends it and what it asks for out; and an answer to it as a response."""
+
+from __future__ import annotations
+
+import http
+from urllib.parse import parse_qsl, urlsplit
+
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from realizer.server.http.http_site import Answer
+from realizer.server.http.jwt_tokens import Pass
+from realizer.server.runtime.session_registry import HubError, Visitor
+
+__all__: list[str] = []
+
+
+def address_of(socket: ServerConnection) -> str:
+    """Without the port; "" where the socket has none, or has none any more."""
+    try:
+        remote = socket.remote_address
+    except (AttributeError, OSError):  # uvloop asks the socket, which is gone where its client has reset it
+        return ""
+    return str(remote[0]) if isinstance(remote, tuple) else ""
+
+
+def headers_of(request: Request) -> dict[str, str]:
+    """By their names in small letters; of several of one name the last."""
+    return {name.lower(): value for name, value in request.headers.raw_items()}
+
+
+def visitor_of(socket: ServerConnection, allowed: Pass | None) -> Visitor:
+    """Who comes; as far as is known where no token has come yet."""
+    return Visitor(address_of(socket), None if allowed is None else allowed.sessions)
+
+
+def query_of(request: Request) -> dict[str, str]:
+    """Names to values; of several of one name the last."""
+    return dict(parse_qsl(urlsplit(request.path).query, keep_blank_values=True))
+
+
+def session_of(request: Request) -> tuple[str | None, int | None]:
+    """`?session=ID&seen=N`.
+
+    Raises:
+        HubError: 400, `seen` is no number.
+    """
+    query = query_of(request)
+    session, seen = query.get("session") or None, query.get("seen")
+    if seen is None:
+        return session, None
+    if not (seen.isascii() and seen.isdigit() and len(seen) < 16):
+        raise HubError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
+    return session, int(seen)
+
+
+def response_to(answer: Answer) -> Response:
+    headers = Headers(
+        {
+            "Content-Type": answer.media_type,
+            "Content-Length": str(len(answer.body)),
+            "X-Content-Type-Options": "nosniff",
+            # Other pages may import realizer.js and draw our faces, as they may open the WebSocket.
+            "Access-Control-Allow-Origin": "*",
+            "Connection": "close",
+            **dict(answer.headers),
+        }
+    )
+    return Response(answer.status, http.HTTPStatus(answer.status).phrase, headers, answer.body)

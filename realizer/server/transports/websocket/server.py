@@ -1,0 +1,267 @@
+"""The WebSocket door: messages in and out of sessions at /ws, faults of texts at /check, HTTP beside them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http
+import logging
+import os
+import socket
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import urlsplit
+from weakref import WeakSet
+
+from websockets.asyncio.server import Server as SocketServer
+from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import serve as listen
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.protocol import State
+from websockets.server import ServerProtocol
+
+from realizer.core.settings import Settings, raises
+from realizer.server.http.access import Guard
+from realizer.server.http.http_site import TEXT, Answer, Site
+from realizer.server.http.metrics import MEDIA_TYPE
+from realizer.server.runtime.session_host import Shell
+from realizer.server.runtime.session_registry import HubError
+from realizer.server.transports.websocket.connection import Visits
+from realizer.server.transports.websocket.request import (
+    address_of,
+    headers_of,
+    query_of,
+    response_to,
+    session_of,
+    visitor_of,
+)
+from realizer.server.transports.websocket.writer import GOODBYE, WebSocketClient
+
+__all__ = ["WebSocketDoor", "lines"]
+
+log = logging.getLogger(__name__)
+
+# How often a client is asked whether it is there, and how long it has for the answer.
+PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
+# How long one that connects has to say what it wants.
+OPENING = 10.0  # s
+
+
+class WebSocketDoor:
+    """Serves `settings.host`; `port` is the one that is open after `start`.
+
+    Args:
+        worker: the number of this one among several; then it serves what it is told to `take`.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings, *, worker: int | None = None) -> None:
+        self.port = settings.port
+        self._listens = worker is None
+        self._worker = worker or 0
+        self._taking: set[asyncio.Task[Any]] = set()
+        self._shell = shell
+        self._settings = settings
+        self._guard = Guard(settings)
+        self._visits = Visits(shell, settings, self._guard)
+        self._site = Site(shell.health, settings)
+        self._socket: SocketServer | None = None
+        self._opened = WeakSet[ServerConnection]()
+        self._closing: set[asyncio.Task[None]] = set()
+        self._checking = asyncio.Lock()
+        self._from: Counter[str] = Counter()  # address -> WebSockets that are open
+
+    @property
+    def url(self) -> str:
+        """Where BML goes."""
+        return _addresses(self._settings, self.port)[0]
+
+    @property
+    def page(self) -> str:
+        """The page's address."""
+        return _addresses(self._settings, self.port)[1]
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        return lines(self._settings, self.port) if self._listens else ()
+
+    async def start(self) -> None:
+        where: dict[str, Any] = {
+            "host": self._settings.host,
+            "port": self.port,
+            "ssl": self._guard.tls(),
+        }
+        if not self._listens:
+            where = {"unix": True, "sock": _nowhere()}
+        where["create_connection"] = self._open
+        self._socket = await listen(
+            self._handle,
+            process_request=self._http,
+            compression=None,  # frames are dense and late is worse than large
+            max_size=self._settings.max_message,
+            open_timeout=OPENING,
+            close_timeout=GOODBYE,
+            server_header=None,
+            **PATIENCE,
+            **where,
+        )
+        if self._listens:
+            self.port = next(iter(self._socket.sockets)).getsockname()[1]
+
+    def take(self, client: socket.socket) -> None:
+        """Serve a connection that another process has accepted."""
+        loop = asyncio.get_running_loop()
+        taking = loop.create_task(loop.connect_accepted_socket(self._connection, client))
+        self._taking.add(taking)
+        taking.add_done_callback(self._taking.discard)
+
+    def _connection(self) -> ServerConnection:
+        assert self._socket is not None
+        protocol = ServerProtocol(max_size=self._settings.max_message)
+        return self._open(protocol, self._socket, close_timeout=GOODBYE, **PATIENCE)
+
+    def _open(self, *arguments: Any, **named: Any) -> ServerConnection:
+        connection = ServerConnection(*arguments, **named)
+        self._opened.add(connection)
+        return connection
+
+    async def ready(self) -> None:
+        return
+
+    def shut(self) -> None:
+        if self._socket is not None:
+            self._socket.close(close_connections=False)
+
+    async def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close(close_connections=False)
+            for one in list(self._opened):
+                # It may never say what it wants. Before TLS is agreed on it has no transport and goes alone.
+                if one.state is State.CONNECTING and hasattr(one, "transport"):
+                    one.transport.abort()
+            for socket in list(self._socket.connections):
+                # After a drain the door is closed already; its connections are closed one by one.
+                self._closing.add(asyncio.create_task(socket.close(1001, "the service ends")))
+            await self._socket.wait_closed()
+
+    async def _http(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Everything but a WebSocket at /ws is answered here."""
+        path = urlsplit(request.path).path
+        upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
+        if path in ("/ws", "/check") and upgrade:
+            try:
+                allowed = self._guard.request(request.path, headers_of(request), later=path == "/ws")
+                self._room(connection)
+                if path == "/check":
+                    self._guard.room()
+                else:
+                    self._shell.check(session_of(request)[0], visitor_of(connection, allowed))
+            except HubError as error:
+                return self._refused(connection, error)
+            return None
+        if path in ("/ws", "/check") or upgrade:
+            got = "a WebSocket" if upgrade else "plain HTTP"
+            words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
+            return response_to(Answer(426 if not upgrade else 404, TEXT, words.encode()))
+        if path in ("/metrics", "/healthz") and (wrong := self._another(request)) is not None:
+            return response_to(Answer(404, TEXT, f"{wrong}\n".encode()))
+        if path == "/metrics":
+            try:
+                allowed = self._guard.request(request.path, headers_of(request))
+                if allowed is None or allowed.sessions is not None:
+                    raise HubError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
+            except HubError as error:
+                return self._refused(connection, error)
+            return response_to(Answer(200, MEDIA_TYPE, self._shell.measured().encode()))
+        loop = asyncio.get_running_loop()
+        return response_to(await loop.run_in_executor(None, self._site.answer, request.path))
+
+    def _another(self, request: Request) -> str | None:
+        """Why the worker that a request names is not this one; None where it is, or none is named."""
+        named = query_of(request).get("worker")
+        if named in (None, str(self._worker)):
+            return None
+        return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {named[:80]!r}"
+
+    def _refused(self, connection: ServerConnection, error: HubError) -> Response:
+        self._shell.metrics.counts["refused"] += 1
+        log.info("refused: %s", error, extra={"address": address_of(connection), "status": error.status})
+        headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
+        return response_to(Answer(error.status, TEXT, f"{error}\n".encode(), headers))
+
+    def _room(self, socket: ServerConnection) -> None:
+        """Whether one more may come from its address: nobody can take the room of all others.
+
+        Raises:
+            HubError: there are too many.
+        """
+        most = self._settings.max_connections
+        if self._from[address_of(socket)] >= most:
+            words = (
+                f"{most} connections from {address_of(socket)} are open: wanted fewer "
+                f"{raises('max_connections')}"
+            )
+            raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
+
+    async def _handle(self, socket: ServerConnection) -> None:
+        """One WebSocket, from its opening to its end."""
+        assert socket.request is not None
+        address = address_of(socket)
+        try:
+            self._room(socket)  # again: many may have been let in at the same moment
+        except HubError as error:
+            await WebSocketClient(socket).close(1013, str(error))
+            return
+        self._from[address] += 1
+        try:
+            if urlsplit(socket.request.path).path == "/check":
+                await self._check(socket)
+            else:
+                await self._visits.begin(socket, socket.request)
+        finally:
+            self._from[address] -= 1
+            if not self._from[address]:
+                del self._from[address]
+
+    async def _check(self, socket: ServerConnection) -> None:
+        """An editor's own WebSocket: a text in, its faults out, one after the other."""
+        from realizer.server.http.page_tools import faults
+
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(ConnectionClosed):
+            async for text in socket:
+                if isinstance(text, bytes):
+                    await socket.close(1003, "wanted text")
+                    return
+                # One text at a time, whoever asks: those that play come first.
+                async with self._checking:
+                    told = await loop.run_in_executor(None, faults, text, self._settings)
+                await socket.send(told)
+
+
+def _nowhere() -> socket.socket:
+    """A socket to listen on that nobody can reach: the package's server must listen to serve at all."""
+    here = socket.socket(socket.AF_UNIX)
+    # In a container memory may be the only place that can be written.
+    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(dir=place) as folder:
+        here.bind(f"{folder}/s")
+    here.setblocking(False)
+    return here
+
+
+def lines(settings: Settings, port: int) -> tuple[str, ...]:
+    """What a service prints that is open at a port."""
+    service, page = _addresses(settings, port)
+    return f"listening on {service}", f"page at {page}"
+
+
+def _addresses(settings: Settings, port: int) -> tuple[str, str]:
+    """Where BML goes, and the page's."""
+    host = settings.host
+    if host in ("", "0.0.0.0", "::"):
+        host = "127.0.0.1"
+    where, s = f"[{host}]:{port}" if ":" in host else f"{host}:{port}", "s" if settings.tls_cert else ""
+    return f"ws{s}://{where}/ws", f"http{s}://{where}/"

@@ -1,0 +1,85 @@
+"""What an Xface task brings, as it came, in; a clip, a script, or why it is neither out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import unescape
+
+from bml_schema import Block, BMLError, read
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.animation.fap.fap_reader import read_fap
+from realizer.behaviours import VOCABULARY
+from realizer.behaviours.fap_document import document_of
+from realizer.behaviours.fap_values import MOST_BYTES
+from realizer.behaviours.fap_visemes import shown
+from realizer.behaviours.kind import World
+from realizer.behaviours.media import media_file
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings, raises
+from realizer.server.documents.limits import too_large
+from realizer.server.transports.xface.wire import Task
+
+__all__ = ["Brought", "Empty", "Script", "prepare"]
+
+ROOM = 2**10  # bytes of a document that are not its keys
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """Documents, and the ids of their blocks."""
+
+    text: str
+    blocks: tuple[str, ...]
+
+
+Brought = FAPClip | Script | RealizerError | None
+
+
+class Empty(RealizerError):
+    """A task without what it should bring."""
+
+
+def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
+    """What a task brings, understood; this may take a second. None where it brings nothing.
+
+    Args:
+        settings: the folder that LOAD_FAP reads from, and how large a document may be.
+
+    Raises:
+        RealizerError: it cannot be understood.
+    """
+    match task.name, task.params:
+        case "UPLOAD_FAP", (text, *_) if text.strip():
+            return _clip(text, settings)
+        case "LOAD_FAP", (name, *_) if name.strip():
+            path = media_file(name, World(media=settings.media))
+            if (size := path.stat().st_size) > MOST_BYTES:
+                raise RealizerError(f"wanted at most {MOST_BYTES} bytes of FAP text, got {size}")
+            return _clip(path.read_bytes(), settings)
+        case "UPLOAD_SCRIPT", (text, processor, *_) if processor.strip().upper() == "BML":
+            script = text if "<" in text else unescape(text)
+            if (large := too_large(script, settings)) is not None:
+                raise RealizerError(large)
+            items = list(read(script, VOCABULARY, most_bytes=settings.max_document))
+            blocks = tuple(item.id for item in items if isinstance(item, Block))
+            if not blocks:
+                wrong = next((str(item) for item in items if isinstance(item, BMLError)), "nothing")
+                raise RealizerError(f"wanted BML, got {wrong}")
+            return Script(script, blocks)
+        case "UPLOAD_SCRIPT", (_, processor, *_):
+            raise RealizerError(f"wanted the processor BML, got {processor.strip()[:60]!r}")
+        case (("UPLOAD_FAP" | "LOAD_FAP" | "UPLOAD_SCRIPT"), _):
+            raise Empty("wanted params, got none, or empty ones")
+    return None
+
+
+def _clip(text: str | bytes, settings: Settings) -> FAPClip:
+    most = settings.max_document - ROOM
+    clip = shown(read_fap(text))
+    if not len(clip.values):
+        raise RealizerError("wanted frames, got none")
+    if len(clip.values) > 1 and clip.mask.any() and len(document_of(clip, "")) > most:
+        got = f"{len(clip.values)} frames of {clip.mask.sum()} FAPs"
+        words = f"wanted a file that plays as at most {most} bytes of BML, got {got}: send parts"
+        raise RealizerError(f"{words} {raises('max_document')}")
+    return clip

@@ -1,0 +1,217 @@
+"""A stream from an Xface client in, the tasks in it, their contents and what is neither out."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from realizer.server.transports.xface.wire import Task
+
+__all__ = ["Content", "Fault", "TaskReader"]
+
+UNREAD = Task("")
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """The bytes that follow a task that announces them."""
+
+    task: Task
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A stretch of the stream that is no task, and why.
+
+    Attributes:
+        task: as much as could be read of one that is too large, half, or has no name that can be one: "".
+    """
+
+    text: str
+    task: Task = UNREAD
+
+
+_OPEN = re.compile(rb"<task(?=[\s/>])")
+_START = re.compile(rb"""<task((?:[^<>"']|"[^"<]*"|'[^'<]*')*)>""")
+_END = re.compile(rb"</task\s*>|\0|<task(?=[\s/>])")
+_PASSED = re.compile(rb"(?:[\s\0]|\xef\xbb\xbf|<\?[^<>]{0,200}\?>)+")
+_BOUND = re.compile(rb"\0|<task(?=[\s/>])")
+# A name is looked at once, from its beginning, however long it is.
+_VALUE = re.compile(r"""(?<![\w:.-])([\w:.-]++)\s*+=\s*(?:"([^"]*)"|'([^']*)')""")
+_PARAM = re.compile(r"<param\s*/>|<param\s*>|</param\s*>")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,63}")
+LONGEST_TAG = 4096  # bytes
+# The only task that is followed by bytes of a file, and how many there may be.
+FOLLOWED = "UPLOAD_WAV"
+_SHOWN = 60  # bytes of a stray stretch that its fault shows
+
+
+class TaskReader:
+    """Finds the tasks of one stream.
+
+    A task ends at `</task>` or `/>`, with NULs after it or without; how the stream was cut into reads changes
+    nothing. A stretch that holds anything else gives one Fault, and reading goes on after the next NUL or at
+    the next `<task`. No byte is looked at more than a few times.
+
+    Args:
+        limit: most bytes of a task, and of the content after it.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._data = bytearray()
+        self._looked = 0  # up to here there is no end of the open task
+        self._lost = False  # in a stretch that has been told of
+        self._content: Task | None = None
+        self._size = 0  # bytes of content to come
+
+    def feed(self, data: bytes) -> list[Task | Content | Fault]:
+        """What `data` completes, in order."""
+        self._data += data
+        found: list[Task | Content | Fault] = []
+        while self._step(found):
+            pass
+        return found
+
+    def _step(self, found: list[Task | Content | Fault]) -> bool:
+        """Understand what is next; False where more data is needed."""
+        if self._content is not None:
+            return self._take_content(found)
+        if self._lost:
+            return self._skip()
+        if (passed := _PASSED.match(self._data)) is not None:
+            self._drop(passed.end())
+        if not self._data:
+            return False
+        if not _OPEN.match(self._data):
+            # It may be the beginning of `<task ` or of a declaration.
+            if len(self._data) < 6 and b"<task".startswith(bytes(self._data[:5])):
+                return False
+            if self._data.startswith((b"<?", b"\xef")) and len(self._data) < 200 and b"\0" not in self._data:
+                return False
+            shown = bytes(self._data[:_SHOWN]).split(b"\0")[0].decode("utf-8", "replace")
+            return self._give_up(f"wanted <task name=...>, got {shown!r}", found)
+        return self._in_task(found)
+
+    def _in_task(self, found: list[Task | Content | Fault]) -> bool:
+        start = _START.match(self._data)
+        if start is None:
+            bound = _BOUND.search(self._data, 5)
+            if (bound.start() if bound is not None else len(self._data)) > LONGEST_TAG:
+                return self._give_up(f"wanted <task ...> of at most {LONGEST_TAG} bytes, got more", found)
+            if bound is None:
+                return False
+            return self._give_up("wanted > at the end of <task, got another beginning", found)
+        if start[1].endswith(b"/"):
+            self._tell(start[1][:-1], b"", start.end(), found)
+            return True
+        end = _END.search(self._data, max(start.end(), self._looked))
+        if end is None or not end[0].startswith(b"</"):
+            if end is not None:
+                got = "a NUL" if end[0] == b"\0" else "another <task"
+                return self._give_up(f"wanted </task>, got {got}: half a task", found, start[1])
+            if len(self._data) > self._limit:
+                return self._give_up(self._too_large, found, start[1])
+            self._looked = max(start.end(), len(self._data) - 80)  # an end may have come in half
+            return False
+        if end.end() > self._limit:
+            return self._give_up(self._too_large, found, start[1])
+        self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), found)
+        return True
+
+    def _tell(self, tag: bytes, body: bytes, end: int, found: list[Task | Content | Fault]) -> None:
+        self._drop(end)
+        task = replace(_head(tag), params=_params(body.decode("utf-8", "replace")))
+        if not task.name:
+            got = _values(tag).get("name", "")
+            found.append(Fault(f"wanted <task> with the name of a task, got {got[:64]!r}", _head(tag)))
+            return
+        found.append(task)
+        if task.name != FOLLOWED or len(task.params) != 2:
+            return
+        size = task.params[1].strip()
+        if not (size.isascii() and size.isdecimal() and len(size) < 12 and 0 < int(size) <= self._limit):
+            found.append(Fault(f"{FOLLOWED}: wanted 1..{self._limit} bytes to follow, got {size[:20]!r}"))
+            return
+        self._content, self._size = task, int(size)
+
+    def _take_content(self, found: list[Task | Content | Fault]) -> bool:
+        assert self._content is not None
+        nul = self._data[:1] == b"\0"  # the terminator of the task; no sound file begins so
+        if len(self._data) < self._size + nul:
+            return False
+        found.append(Content(self._content, bytes(self._data[nul : self._size + nul])))
+        self._drop(self._size + nul)
+        self._content = None
+        return True
+
+    @property
+    def _too_large(self) -> str:
+        return f"wanted a task of at most {self._limit} bytes, got more"
+
+    def _give_up(self, text: str, found: list[Task | Content | Fault], tag: bytes = b"") -> bool:
+        """Tell of a fault; `tag` is what stands behind `<task` in the one that it is in."""
+        found.append(Fault(text, _head(tag)))
+        self._lost = True
+        self._drop(1)  # at least the mark that was misunderstood
+        return True
+
+    def _skip(self) -> bool:
+        """To the end of what was told of."""
+        bound = _BOUND.search(self._data)
+        if bound is None:
+            self._drop(max(0, len(self._data) - 5))
+            return False
+        self._lost = False
+        self._drop(bound.start() if bound[0] != b"\0" else bound.end())
+        return True
+
+    def _drop(self, count: int) -> None:
+        del self._data[:count]
+        self._looked = 0
+
+
+def _values(tag: bytes) -> dict[str, str]:
+    return {name: one or two for name, one, two in _VALUE.findall(tag.decode("utf-8", "replace"))}
+
+
+def _head(tag: bytes) -> Task:
+    """What a tag says of its task; its name is "" where it cannot be one."""
+    values = _values(tag)
+    name = values.get("name", "")
+    known = name if _NAME.fullmatch(name) else ""
+    return Task(known, _number(values.get("ownerId")), _number(values.get("taskId")))
+
+
+def _number(text: str | None) -> int:
+    """As clients count; what is no number is 0, as in the player there is."""
+    return int(text) if text is not None and text.isascii() and text.isdecimal() and len(text) < 10 else 0
+
+
+def _params(body: str) -> tuple[str, ...]:
+    """What stands in each <param>, as it is; a param may hold XML, also with params of its own."""
+    params: list[str] = []
+    depth = begin = 0
+    for mark in _PARAM.finditer(body):
+        if mark[0].endswith("/>"):
+            if depth == 0:
+                params.append("")
+        elif mark[0].startswith("</"):
+            depth -= 1
+            if depth == 0:
+                params.append(_plain(body[begin : mark.start()]))
+            depth = max(depth, 0)
+        else:
+            if depth == 0:
+                begin = mark.end()
+            depth += 1
+    return tuple(params)
+
+
+def _plain(text: str) -> str:
+    """Without the CDATA around all of it."""
+    inner = text.strip()
+    if inner.startswith("<![CDATA[") and inner.endswith("]]>"):
+        return inner[9:-3]
+    return text

@@ -1,0 +1,168 @@
+"""The Xface TCP door: clients that push FAPs to an Xface player, and scripts, find one here."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Iterable
+
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
+from realizer.server.http.access import Pace
+from realizer.server.runtime.session_host import Shell
+from realizer.server.runtime.session_registry import HubError
+from realizer.server.transports.message_format import Leave, ToSession
+from realizer.server.transports.tcp_listener import Listener, session_of
+from realizer.server.transports.xface.attachments import Brought, prepare
+from realizer.server.transports.xface.reader import Content, Fault, TaskReader
+from realizer.server.transports.xface.tasks import ERROR, Answer, Desk
+from realizer.server.transports.xface.wire import Task
+
+__all__ = ["XfaceDoor"]
+
+log = logging.getLogger(__name__)
+
+READ = 64 * 1024  # bytes
+# Of one task: minutes of FAP text, and more than plays as one document.
+LIMIT = 4 * 2**20  # bytes
+MOST_CLIENTS = 64  # a player is steered by one or two; each may hold a task that has not come to its end
+# What is understood at once; more of it goes to a thread, so that the frames of others are not late.
+SMALL = 16 * 1024  # characters
+FEEDBACK = (
+    '{"type":"subscribe","stream":"feedback",'
+    '"elements":["predictionFeedback","blockProgress","warningFeedback"]}'
+)
+
+
+class XfaceDoor:
+    """Listens on `settings.host` and `settings.xface_port`; `port` is the one that is open after `start`.
+
+    Each client has its own number, its own loaded file and its own queue, as several have in the player. The
+    clients of one address share a face: that of the session `xface-ADDRESS`, which viewers can join.
+    """
+
+    def __init__(self, shell: Shell, settings: Settings) -> None:
+        assert settings.xface_port is not None
+        self._listener = Listener(
+            "xface", settings.host, settings.xface_port, self._talk, settings.max_connections
+        )
+        self._settings = settings
+        self._shell = shell
+        self._count = 0
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        return (f"xface: tasks at {self._listener.where}, session xface-ADDRESS",)
+
+    @property
+    def port(self) -> int:
+        """The one that is open after `start`."""
+        return self._listener.port
+
+    async def start(self) -> None:
+        await self._listener.start()
+
+    async def ready(self) -> None:
+        return
+
+    def shut(self) -> None:
+        self._listener.shut()
+
+    async def close(self) -> None:
+        await self._listener.close()
+
+    async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._count += 1
+        seat = _Seat(self._shell, Desk(self._count), writer)
+        try:
+            if len(self._listener) > MOST_CLIENTS:
+                raise HubError(503, f"{MOST_CLIENTS} clients are connected: wanted fewer")
+            number = self._shell.join(seat, session_of("xface", host))
+        except HubError as error:
+            log.warning("xface: %s is not let in: %s", host, error)
+            writer.write(ERROR)
+            await writer.drain()
+            writer.close()
+            return
+        seat.sit(number)
+        try:
+            await self._read(reader, writer, seat)
+        finally:
+            self._shell.leave(number)
+
+    async def _read(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, seat: _Seat) -> None:
+        tasks = TaskReader(min(LIMIT, self._settings.max_message))
+        pace, loop = Pace(self._settings.max_rate), asyncio.get_running_loop()
+        while data := await reader.read(READ):
+            for found in tasks.feed(data):
+                match found:
+                    case Fault(text, task):
+                        log.info("xface: client %d: %s", seat.desk.owner, text)
+                        seat.do(seat.desk.refuse(task))
+                    case Task():
+                        seat.do(seat.desk.accept(found))
+                        brought = await self._prepared(found)
+                        seat.do(seat.desk.run(found, brought, asyncio.get_running_loop().time()))
+                    case Content():
+                        pass  # of a task that has been answered
+                if seat.left:
+                    return
+                # 0 too: a read full of tasks must not hold up the frames of others, nor pile up notes unread.
+                pause = pace.wait(loop.time())
+                if pace.news is not None:
+                    log.warning("xface: client %d: %s", seat.desk.owner, pace.news)
+                await asyncio.sleep(pause)
+                await writer.drain()
+
+    async def _prepared(self, task: Task) -> Brought:
+        try:
+            if sum(map(len, task.params)) < SMALL and task.name != "LOAD_FAP":
+                return prepare(task, self._settings)
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(None, prepare, task, self._settings)
+        except RealizerError as error:
+            return error
+        except OSError as error:
+            return RealizerError(str(error.strerror or error))
+
+
+class _Seat:
+    """One client in its session."""
+
+    def __init__(self, shell: Shell, desk: Desk, writer: asyncio.StreamWriter) -> None:
+        self.desk = desk
+        self.left = False
+        self._shell = shell
+        self._writer = writer
+        self._number = 0
+
+    def sit(self, number: int) -> None:
+        """It has joined its session."""
+        self._number = number
+        self._shell.receive(number, FEEDBACK)
+        self._writer.write(self.desk.greeting)
+
+    def do(self, answers: Iterable[Answer]) -> None:
+        """Carry out what the desk wants, in order."""
+        for answer in answers:
+            match answer:
+                case ToSession(text):
+                    self.left = self.left or not self._shell.receive(self._number, text)
+                case Leave():
+                    self.left = True
+                case note:
+                    self._writer.write(note)
+
+    @property
+    def waiting(self) -> int:
+        return self._writer.transport.get_write_buffer_size()
+
+    def send(self, data: str | bytes) -> None:
+        if isinstance(data, str):
+            loop = asyncio.get_running_loop()
+            # What the desk wants of the session now would come back here before this has been told.
+            loop.call_soon(lambda: self.do(self.desk.told(data, loop.time())))
+
+    def end(self, code: int, reason: str) -> None:
+        log.warning("xface: client %d is let go of: %s", self.desk.owner, reason)
+        self._writer.transport.abort()

@@ -1,0 +1,153 @@
+"""Two rows of features, one with places where a pause may be, in; which frame belongs to which out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from realizer.core.array_types import Bool, Float64
+
+__all__ = ["Heard", "Index", "States", "matched", "quiet", "unlike", "usual"]
+
+Index = npt.NDArray[np.intp]
+
+# In units of the usual difference of a frame and a state; found by trial on human and on synthetic speech.
+STAY, SKIP, SKIP_TWO = 0.3, 0.3, 1.0  # of a state a frame longer, or of states left out
+ENTER = 5.0  # of a pause: a weak sound or a closure is none
+SILENT, NOT_SILENT = 0.35, 8.0  # of a silent frame in a pause, and for each part of loudness more
+NOISE = 2.0  # of a frame in a pause at most: a breath or a cough, which is not of the text
+IMPOSSIBLE = 1e30
+AT_ONCE = 256  # frames whose costs are worked out together
+SAMPLED = 300  # rows and columns that the usual difference is taken of
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """What is to be heard, in order.
+
+    Attributes:
+        features: (j, d); rows of pauses do not count.
+        pause: (j,) where a pause may be, or not: it can be left out. The first and the last are such.
+        times: (j,) seconds in the reference; of a pause that of what follows.
+    """
+
+    features: Float64
+    pause: Bool
+    times: Float64
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """What is heard.
+
+    Attributes:
+        features: (t, d), normalised as those of the states are.
+        quiet: (t,) what each frame costs in a pause.
+        usual: the unit of costs: the median difference of a frame and a state.
+    """
+
+    features: Float64
+    quiet: Float64
+    usual: float
+
+
+def unlike(features: Float64, others: Float64) -> Float64:
+    """(t, j) root mean square differences of (t, d) and (j, d) features."""
+    squares = (features**2).sum(axis=1)[:, None] + (others**2).sum(axis=1)
+    distance: Float64 = np.sqrt(
+        np.maximum(squares - 2 * (features @ others.T), 0.0) / max(1, features.shape[1])
+    )
+    return distance
+
+
+def usual(features: Float64, others: Float64) -> float:
+    """The median of `unlike`, of evenly chosen rows."""
+    some = (rows[:: max(1, len(rows) // SAMPLED)] for rows in (features, others))
+    return max(float(np.median(unlike(*some))), 1e-6)
+
+
+def quiet(part: Float64, threshold: float) -> Float64:
+    """(t,) what frames cost in a pause, by how loud they are between silence (0) and speech (1)."""
+    cost: Float64 = np.minimum(SILENT + NOT_SILENT * np.maximum(0.0, part - threshold), NOISE)
+    return cost
+
+
+def matched(
+    heard: Heard, states: States, centre: Index | None = None, reach: int = 0
+) -> tuple[Index, Float64]:
+    """The cheapest way: (t,) the state of each frame, and (t,) what each costs.
+
+    From one frame to the next the state is the same one, the next, or one of the two after that (dynamic time
+    warping with slopes 0 to 3); a pause is left out or stayed in for nothing. Work and memory are t times the
+    width of the band.
+
+    Args:
+        heard: t frames.
+        states: j of them.
+        centre: (t,) the state about which the way lies, rising; None: anywhere.
+        reach: states to each side of it.
+
+    Source: Sakoe and Chiba 1978, with the pauses of a recogniser of words.
+    """
+    frames, count = len(heard.features), len(states.times)
+    width = count if centre is None else min(count, 2 * reach + 1)
+    lows = np.zeros(frames, np.intp) if centre is None else np.clip(centre - reach, 0, count - width)
+    penalties = _penalties(states.pause)
+    stay, enter, two, three = penalties
+    came = np.zeros((frames, width), np.int8)
+    costs = _costs(heard, states, lows, width)
+    total = np.full(width + 3, IMPOSSIBLE)  # by state - low, after three that are impossible
+    total[3:5] = next(costs)[:2]
+    ways, places = np.empty((4, width)), np.arange(width)
+    for t in range(1, frames):
+        low, shift = int(lows[t]), int(lows[t] - lows[t - 1])
+        if shift:
+            moved = np.full(width + 3, IMPOSSIBLE)
+            moved[: max(0, width + 3 - shift)] = total[shift:]
+            total = moved
+        these = slice(low, low + width)
+        np.add(total[3:], stay[these], out=ways[0])
+        np.add(total[2:-1], enter[these], out=ways[1])
+        np.add(total[1:-2], two[these], out=ways[2])
+        np.add(total[:-3], three[these], out=ways[3])
+        came[t] = ways.argmin(axis=0)
+        total[3:], total[:3] = ways[came[t], places] + next(costs), IMPOSSIBLE
+    way = _traced(came, lows, width - 1 - int(total[-1] > total[-2]))
+    spent = np.sqrt(((heard.features - states.features[way]) ** 2).mean(axis=1)) / heard.usual
+    spent = np.where(states.pause[way], heard.quiet, spent)
+    spent[1:] += penalties[np.diff(way), way[1:]]
+    return way, spent
+
+
+def _penalties(pause: Bool) -> Float64:
+    """(4, j): of staying in a state, and of coming to it from the one, two or three before."""
+    enter = np.where(pause, ENTER, 0.0)
+    enter[[0, -1]] = 0.0  # silence before and after all of it is not a pause that somebody makes
+    over = np.append(False, pause[:-1])  # a pause is left out
+    over_two = over | np.append([False, False], pause[:-2])[: len(pause)]
+    stay = np.where(pause, 0.0, STAY)
+    two, three = np.where(over, 0.0, SKIP), np.where(over_two, SKIP, SKIP_TWO)
+    return np.stack([stay, enter, enter + two, enter + three])
+
+
+def _costs(heard: Heard, states: States, lows: Index, width: int) -> Iterator[Float64]:
+    """(width,) for each frame."""
+    for k in range(0, len(lows), AT_ONCE):
+        band = slice(int(lows[k]), int(lows[k : k + AT_ONCE][-1]) + width)
+        rows = unlike(heard.features[k : k + AT_ONCE], states.features[band]) / heard.usual
+        rows[:, states.pause[band]] = heard.quiet[k : k + AT_ONCE, None]
+        for row, low in zip(rows, lows[k : k + AT_ONCE] - lows[k], strict=True):
+            yield row[low : low + width]
+
+
+def _traced(came: npt.NDArray[np.int8], lows: Index, last: int) -> Index:
+    """(t,) states, from the last place in its band back."""
+    way = np.empty(len(lows), np.intp)
+    state = int(lows[-1]) + last
+    for t in range(len(lows) - 1, -1, -1):
+        way[t] = state
+        state -= int(came[t, state - lows[t]])
+    return way

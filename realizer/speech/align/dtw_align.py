@@ -1,0 +1,197 @@
+"""A recording and a voice that says the same in; when the recording says each word and phoneme out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float32, Float64
+from realizer.speech.align import features as f
+from realizer.speech.align.dtw import Heard, Index, States, matched, quiet, usual
+from realizer.speech.utterance import Utterance
+
+__all__ = ["Spans", "by_sound"]
+
+COARSE, FINE = 320, 80  # samples between frames: 20 and 5 ms
+FAR, NEAR = 30.0, 0.4  # s to each side that the way is looked for in: of the diagonal, and of the coarse way
+SLOWEST, FASTEST = 0.4, 2.5  # of the reference, which is brought to the speed of the recording first
+LEAST = 0.2  # s of speech
+RIDGE = 30.0  # frames that speak against any change when the one voice is made to sound like the other
+
+
+@dataclass(frozen=True, eq=False)
+class Spans:
+    """What was found, in seconds of the recording.
+
+    Attributes:
+        reference: the voice that was most like it.
+        words: (n, 2) start and end of each word of the reference.
+        phonemes: (m, 2) of each phoneme; its pauses are (nan, nan).
+        costs: (n,) how unlike the two are in each word, where 1 is as unlike as the same sounds in the wrong
+            order: under 0.9 for the same words in another voice, near 1 for others.
+        cost: of all of it.
+        pace: how many times faster than the reference it is.
+    """
+
+    reference: Utterance
+    words: Float64
+    phonemes: Float64
+    costs: Float64
+    cost: float
+    pace: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Match:
+    """A voice brought to the speed of the recording, and the coarse way between the two."""
+
+    reference: Utterance
+    spoken: Float32
+    speed: float
+    pace: float
+    states: States
+    heard: Heard
+    way: Index
+    spent: Float64
+    null: float
+
+    @property
+    def cost(self) -> float:
+        said = ~self.states.pause[self.way]
+        return float(self.spent[said].mean()) / self.null if said.any() else 1.0
+
+
+def by_sound(sound: Float32, references: Sequence[Utterance]) -> Spans:
+    """Warp a voice that says the same text to the recording; no model, any language that the voice speaks.
+
+    Args:
+        sound: (n,) at 16 kHz, with something to be heard in it.
+        references: the same text by voices that differ, with sound; what is most like the recording counts.
+
+    Source: Malfrère and Dutoit 1997, who align speech by synthesis.
+    """
+    best = min((_matched(sound, reference) for reference in references), key=lambda match: match.cost)
+    reference, states, way = best.reference, best.states, best.way
+
+    # The same with the voice made to sound like the recording, closer, and only near the way found.
+    energy = f.energies(sound, FINE)
+    part, talks = f.sounding(f.loudness(energy))
+    fine = _states(best.spoken, FINE * best.speed, reference)
+    change = _likened(best.heard.features, states, way)
+    likened = States(
+        np.hstack([fine.features, np.ones((len(fine.times), 1))]) @ change, fine.pause, fine.times
+    )
+    heard = _heard(f.cepstra(energy), part, talks, likened)
+    about = np.minimum(np.arange(len(energy)) * FINE // COARSE, len(way) - 1)
+    centre = np.maximum.accumulate(np.searchsorted(fine.times, states.times[way[about]]).astype(np.intp))
+    centre[-1] = len(fine.times) - 1
+    closely, _ = matched(heard, likened, centre, round(NEAR * f.RATE / FINE))
+
+    def spans(pairs: Sequence[tuple[float, float]]) -> Float64:
+        return _spans(np.array(pairs).reshape(-1, 2), fine, closely) * FINE / f.RATE
+
+    words = spans([(word.start, word.end) for word in reference.words])
+    return Spans(
+        reference=reference,
+        words=words,
+        phonemes=spans([(p.start, p.end) if p.ipa else (np.nan, np.nan) for p in reference.phonemes]),
+        costs=_costs(words, way, best.spent, states.pause, best.null),
+        cost=best.cost,
+        pace=best.pace,
+    )
+
+
+def _matched(sound: Float32, reference: Utterance) -> _Match:
+    assert reference.pcm is not None
+    spoken = f.resampled((reference.pcm / 32768).astype(np.float32), reference.sample_rate)
+    seconds = sum(p.end - p.start for p in reference.phonemes if p.ipa)
+    energy = f.energies(sound, COARSE)
+    part, talks = f.sounding(f.loudness(energy))
+    pace = max(seconds, LEAST) / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
+    speed = min(max(pace, SLOWEST), FASTEST)
+    states = _states(spoken, COARSE * speed, reference)
+    heard = _heard(f.cepstra(energy), part, talks, states)
+    centre = np.rint(np.linspace(0, len(states.times) - 1, len(energy))).astype(np.intp)
+    reach = max(round(FAR * f.RATE / COARSE), 1)
+    way, spent = matched(heard, states, centre, reach)
+    null = _null(heard, states, centre, reach)
+    return _Match(reference, spoken, speed, pace, states, heard, way, spent, null)
+
+
+def _states(spoken: Float32, hop: float, reference: Utterance) -> States:
+    """The frames of the reference, instead of its pauses one before each word and at the end."""
+    values = f.cepstra(f.energies(spoken, hop))
+    times = np.arange(len(values)) * hop / f.RATE
+    said = np.ones(len(times), bool)
+    for phoneme in reference.phonemes:
+        if not phoneme.ipa:
+            said &= (times < phoneme.start) | (times >= phoneme.end)
+    if not said.any():
+        said[:] = True
+    values = f.normalised(values, said)[said]
+    times = times[said]
+    starts = [word.start for word in reference.words]
+    word = np.maximum(np.searchsorted(starts, times + 1e-9, side="right") - 1, 0)
+    breaks = np.append(np.flatnonzero(np.diff(word, prepend=-1)), len(times))
+    return States(
+        np.insert(values, breaks, 0.0, axis=0),
+        np.insert(np.zeros(len(times), bool), breaks, True),
+        np.insert(times, breaks, np.append(times, times[-1] + hop / f.RATE)[breaks]),
+    )
+
+
+def _heard(values: Float64, part: Float64, talks: Bool, states: States) -> Heard:
+    values = f.normalised(values, talks)
+    unit = usual(values[talks] if talks.any() else values, states.features[~states.pause])
+    return Heard(values, quiet(part, f.HEARD), unit)
+
+
+def _likened(values: Float64, states: States, way: Index) -> Float64:
+    """(d + 1, d): a linear change of the reference's features, and a shift, to the recording's."""
+    pairs = ~states.pause[way]
+    ours = np.hstack([states.features[way[pairs]], np.ones((int(pairs.sum()), 1))])
+    same = np.eye(ours.shape[1])
+    change = np.linalg.solve(ours.T @ ours + RIDGE * same, ours.T @ values[pairs] + RIDGE * same[:, :-1])
+    return np.asarray(change, np.float64)
+
+
+def _null(heard: Heard, states: States, centre: Index, reach: int) -> float:
+    """What a wrong text would cost, of the same sounds: the least of their costs in other orders."""
+    places = np.arange(len(states.times))
+    found = [1.0]
+    for order in (places[::-1], *(np.roll(places, len(places) * part // 3) for part in (1, 2))):
+        pause = states.pause[order]
+        pause[[0, -1]] = True
+        way, spent = matched(heard, States(states.features[order], pause, states.times), centre, reach)
+        said = ~pause[way]
+        if said.any():
+            found.append(float(spent[said].mean()))
+    return max(min(found[1:] or found), 1e-6)
+
+
+def _costs(words: Float64, way: Index, spent: Float64, pause: Bool, null: float) -> Float64:
+    """(n,) the mean cost of the frames of each word."""
+    said = ~pause[way]
+    total = np.append(0.0, np.cumsum(np.where(said, spent, 0.0)))
+    count = np.append(0, np.cumsum(said))
+    first, last = (np.clip(np.rint(words * f.RATE / COARSE), 0, len(way)).astype(np.intp)).T
+    last = np.minimum(np.maximum(last, first + 1), len(way))
+    first = np.minimum(first, last - 1)
+    frames = count[last] - count[first]
+    costs = np.where(frames > 0, (total[last] - total[first]) / np.maximum(frames, 1) / null, 1.0)
+    return np.asarray(costs, np.float64)
+
+
+def _spans(pairs: Float64, states: States, way: Index) -> Float64:
+    """(n, 2) frames in which the way enters and leaves what lies between two times of the reference."""
+    said = np.flatnonzero(~states.pause)
+    times = states.times[said]
+    first = np.searchsorted(times, pairs[:, 0] - 1e-9)
+    last = np.searchsorted(times, pairs[:, 1] - 1e-9) - 1
+    enters = np.searchsorted(way, said[np.minimum(first, len(said) - 1)])
+    leaves = np.searchsorted(way, said[np.clip(last, 0, len(said) - 1)], side="right")
+    found = np.stack([enters, np.maximum(enters, leaves)], axis=1).astype(np.float64)
+    found[np.isnan(pairs).any(axis=1)] = np.nan
+    return found

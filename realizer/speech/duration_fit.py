@@ -1,0 +1,98 @@
+"""What is to be said, and how long it is to last, in; an utterance of that length out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from realizer.speech.utterance import WARP, Say, Utterance, Voice
+from realizer.speech.volume import with_volumes
+
+__all__ = ["fitted", "near", "stretched"]
+
+# A voice is asked again at another rate so often; its rate has steps, and pauses do not stretch evenly.
+TRIES = 9
+# What is left is made up for by playing it faster or slower by so little (a tenth of a semitone) that nobody
+# hears it.
+NEAR = 0.006
+
+
+def fitted(voice: Voice, say: Say) -> Utterance:
+    """Speak, `say.seconds` long where that is given: at the rate that comes nearest, then by resampling.
+
+    What is recorded is not spoken (`speech.given`), and stays as long as it is.
+
+    Raises:
+        VoiceError: as `voice.say`.
+    """
+    if say.recording is not None:
+        from realizer.speech.recorded.recorded_speech import played
+
+        return with_volumes(say, played(say, say.recording))
+    return with_volumes(say, _spoken(voice, say))
+
+
+def _spoken(voice: Voice, say: Say) -> Utterance:
+    utterance = voice.say(replace(say, seconds=None))
+    if say.seconds is None or not utterance.duration:
+        return utterance
+    rate, best = say.rate, utterance
+    slow: tuple[float, float] | None = None  # the fastest rate that is too slow, and how long it takes
+    fast: tuple[float, float] | None = None
+    for _ in range(TRIES):
+        if abs(best.duration / say.seconds - 1.0) <= NEAR:
+            break
+        if utterance.duration > say.seconds:
+            slow = (rate, utterance.duration)
+        else:
+            fast = (rate, utterance.duration)
+        if slow and fast and slow[1] > fast[1]:
+            # Between the two, by length as they lie, but never so near to one of them that nothing is won.
+            part = min(0.8, max(0.2, (slow[1] - say.seconds) / (slow[1] - fast[1])))
+            rate = slow[0] + part * (fast[0] - slow[0])
+        else:
+            rate *= utterance.duration / say.seconds
+        before, utterance = utterance, voice.say(replace(say, rate=rate, seconds=None))
+        if abs(utterance.duration - say.seconds) < abs(best.duration - say.seconds):
+            best = utterance
+        elif utterance.duration == before.duration and not (slow and fast):
+            break  # as slow or as fast as it can
+    return near(stretched(best, {"end": say.seconds}))
+
+
+def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
+    """The same utterance with its end, and marks that are named, at these times; it stretches no more.
+
+    Args:
+        times: "end" or a mark -> seconds from its start.
+    """
+    was = {**utterance.marks, "end": utterance.duration}
+    knots = sorted((was[name], time) for name, time in times.items() if name in was)
+    source, target = (np.array([0.0, *side]) for side in zip(*knots, strict=True))
+    source, target = np.maximum.accumulate(source), np.maximum.accumulate(target)
+
+    def moved(time: float) -> float:
+        return float(np.interp(time, source, target))
+
+    end, pcm = float(target[-1]), utterance.pcm
+    if pcm is not None:
+        rate = utterance.sample_rate
+        at = np.interp(np.arange(round(end * rate)) / rate, target, source) * rate
+        pcm = np.rint(np.interp(at, np.arange(len(pcm)), pcm)).astype(np.int16)
+    return replace(
+        utterance,
+        duration=end,
+        words=tuple(replace(w, start=moved(w.start), end=moved(w.end)) for w in utterance.words),
+        phonemes=tuple(replace(p, start=moved(p.start), end=moved(p.end)) for p in utterance.phonemes),
+        marks={name: times[name] if name in times else moved(at) for name, at in utterance.marks.items()},
+        pcm=pcm,
+        stretch=(1.0, 1.0),
+        parts=(),
+    )
+
+
+def near(utterance: Utterance) -> Utterance:
+    """An utterance that the voice is not asked for again: it can be warped a little."""
+    return replace(utterance, stretch=WARP if utterance.duration else (1.0, 1.0))

@@ -1,0 +1,90 @@
+"""A script in, the SSML that espeak-ng is given and where our words and marks stand in it out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from realizer.speech.ssml import Break, Mark, Part, Script, Tag, write_tag
+from realizer.speech.ssml_prosody import PLAIN
+from realizer.speech.words import PlacedMark, words_in
+
+__all__ = ["Document", "write_document"]
+
+# Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
+OCTAVES = 0.72
+MOST_PITCH = 198.0  # %; its setting ends there
+STOPS = re.compile(r"\.+(?!\w)")
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """What espeak-ng is given.
+
+    Attributes:
+        text: SSML; marks are named m0, m1, ...
+        words: (word, place) with places as espeak-ng counts them: characters of `text` from 1.
+        marks: in the order of the text.
+    """
+
+    text: str
+    words: tuple[tuple[str, int], ...]
+    marks: tuple[PlacedMark, ...]
+
+
+def write_document(script: Script) -> Document:
+    """The script as SSML: inside <speak>, attributes in double quotes, only elements that are spoken."""
+    text = "<speak>"
+    words: list[tuple[str, int]] = []
+    marks: list[PlacedMark] = []
+    for part in _stops_first(script.parts):
+        if isinstance(part, str):
+            words += [(word, len(text) + len(escape(part[:at])) + 1) for word, at in words_in(part)]
+            text += escape(part)
+        elif isinstance(part, Mark):
+            text += f'<mark name="m{len(marks)}"/>'
+            marks.append(PlacedMark(part.name, len(words), False))
+        elif isinstance(part, Break):
+            text += f'<break time="{round(part.seconds * 1000)}ms"/>'
+            marks = [PlacedMark(m.name, m.word, m.paused or m.word == len(words)) for m in marks]
+        else:
+            text += write_tag(_in_its_units(part))
+    return Document(text + "</speak>", tuple(words), tuple(marks))
+
+
+def _stops_first(parts: Sequence[Part]) -> list[Part]:
+    """The parts, full stops that stand behind a mark before it: alone there espeak-ng says "dot"."""
+    moved: list[Part] = []
+    for part in parts:
+        stops = STOPS.match(part) if isinstance(part, str) else None
+        at = len(moved)
+        while at and isinstance(moved[at - 1], Mark):
+            at -= 1
+        said = moved[at - 1] if at else None
+        if stops is None or at == len(moved) or not isinstance(said, str) or said[-1].isspace():
+            moved.append(part)
+            continue
+        moved[at - 1] = said + stops[0]
+        if rest := str(part)[stops.end() :]:
+            moved.append(rest)
+    return moved
+
+
+def _in_its_units(tag: Tag) -> Tag:
+    """The tag with volume and pitch of <prosody> as espeak-ng means them.
+
+    It reads decibels and semitones as per cent, and its pitch is a setting and not a factor.
+    """
+    if tag.name != "prosody" or tag.attributes is None:
+        return tag
+    given = dict(tag.attributes)
+    manner = PLAIN.within(given)
+    if "volume" in given:
+        given["volume"] = f"{100 * manner.volume:.1f}%"
+    if manner.pitch != PLAIN.pitch:  # of Hz it alone knows what they are
+        given["pitch"] = f"{min(MOST_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
+    return Tag(tag.name, tuple(given.items()))

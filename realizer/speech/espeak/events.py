@@ -1,0 +1,226 @@
+"""What espeak-ng reports in, times of our words, phonemes and marks out: merged words split, marks found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from realizer.core.array_types import Int16
+from realizer.speech.espeak.document import Document
+from realizer.speech.espeak.protocol import END, MARK, PHONEME, WORD, Event
+from realizer.speech.utterance import Phoneme, Word
+from realizer.speech.word_boundaries import bare, cuts, is_vowel
+
+__all__ = ["Timeline", "timeline"]
+
+STRESS = {"ˈ": 1, "ˌ": 2}
+SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
+LEAST_CLOSURE = 0.01  # s
+KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
+
+Spoken = Callable[[Sequence[str]], Sequence[Sequence[str]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    words: tuple[Word, ...]
+    phonemes: tuple[Phoneme, ...]
+    marks: Mapping[str, float]
+
+
+@dataclass(slots=True)
+class Group:
+    """A run of phonemes that begins where one of our words surely begins, and the words in it."""
+
+    sample: int
+    first: int  # of the phonemes
+    words: list[int] = field(default_factory=list)
+
+
+def timeline(document: Document, events: Sequence[Event], pcm: Int16, rate: int, spoken: Spoken) -> Timeline:
+    """The times of everything in seconds; phonemes tile 0..len(pcm)/rate without a gap.
+
+    Args:
+        document: what was spoken.
+        events: (type, sample, place, text) in order.
+        pcm: (n,) int16.
+        rate: Hz.
+        spoken: words -> the phonemes of each alone; only asked where espeak-ng merged words.
+    """
+    events = _linked(events)
+    begins, sounds, word_events = _sounds(events, len(pcm))
+    words = _words(document, begins, sounds, word_events, len(pcm), spoken)
+    marks = _marks(document, events, words)
+    phonemes = _phonemes(_with_closures(begins, sounds, pcm, rate), sounds, len(pcm), rate)
+    return Timeline(
+        words=tuple(
+            Word(first / rate, last / rate, text)
+            for (text, _), (first, last) in zip(document.words, words, strict=True)
+        ),
+        phonemes=phonemes,
+        marks={name: sample / rate for name, sample in marks.items()},
+    )
+
+
+def _linked(events: Sequence[Event]) -> list[Event]:
+    """The events with words and marks that come too early moved to their first phoneme.
+
+    Where a nasal runs on into a vowel ("one of", "am in"), espeak-ng reports the second word, after the
+    nasal in order, at the time when the nasal begins.
+    """
+    moved = list(events)
+    latest: tuple[int, str] = (-1, "")
+    for k, (kind, sample, place, text) in enumerate(moved):
+        if kind == PHONEME:
+            latest = (sample, text)
+        elif kind in (WORD, MARK) and latest[1] and sample <= latest[0]:
+            later = next((s for t, s, _, _ in moved[k:] if t in (PHONEME, END)), sample)
+            moved[k] = (kind, max(sample, later), place, text)
+    return moved
+
+
+def _sounds(events: Sequence[Event], end: int) -> tuple[list[int], list[str], list[tuple[int, int, int]]]:
+    """Starts of phonemes, their IPA with stress, and (sample, place, index of its first phoneme) of words."""
+    begins: list[int] = []
+    sounds: list[str] = []
+    words: list[tuple[int, int, int]] = []
+    for kind, sample, place, text in events:
+        if kind == WORD:
+            words.append((min(sample, end), place, len(sounds)))
+        elif kind == PHONEME and not text.startswith("("):  # "(en)": the language changes
+            begins.append(min(sample, end))
+            sounds.append(text)
+    return begins, sounds, words
+
+
+def _words(
+    document: Document,
+    begins: Sequence[int],
+    sounds: Sequence[str],
+    events: Sequence[tuple[int, int, int]],
+    end: int,
+    spoken: Spoken,
+) -> list[tuple[int, int]]:
+    """For each of our words: its first sample and the one after its last."""
+    if not document.words:
+        return []
+    starts = {place: index for index, (_, place) in enumerate(document.words)}
+    groups: list[Group] = []
+    last = -1
+    for sample, place, first in events:
+        # After some punctuation the place is that of the blank before the word.
+        index = starts.get(place, starts.get(place + 1, -1))
+        if index > last:
+            groups.append(Group(sample, first))
+            groups[-1].words.append(index)
+            last = index
+    if not groups:
+        groups = [Group(begins[0] if begins else 0, 0)]
+    if not groups[0].words or groups[0].words[0] != 0:  # words before the first that was reported
+        groups[0].words = [0]
+        groups[0].first = 0
+    bounds = [group.words[0] for group in groups] + [len(document.words)]
+    for k, group in enumerate(groups):
+        group.words = list(range(bounds[k], bounds[k + 1]))
+    merged = [i for group in groups if len(group.words) > 1 for i in group.words]
+    alone = dict(zip(merged, spoken([document.words[i][0] for i in merged]), strict=True)) if merged else {}
+    inner = {first: sample for sample, _, first in events}
+
+    found: list[tuple[int, int]] = []
+    for k, group in enumerate(groups):
+        stop = groups[k + 1].first if k + 1 < len(groups) else len(sounds)
+        own = [i for i in range(group.first, stop) if sounds[i]]  # without pauses
+        places = [0]
+        if len(group.words) > 1:
+            hints = {n for n, i in enumerate(own) if i in inner}
+            places = cuts([alone[w] for w in group.words], [sounds[i] for i in own], hints)
+        places.append(len(own))
+        for n in range(len(group.words)):
+            mine = own[places[n] : places[n + 1]]
+            if n == 0:
+                first = group.sample
+            elif mine:
+                first = inner.get(mine[0], begins[mine[0]])
+            else:
+                first = found[-1][1]
+            until = begins[mine[-1] + 1] if mine and mine[-1] + 1 < len(begins) else end
+            found.append((first, max(first, until if mine else first)))
+    # A word ends where the next begins at the latest.
+    return [
+        (first, min(last, found[k + 1][0]) if k + 1 < len(found) else last)
+        for k, (first, last) in enumerate(found)
+    ]
+
+
+def _marks(document: Document, events: Sequence[Event], words: Sequence[tuple[int, int]]) -> dict[str, int]:
+    """Mark -> sample: where the next word begins; before a <break> and at the end as it is reported."""
+    reported: dict[str, int] = {}
+    for kind, sample, _, text in events:
+        if kind == MARK:
+            reported.setdefault(text, sample)
+    marks: dict[str, int] = {}
+    latest = 0
+    for k, mark in enumerate(document.marks):
+        before = words[mark.word - 1][1] if mark.word else 0
+        following = words[mark.word] if mark.word < len(words) else None
+        heard = reported.get(f"m{k}")
+        if following is not None and not mark.paused:
+            # A reported mark comes too early where espeak-ng puts a little pause before the word.
+            sample = following[0]
+        else:
+            sample = before if heard is None else heard
+        latest = max(latest, sample)
+        marks.setdefault(mark.name, latest)
+    return marks
+
+
+def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rate: int) -> list[int]:
+    """Starts of the phonemes with each closure given to the stop that it belongs to.
+
+    espeak-ng reports a stop at its burst: the silence of the closure counts to the sound before, and lips
+    that follow it would close when the burst is heard.
+    """
+    begins = list(begins)
+    loud = (pcm > SILENCE) | (pcm < -SILENCE)
+    mostly = [True, *loud.take([here - 1 for here in begins[1:]], mode="wrap").tolist()]
+    for k in range(1, len(begins)):
+        before, here = begins[k - 1], begins[k]
+        if mostly[k] or before == here or not sounds[k] or not sounds[k - 1] or _is_vowel(sounds[k]):
+            continue
+        backwards = loud[before:here][::-1]
+        still = int(backwards.argmax())  # 0 also where nothing is loud
+        quiet = here - still if still else before
+        if here - quiet >= LEAST_CLOSURE * rate:
+            begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (here - before)))
+    return begins
+
+
+def _phonemes(begins: Sequence[int], sounds: Sequence[str], end: int, rate: int) -> tuple[Phoneme, ...]:
+    found: list[tuple[int, str, int]] = [(0, "", 0)] if not begins or begins[0] > 0 else []
+    for sample, until, sound in zip(begins, [*begins[1:], end], sounds, strict=True):
+        if until <= sample:
+            continue
+        ipa, stress = _plain(sound)
+        if not ipa and found and not found[-1][1]:
+            continue  # two pauses are one
+        found.append((sample, ipa, stress))
+    ends = [sample for sample, _, _ in found[1:]] + [end]
+    return tuple(
+        Phoneme(sample / rate, until / rate, ipa, stress)
+        for (sample, ipa, stress), until in zip(found, ends, strict=True)
+        if until > sample
+    )
+
+
+# The same few hundred sounds are heard again and again.
+@lru_cache(maxsize=2048)
+def _plain(sound: str) -> tuple[str, int]:
+    """The sound without its stress, and that."""
+    stress = next((STRESS[c] for c in sound if c in STRESS), 0)
+    return sound.replace("ˈ", "").replace("ˌ", ""), stress
+
+
+@lru_cache(maxsize=2048)
+def _is_vowel(sound: str) -> bool:
+    return is_vowel(bare(sound))

@@ -1,0 +1,175 @@
+"""The espeak-ng voice: a request in, sound with exact times out; the engine lives in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from realizer.core.errors import VoiceError
+from realizer.speech.cache import Kept
+from realizer.speech.engine_process import Engine, EngineProcess
+from realizer.speech.espeak.document import write_document
+from realizer.speech.espeak.events import timeline
+from realizer.speech.espeak.protocol import read_answer
+from realizer.speech.ssml import Break, read_script
+from realizer.speech.utterance import STRETCH, Say, Utterance
+
+__all__ = ["EspeakVoice", "choose_voice", "missing"]
+
+WORDS_A_MINUTE = 175  # espeak-ng's own rate
+SLOWEST, FASTEST = 80, 450  # words a minute; what it accepts
+KEPT_WORDS = 4096
+INSTALL = "espeak-ng is not installed: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
+
+
+def missing() -> str | None:
+    """None where espeak-ng is installed; otherwise the sentence that says what to install."""
+    if importlib.util.find_spec("espeakng_loader") is not None:
+        return None
+    import ctypes.util  # slow, and only needed without the package
+
+    return None if ctypes.util.find_library("espeak-ng") else INSTALL
+
+
+ENGINE = Engine("espeak-ng", Path(__file__).with_name("worker.py"), missing)
+
+
+class EspeakVoice:
+    """espeak-ng in over 100 languages; the same request gives the same samples, in any order and process.
+
+    Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
+    the next one starts it again.
+
+    Args:
+        voice: a voice of espeak-ng ("nl", "en-gb+f3", "+m3" for the language's own with a variant), or None.
+        limit: seconds that one request may take.
+        options: for the worker process ("--data", PATH; "--no-fork").
+    """
+
+    def __init__(
+        self, voice: str | None = None, *, limit: float = 30.0, options: tuple[str, ...] = ()
+    ) -> None:
+        self.name = f"espeak:{voice}" if voice else "espeak"
+        self._voice = voice
+        self._process = EngineProcess(ENGINE, options, limit)
+        self._lock = threading.Lock()
+        self._kept = Kept()
+        self._alone: dict[tuple[str, str], tuple[str, ...]] = {}
+
+    def say(self, request: Say) -> Utterance:
+        """Speak; `duration` is exactly the sound's.
+
+        Wrong SSML is spoken as plain text, control characters and emoji are left out, an unknown language is
+        spoken as English, an empty text is no sound: each with a warning.
+
+        Raises:
+            VoiceError: the text is too long, or the engine is missing, died or hung.
+        """
+        return self._kept.get(request, self._spoken)
+
+    def close(self) -> None:
+        """End the process; may be called twice. A later request starts it again."""
+        self._process.close()
+
+    @property
+    def pid(self) -> int | None:
+        """Id of the engine's process while it runs."""
+        return self._process.pid
+
+    def languages(self) -> tuple[str, ...]:
+        """BCP-47 tags of what it speaks, in alphabetical order.
+
+        Raises:
+            VoiceError: it is not installed or does not start.
+        """
+        return tuple(sorted({tag for v in self._process.hello()["voices"] for _, tag in v["languages"]}))
+
+    def _spoken(self, request: Say) -> Utterance:
+        script = read_script(request)
+        if script.is_silent and not any(isinstance(part, Break) for part in script.parts):
+            marks = dict.fromkeys(script.marks, 0.0)
+            return Utterance(0.0, (), (), marks, 0, None, script.warnings)
+        hello = self._process.hello()
+        voice, warnings = choose_voice(hello, request.voice or self._voice, request.language)
+        wpm = round(min(FASTEST, max(SLOWEST, WORDS_A_MINUTE * request.rate)))
+        document = write_document(script)
+        head, body = self._process.ask({"op": "say", "text": document.text, "voice": voice, "wpm": wpm})
+        rate: int = hello["rate"]
+        events, pcm = read_answer(head, body)
+        times = timeline(document, events, pcm, rate, lambda words: self._spoken_alone(voice, words))
+        if not any(phoneme.ipa for phoneme in times.phonemes) and not script.is_silent:
+            warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
+        return Utterance(
+            duration=len(pcm) / rate,
+            stretch=STRETCH,
+            words=times.words,
+            phonemes=times.phonemes,
+            marks=times.marks,
+            sample_rate=rate,
+            pcm=pcm,
+            warnings=(*script.warnings, *warnings),
+        )
+
+    def _spoken_alone(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
+        """The phonemes of each word by itself."""
+        with self._lock:
+            known = dict(self._alone)
+        unknown = sorted({word for word in words if (voice, word) not in known})
+        if unknown:
+            head, _ = self._process.ask({"op": "phonemes", "voice": voice, "words": unknown})
+            for word, ipa in zip(unknown, head["phonemes"], strict=True):
+                known[voice, word] = tuple(ipa)
+            with self._lock:
+                self._alone = known if len(known) <= KEPT_WORDS else {}
+        return [known[voice, word] for word in words]
+
+
+def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tuple[str, tuple[str, ...]]:
+    """espeak-ng's own name of a voice, and warnings.
+
+    espeak-ng takes "nl" and "en-gb" but not "nl-NL" or "fr-fr": its list of voices knows which tag is whose.
+
+    Args:
+        hello: what the engine said of itself.
+        wanted: a tag, an identifier or a name of the list, with or without "+variant"; or None.
+        language: BCP-47, used where `wanted` names no voice.
+    """
+    warnings: list[str] = []
+    base, _, variant = (wanted or "").partition("+")
+    found = _by_tag(hello, base) or _by_name(hello, base) if base else None
+    if base and found is None and base in hello["variants"]:  # "f3" alone
+        base, variant = "", base
+    if base and found is None:
+        warnings.append(f"espeak-ng has no voice {base!r}: the language's own is used")
+    if variant and hello["variants"] and variant not in hello["variants"]:
+        warnings.append(f"espeak-ng has no variant {variant!r}: the plain voice is used")
+        variant = ""
+    if found is None:
+        found = _by_tag(hello, language)
+    if found is None:
+        warnings.append(f"espeak-ng does not speak {language!r}: spoken as English")
+        found = _by_tag(hello, "en-us")
+    if found is None:
+        raise VoiceError("espeak-ng has no English voice: its installation is damaged")
+    return found + (f"+{variant}" if variant else ""), tuple(warnings)
+
+
+def _by_tag(hello: dict[str, Any], tag: str) -> str | None:
+    """The voice of a BCP-47 tag: the longest part of it that some voice has, most specific first."""
+    subtags = tag.lower().replace("_", "-").split("-")
+    for length in range(len(subtags), 0, -1):
+        part = "-".join(subtags[:length])
+        has = [(p, v["id"]) for v in hello["voices"] for p, t in v["languages"] if t.lower() == part]
+        if has:
+            return str(min(has, key=lambda pair: pair[0])[1])
+    return None
+
+
+def _by_name(hello: dict[str, Any], name: str) -> str | None:
+    for voice in hello["voices"]:
+        if name.lower() in (voice["id"].lower(), voice["name"].lower()):
+            return str(voice["id"])
+    return None

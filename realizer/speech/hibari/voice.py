@@ -1,0 +1,259 @@
+"""The hibari voice: a request in, neural English speech with its times out; the model has its own process."""
+
+from __future__ import annotations
+
+import importlib.util
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realizer import tables
+from realizer.core.array_types import Int16
+from realizer.speech.cache import Kept
+from realizer.speech.engine_process import Engine, EngineProcess
+from realizer.speech.hibari.text import Run, runs
+from realizer.speech.hibari.times import (
+    Lengths,
+    Sound,
+    Token,
+    ending_in_silence,
+    guessed,
+    places,
+    sounds,
+    written,
+)
+from realizer.speech.letter_to_sound import syllable_facts
+from realizer.speech.speech_buffer import Track, cut
+from realizer.speech.ssml import Break, read_script
+from realizer.speech.utterance import STRETCH, Say, Utterance, Word
+
+__all__ = ["HibariVoice", "missing", "missing_voice"]
+
+INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
+SHOWN = 3  # words that a warning names
+
+
+def missing() -> str | None:
+    """None where hibari is installed; otherwise the sentence that says what to install."""
+    there = all(importlib.util.find_spec(name) for name in ("hibari", "onnxruntime"))
+    return None if there else INSTALL
+
+
+def missing_voice(name: str) -> str | None:
+    """None where that voice of hibari is on this machine; otherwise the sentence that says what to do."""
+    from hibari.voices import VOICES, voice_path
+
+    if name not in VOICES:
+        return f"hibari: wanted one of its voices {', '.join(VOICES)}, got {name!r}"
+    try:
+        voice_path(name, download_missing=False)
+    except OSError:
+        return f"hibari's voice {name!r} is not on this machine; `hibari --voice {name} Hello` fetches it"
+    return None
+
+
+ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), missing)
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceRow:
+    """A row of the table of voices.
+
+    Attributes:
+        offset: seconds to add to the engine's times so that they are when a sound is heard.
+        slowest, fastest: rates.
+    """
+
+    engine: str
+    offset: float
+    slowest: float
+    fastest: float
+
+
+@cache
+def _facts() -> VoiceRow:
+    rows = tables.read_csv(tables.text_of("voices.csv"), VoiceRow, "voices.csv")
+    return next(row for row in rows if row.engine == "hibari")
+
+
+class HibariVoice:
+    """hibari speaks English; the same request gives the same samples.
+
+    Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
+    the next one starts it again. A long text is spoken a sentence at a time, so that others come between.
+
+    Args:
+        voice: one of hibari's that is on this machine, or None for the one in the package.
+        limit: seconds that a sentence may take.
+        options: for the worker ("--durations", TENSOR).
+    """
+
+    def __init__(
+        self, voice: str | None = None, *, limit: float = 30.0, options: tuple[str, ...] = ()
+    ) -> None:
+        self.name = f"hibari:{voice}" if voice else "hibari"
+        chosen = ("--voice", voice) if voice else ()
+        self._process = EngineProcess(ENGINE, (*chosen, *options), limit)
+        self._kept = Kept()
+
+    def say(self, request: Say) -> Utterance:
+        """Speak; `duration` is exactly the sound's.
+
+        Wrong SSML is spoken as plain text, control characters and emoji are left out, another language is
+        read as English, an empty text is no sound: each with a warning.
+
+        Raises:
+            VoiceError: the text is too long, or the engine is missing, died or hung.
+        """
+        return self._kept.get(request, self._spoken)
+
+    def close(self) -> None:
+        """End the process; may be called twice. A later request starts it again."""
+        self._process.close()
+
+    @property
+    def pid(self) -> int | None:
+        """Id of the engine's process while it runs."""
+        return self._process.pid
+
+    def _spoken(self, request: Say) -> Utterance:
+        script = read_script(request)
+        if script.is_silent and not any(isinstance(part, Break) for part in script.parts):
+            marks = dict.fromkeys(script.marks, 0.0)
+            return Utterance(0.0, (), (), marks, 0, None, script.warnings)
+        hello = self._process.hello()
+        rate: int = hello["rate"]
+        parts, placed = runs(script)
+        head, _ = self._process.ask({"op": "read", "texts": [run.text for run in parts]})
+        track = Track()
+        for k, (run, reading) in enumerate(zip(parts, head["texts"], strict=True)):
+            goes_on = k + 1 < len(parts) and not parts[k + 1].pause
+            self._speak(
+                track, run, reading, request.rate, rate, joined=k > 0 and not run.pause, goes_on=goes_on
+            )
+        warnings = [*script.warnings, *_warnings(request, track, hello)]
+        return Utterance(
+            duration=track.length / rate,
+            stretch=STRETCH,
+            words=tuple(Word(first / rate, last / rate, text) for first, last, text in track.words),
+            phonemes=track.sounds(rate),
+            marks={name: sample / rate for name, sample in track.marks(placed).items()},
+            sample_rate=rate,
+            pcm=np.concatenate(track.pcm) if track.pcm else np.zeros(0, np.int16),
+            warnings=tuple(warnings),
+        )
+
+    def _speak(
+        self,
+        track: Track,
+        run: Run,
+        reading: Sequence[Sequence[Token]],
+        pace: float,
+        rate: int,
+        *,
+        joined: bool,
+        goes_on: bool,
+    ) -> None:
+        """Put a run behind what has been spoken.
+
+        Args:
+            pace: rate of the request.
+            rate: Hz.
+            joined: whether it goes on where the run before ended, without a pause.
+            goes_on: the same of the run after.
+        """
+        track.add(np.zeros(round(run.pause * rate), np.int16))
+        heard: list[Sound] = []
+        tokens: list[Token] = []
+        for k, sentence in enumerate(reading):
+            if not any(phonemes for _, phonemes, _ in sentence):
+                tokens += sentence
+                continue
+            pcm, told = self._sentence(sentence, run, pace, rate)
+            # A new sentence keeps the breath before it; the first starts at once.
+            lead = 0 if joined else round(syllable_facts()["edge"] * rate)
+            first = max(0, told[0].end - lead) if not heard and not told[0].ipa else 0
+            ends_open = goes_on and k + 1 == len(reading) and not _ends_in_pause(sentence)
+            last = told[-1].start if ends_open and not told[-1].ipa else len(pcm)
+            at = track.length - first
+            for sound in told:
+                start, end = max(sound.start, first), min(sound.end, last)
+                if end > start:
+                    moved = replace(sound, start=at + start, end=at + end, token=sound.token + len(tokens))
+                    heard.append(moved)
+            track.add(cut(pcm, first, last, rate))
+            tokens += sentence
+        end = track.words[-1][1] if track.words else track.length
+        for word, (begin, until) in zip(
+            run.words, places(run.words, tokens, heard, self._alone), strict=True
+        ):
+            start = heard[begin].start if until > begin else end
+            end = heard[until - 1].end if until > begin else end
+            track.words.append((start, end, word))
+        track.phonemes += heard
+
+    def _sentence(
+        self, sentence: Sequence[Token], run: Run, pace: float, rate: int
+    ) -> tuple[Int16, list[Sound]]:
+        """Sound, and its phonemes when they are heard; they tile it."""
+        facts = _facts()
+        speed = min(facts.fastest, max(facts.slowest, pace * run.prosody.rate))
+        asked = {"op": "say", "phonemes": written(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
+        head, body = self._process.ask(asked)
+        volume = 32767 * run.prosody.volume
+        pcm = np.rint(np.clip(np.frombuffer(body, "<f4") * volume, -32768, 32767)).astype(np.int16)
+        if head["signs"] is None:
+            return pcm, sounds(sentence, guessed(sentence, pcm))
+        told = sounds(sentence, Lengths(head["lead"], tuple(head["signs"]), head["tail"]))
+        shift = round(facts.offset * rate)
+        borders = [0, *(min(max(0, sound.end + shift), len(pcm)) for sound in told[:-1]), len(pcm)]
+        heard = [
+            replace(sound, start=start, end=end)
+            for sound, start, end in zip(told, borders, borders[1:], strict=False)
+        ]
+        return pcm, ending_in_silence(heard, pcm)
+
+    def _alone(self, words: Sequence[str]) -> list[list[str]]:
+        """The phonemes of each word by itself."""
+        head, _ = self._process.ask({"op": "read", "texts": list(words)})
+        found = []
+        for text in head["texts"]:
+            each = (sounds(sentence, Lengths(0, (1,) * len(written(sentence)[0]), 0)) for sentence in text)
+            found.append([sound.ipa for told in each for sound in told if sound.ipa])
+        return found
+
+
+def _is_latin(letter: str) -> bool:
+    return unicodedata.name(letter, "").startswith("LATIN")
+
+
+def _ends_in_pause(sentence: Sequence[Token]) -> bool:
+    signs = written(sentence)[0].rstrip()
+    return not sounds([("", signs[-1:], False)], Lengths(0, (1,), 0))[-1].ipa
+
+
+def _warnings(request: Say, track: Track, hello: dict[str, Any]) -> list[str]:
+    found = []
+    if request.language.lower().replace("_", "-").split("-")[0] != "en":
+        found.append(f"hibari speaks English only: {request.language!r} is read as English")
+    if not hello["durations"]:
+        found.append(
+            "this hibari does not tell how long its phonemes are: their times are shared out over its sound"
+        )
+    if not track.phonemes:
+        found.append("hibari found nothing to pronounce in the text")
+    else:
+        mute = [
+            word
+            for first, last, word in track.words
+            if any(map(str.isalpha, word)) and (first == last or not any(map(_is_latin, word)))
+        ]
+        if mute:
+            more = ", ..." if len(mute) > SHOWN else ""
+            found.append(f"hibari cannot pronounce {', '.join(map(repr, mute[:SHOWN]))}{more}")
+    return found

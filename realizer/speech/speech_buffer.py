@@ -1,0 +1,82 @@
+"""Pieces of speech in, one sound with its phonemes, words and marks out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from realizer.core.array_types import Int16
+from realizer.speech.hibari.times import Sound
+from realizer.speech.utterance import Phoneme
+from realizer.speech.words import PlacedMark
+
+__all__ = ["Track", "cut"]
+
+FADE = 0.004  # s, where a sound is cut
+
+
+@dataclass(slots=True)
+class Track:
+    """What has been spoken so far.
+
+    Attributes:
+        pcm: the pieces, one behind the other; `length` samples in all.
+        phonemes: in order; `start` and `end` in samples of the whole.
+        words: first sample, end, text.
+    """
+
+    pcm: list[Int16] = field(default_factory=list)
+    length: int = 0
+    phonemes: list[Sound] = field(default_factory=list)
+    words: list[tuple[int, int, str]] = field(default_factory=list)
+
+    def add(self, pcm: Int16) -> None:
+        """Put a piece behind the others."""
+        self.pcm.append(pcm)
+        self.length += len(pcm)
+
+    def sounds(self, rate: int) -> tuple[Phoneme, ...]:
+        """They tile the sound: what nobody speaks is a pause, pauses that touch are one.
+
+        Args:
+            rate: Hz.
+        """
+        if not self.length:
+            return ()
+        found: list[tuple[int, str, int]] = []
+        at = 0
+        for sound in [*self.phonemes, Sound("", 0, self.length, self.length, 0)]:
+            if sound.start > at:
+                found.append((at, "", 0))
+            if sound.end > sound.start:
+                found.append((sound.start, sound.ipa, sound.stress))
+            at = sound.end
+        joined = [f for k, f in enumerate(found) if f[1] or not k or found[k - 1][1]]
+        ends = [start for start, _, _ in joined[1:]] + [self.length]
+        return tuple(
+            Phoneme(start / rate, end / rate, ipa, stress)
+            for (start, ipa, stress), end in zip(joined, ends, strict=True)
+        )
+
+    def marks(self, placed: Sequence[PlacedMark]) -> dict[str, int]:
+        """Mark -> sample: where the next word begins, or before a <break> where the last one ended."""
+        marks: dict[str, int] = {}
+        for mark in placed:
+            if mark.word < len(self.words) and not mark.paused:
+                marks.setdefault(mark.name, self.words[mark.word][0])
+            else:
+                marks.setdefault(mark.name, self.words[mark.word - 1][1] if mark.word and self.words else 0)
+        return marks
+
+
+def cut(pcm: Int16, first: int, last: int, rate: int) -> Int16:
+    """The samples from `first` to `last`, faded where something was cut off."""
+    part = pcm[first:last].astype(np.float32)
+    ramp = np.linspace(0, 1, min(len(part), round(FADE * rate)), dtype=np.float32)
+    if first > 0:
+        part[: len(ramp)] *= ramp
+    if last < len(pcm):
+        part[len(part) - len(ramp) :] *= ramp[::-1]
+    return np.rint(part).astype(np.int16)

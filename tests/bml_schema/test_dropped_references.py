@@ -1,0 +1,143 @@
+"""What names a dropped behaviour vanishes with it, and its one Problem lists it."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bml_schema import (
+    Block,
+    Constraint,
+    Problem,
+    Required,
+    Speech,
+    Sync,
+    SyncRef,
+    Wait,
+    parse,
+    without,
+    write,
+)
+from bml_schema.dropped_references import Losses
+from tests.strategies import blocks
+
+
+def only(inside: str) -> Block:
+    return parse(f"<bml id='b'>{inside}</bml>")
+
+
+BAD = "<wait id='bad' duration='x'/>"
+
+
+def test_references_to_a_dropped_behaviour_vanish_and_are_listed() -> None:
+    block = only(f"<wait id='a' start='bad:end+1' end='9'/>{BAD}<wait id='c' end='bad:start'/>")
+    assert block["a"] == Wait(id="a", syncs={"end": SyncRef(offset=9.0)})
+    assert block["c"] == Wait(id="c")
+    (problem,) = block.problems
+    assert problem.id == "b:bad"
+    assert problem.lost == ("a:start", "c:end")
+    assert problem.text.endswith("; with it went a:start, c:end")
+    assert not problem.fatal
+
+
+def test_a_sync_of_speech_loses_its_reference_and_stays() -> None:
+    block = only(
+        f"{BAD}<speech id='s'><text>a<sync id='m' ref='bad:end'/>b<sync id='n' ref='1'/></text></speech>"
+    )
+    speech = block["s"]
+    assert isinstance(speech, Speech)
+    assert speech.text is not None
+    assert speech.text.parts == ("a", Sync(id="m"), "b", Sync(id="n", ref=SyncRef(offset=1.0)))
+    assert block.problems[0].lost == ("s:m",)
+
+
+def test_a_constraint_that_names_a_dropped_behaviour_vanishes_whole() -> None:
+    block = only(
+        f"{BAD}<wait id='a'/><constraint id='c'><synchronize><sync ref='a:end'/><sync ref='2'/></synchronize>"
+        "<before ref='bad:end'><sync ref='a:end'/></before></constraint>"
+        "<constraint><after ref='a:end'><sync ref='bad:start'/></after></constraint>"
+        "<constraint id='kept'><after ref='1'><sync ref='a:start'/></after></constraint>"
+    )
+    assert [c.id for c in block.constraints] == ["kept"]
+    assert [p.lost for p in block.problems] == [("c", "/bml/constraint[2]")]
+
+
+def test_a_required_constraint_that_cannot_hold_is_fatal() -> None:
+    synchronize = "<synchronize><sync ref='bad:end'/><sync ref='2'/></synchronize>"
+    block = only(f"{BAD}<required><constraint>{synchronize}</constraint></required>")
+    assert [p.fatal for p in block.problems] == [True]
+
+
+def test_a_chain_of_dropped_behaviours_gives_each_its_own_problem_only() -> None:
+    block = only("<wait id='a' start='nobody:end'/><wait id='c' start='a:end'/><wait id='d' start='c:end'/>")
+    assert [p.id for p in block.problems] == ["b:a"]
+    assert block.problems[0].lost == ("c:start",)
+    assert [x.id for x in block.behaviours] == ["c", "d"]
+
+
+def test_references_to_an_unsupported_element_vanish() -> None:
+    block = only("<blink id='x'/><wait id='a' start='x:middle'/>")
+    assert [(p.id, p.type, p.lost) for p in block.problems] == [
+        ("b:x", "BEHAVIOR_TYPE_NOT_SUPPORTED", ("a:start",))
+    ]
+
+
+def test_many_losses_are_counted_in_the_text_and_named_in_the_tuple() -> None:
+    waits = "".join(f"<wait id='w{i}' start='bad:end'/>" for i in range(30))
+    problem: Problem = only(BAD + waits).problems[0]
+    assert len(problem.lost) == 30
+    assert problem.text.endswith("w9:start and 20 more")
+
+
+def test_a_node_that_names_nothing_dropped_is_itself() -> None:
+    losses = Losses({"gone"})
+    node = Wait(id="a", syncs={"start": SyncRef(behaviour="here", sync="end")})
+    other = Wait(id="a", syncs={"start": SyncRef(block="x", behaviour="gone", sync="end")})
+    assert losses.without(node) is node
+    assert losses.without(other) is other
+    assert not losses.lost
+
+
+def test_without_gives_the_rest_of_a_block_and_what_went() -> None:
+    synchronize = "<synchronize><sync ref='a:end'/><sync ref='2'/></synchronize>"
+    block = only(
+        f"<wait id='a'/><wait id='c' start='a:end+1' end='9'/><constraint id='k'>{synchronize}</constraint>"
+        "<required><wait id='d' start='c:end' end='a:end'/></required>"
+    )
+    left, lost, fatal = without(block, ["a"])
+    assert left.children == (
+        Wait(id="c", syncs={"end": SyncRef(offset=9.0)}),
+        Required(children=(Wait(id="d", syncs={"start": SyncRef(behaviour="c", sync="end")}),)),
+    )
+    assert [b.id for b in left.behaviours] == ["c", "d"]
+    assert lost == {"a": ("c:start", "k", "d:end")}
+    assert not fatal
+    assert left.places == block.places
+
+
+def test_without_tells_whose_loss_breaks_a_required_constraint() -> None:
+    before = "<before ref='a:end'><sync ref='c:end'/></before>"
+    block = only(f"<wait id='a'/><wait id='c'/><required><constraint>{before}</constraint></required>")
+    left, lost, fatal = without(block, {"a"})
+    assert left.children == (Wait(id="c"), Required())
+    assert lost == {"a": ("/bml/required[1]/constraint[1]",)}
+    assert fatal == {"a"}
+    # Made by hand, a constraint is required because of where it stands.
+    made = Block(
+        id="b", children=(Wait(id="a"), Required(children=(Constraint(parts=block.constraints[0].parts),)))
+    )
+    assert without(made, {"a"}).fatal == {"a"}
+
+
+@given(blocks(), st.data())
+def test_what_is_left_names_nothing_that_went_and_is_a_sound_document(
+    block: Block, data: st.DataObject
+) -> None:
+    ids = [b.id for b in block.behaviours]
+    gone = data.draw(st.sets(st.sampled_from(ids)) if ids else st.just(set()))
+    left = without(block, gone).block
+    assert [b.id for b in left.behaviours] == [id for id in ids if id not in gone]
+    back = parse(write(left))
+    assert not back.problems
+    assert back == left
+    assert without(block, ()) == (block, {}, frozenset())

@@ -1,0 +1,148 @@
+"""Feature points to FAPs, and the 15 features."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.analysis.faps_from_mesh import points_of
+from realizer.analysis.faps_from_points import (
+    as_features_see,
+    faps_from_features,
+    faps_from_points,
+    features_from_faps,
+    features_from_points,
+)
+from realizer.emotions.profile import Profile
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.model import Face
+from realizer.tables import faps
+from realizer.tables.facial_features import facial_features
+
+
+@pytest.fixture(scope="module")
+def face() -> Face:
+    return load_face("ada")
+
+
+def rest(face: Face) -> dict[str, np.ndarray]:
+    return {name: face.vertices[index] for name, index in face.feature_points.items()}
+
+
+def row(**values: float) -> np.ndarray:
+    frame = np.zeros(68, np.float32)
+    for name, value in values.items():
+        frame[int(name[1:]) - 1] = value
+    return frame
+
+
+def test_each_fap_is_measured_at_its_own_point(face: Face) -> None:
+    local = [fap for fap in faps()[2:] if fap.unit not in ("none", "angle_unit") and fap.fap not in (29, 30)]
+    frames = np.stack([row(**{f"F{fap.fap}": 50}) for fap in local])
+    read, seen = faps_from_points(points_of(face, deform(face, frames)), rest(face), face.fapu)
+    for k, fap in enumerate(local):
+        assert seen[fap.fap - 1]
+        # What lifts the chin's boss lifts the chin a little too, which its measure is relative to.
+        assert read[k, fap.fap - 1] == pytest.approx(50, abs=9 if fap.fap == 18 else 1), fap.name
+
+
+def test_a_turned_head_is_found_and_taken_away(face: Face) -> None:
+    frames = np.stack([row(F48=9000, F49=-20000, F50=5000, F12=200, F13=200, F31=150), row()])
+    points = points_of(face, deform(face, frames))
+    read, _ = faps_from_points(points, rest(face), face.fapu)
+    assert read[0, 47:50] == pytest.approx((9000, -20000, 5000), abs=20)
+    assert read[0, [11, 12, 30]] == pytest.approx((200, 200, 150), abs=2)
+    assert np.abs(read[1]).max() < 0.1
+    moved = {name: at + np.array([0.3, -0.1, 2.0]) for name, at in points.items()}
+    again, _ = faps_from_points(moved, rest(face), face.fapu)
+    assert np.allclose(again, read, atol=1)
+
+
+def test_corners_of_the_eyes_stand_in_for_a_skull_that_nobody_tracked(face: Face) -> None:
+    frames = row(F49=15000, F31=150)[None]
+    points = points_of(face, deform(face, frames))
+    few = {name: points[name] for name in ("3.7", "3.8", "3.11", "3.12", "4.1", "2.4")}
+    read, seen = faps_from_points(few, rest(face), face.fapu)
+    assert read[0, 48] == pytest.approx(15000, abs=100)
+    assert read[0, 30] == pytest.approx(150, abs=3)
+    assert set(np.flatnonzero(seen) + 1) == {6, 12, 31, 37, 48, 49, 50}
+
+
+def test_a_point_that_was_lost_tells_nothing(face: Face) -> None:
+    points = points_of(face, deform(face, np.stack([row(F12=100), row(F12=100)])))
+    points["2.4"] = points["2.4"].copy()
+    points["2.4"][1] = np.nan
+    read, seen = faps_from_points(points, rest(face), face.fapu)
+    assert not seen[11]
+    assert seen[12]
+    assert read[1, 11] == 0
+    assert np.isfinite(read).all()
+
+
+def test_features_of_a_mesh_agree_with_those_of_its_faps(face: Face) -> None:
+    frames = np.stack([row(F19=200, F21=100), row(F31=100), row(F53=80, F54=80), row(F51=60)])
+    features = features_from_points(points_of(face, deform(face, frames)), rest(face), face.fapu)
+    asked = features_from_faps(frames)
+    assert features[0, 11] == pytest.approx(asked[0, 11], rel=0.05) == pytest.approx(-300, rel=0.05)
+    assert features[1, 4] == pytest.approx(100, rel=0.25)  # the distance to the eye's corner slants
+    assert features[2, 13] == pytest.approx(160, rel=0.05)
+    assert features[3, 2] == pytest.approx(60, rel=0.15)  # the outer lip, where the paper names the inner FAP
+
+
+def test_features_do_not_depend_on_where_the_head_is(face: Face) -> None:
+    still, turned = row(F31=100, F19=-150), row(F31=100, F19=-150, F48=9000, F49=20000)
+    features = features_from_points(
+        points_of(face, deform(face, np.stack([still, turned]))), rest(face), face.fapu
+    )
+    assert np.allclose(features[0], features[1], atol=3)
+
+
+def test_a_feature_of_several_faps_gives_each_an_equal_part() -> None:
+    features = np.zeros((1, 15))
+    features[0, [0, 11, 13, 14]] = 30, 100, 80, 500
+    frames, seen = faps_from_features(features)
+    assert frames[0, [18, 20]] == pytest.approx([-50, -50])
+    assert frames[0, [5, 6, 52, 53]] == pytest.approx([40, 40, 40, 40])
+    assert frames[0, 36] == 30  # and not a half of the 500
+    assert set(np.flatnonzero(seen) + 1) == {fap for f in facial_features() for fap in (*f.signs, *f.also)}
+
+
+def test_a_profile_as_features_see_it_has_lids_together_and_the_outer_lips_for_the_inner() -> None:
+    told = as_features_see(
+        Profile.parse("F19 [100, 120], F21 [10, 20], F5 [0, 5], F52 [-200, -100], F51 [20, 30]")
+    )
+    assert told.ranges[19] == told.ranges[21] == (55, 70)
+    assert told.ranges[4] == (20, 30)
+    assert told.ranges[5] == (-200, -100)
+    assert told.ranges[3] == (70, 180)  # -(F51 + F52): how far the lips part
+    assert 52 not in told.ranges
+    shut = as_features_see(Profile.parse("F3 [100, 200]"))
+    assert dict(shut.ranges) == {3: (100, 200)}
+
+
+def test_what_features_tell_of_a_frame_is_in_the_profile_as_they_see_it() -> None:
+    profile = Profile.parse("F19 [90, 110], F21 [40, 60], F53 [70, 90], F54 [70, 90], F31 [100, 120]")
+    frames, seen = faps_from_features(features_from_faps(profile.frame()[None]))
+    for fap, (low, high) in as_features_see(profile).ranges.items():
+        assert seen[fap - 1]
+        assert low <= frames[0, fap - 1] <= high
+
+
+def test_bad_points_are_refused_in_words(face: Face) -> None:
+    here = {name: at[None] for name, at in rest(face).items()}
+    for points, neutral, said in (
+        ({}, rest(face), "wanted at least one feature point, got none"),
+        ({"99.1": np.zeros(3)}, rest(face), "wanted such as have a neutral place, got 99.1"),
+        (here | {"2.1": np.zeros((4, 3))}, rest(face), r"all of one n, got \(1, 3\), \(4, 3\)"),
+        (here, rest(face) | {"2.1": np.zeros(2)}, r"neutral: wanted \(3,\) each, got \(2,\)"),
+        (here, rest(face) | {"2.1": np.full(3, np.nan)}, "neutral: wanted finite places"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            faps_from_points(points, neutral, face.fapu)
+    del here["9.3"]
+    with pytest.raises(ValueError, match=r"these are missing: 9\.3"):
+        features_from_points(here, rest(face), face.fapu)
+    for call in (features_from_faps, faps_from_features):
+        with pytest.raises(ValueError, match=r"wanted \(n, "):
+            call(np.zeros((3, 4)))

@@ -1,0 +1,55 @@
+"""Looking expressions up by a picture of one of our faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
+from realizer.animation.axis import au, axis
+from realizer.animation.frames import AUFrames
+from realizer.animation.pose import poses
+from realizer.expressions import shipped
+from realizer.face.load import takes
+from realizer.render import Renderer
+
+NAMES = ("SMILE", "RAISE_LEFT_BROW", "RAISE_RIGHT_BROW", "template:anger", "template:sadness", "OPEN_MOUTH")
+KNOWN = [shipped()[name] for name in NAMES]
+
+
+def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> list[np.ndarray]:
+    """The neutral face, and each of these expressions."""
+    rows = np.zeros((len(KNOWN) + 1, len(axis())), np.float32)
+    for row, one in zip(rows[1:], KNOWN, strict=True):
+        for (number, side), value in one.aus.items():
+            row[[target.column for target in au(number, side)]] = value * intensity
+    frames = AUFrames(np.arange(len(rows), dtype=np.float64), rows)
+    with Renderer(face, size, "front", light=light) as renderer:
+        return [picture[..., :3].copy() for picture in renderer.draw(poses(frames, takes(face)))]
+
+
+def test_face_light_and_expression_are_found_in_a_picture_of_any_size() -> None:
+    neutral, *pictures = drawn("ben", "evening", (300, 400), 0.7)
+    for one, picture in list(zip(KNOWN, pictures, strict=True))[:2]:
+        seen = by_picture(picture, KNOWN)
+        assert (seen.face, seen.light, seen.neutral) == ("ben", "evening", False)
+        assert seen.found[0][0] is one
+        scores = [score for _, score in seen.found]
+        assert scores == sorted(scores, reverse=True)
+        assert scores[0] > 0.8
+    rest = by_picture(neutral, KNOWN)
+    assert rest.neutral
+    assert rest.found == ()
+
+
+@pytest.mark.parametrize("shape", [(200, 200, 3), (900, 20, 3), (20, 900, 3)])
+def test_what_is_no_face_of_ours_is_said(shape: tuple[int, int, int]) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, shape).astype(np.uint8)
+    with pytest.raises(UnknownPictureError, match="wanted a picture of one of our faces from the front"):
+        by_picture(noise, KNOWN, ["ada"])
+
+
+def test_a_file_that_is_no_picture_is_said(tmp_path) -> None:
+    (tmp_path / "a.png").write_text("no", "utf-8")
+    with pytest.raises(UnknownPictureError, match=r"a\.png: wanted a picture"):
+        read_picture(tmp_path / "a.png")

@@ -1,0 +1,26 @@
+"""A mapping is the table, and what goes before it goes by action unit and side."""
+
+from __future__ import annotations
+
+from realizer import tables
+from realizer.animation.fap.au_fap_mapping import standard
+from realizer.tables import AuToFap
+
+
+def test_the_standard_mapping_is_the_table() -> None:
+    assert standard().rows == tables.au_to_fap()
+    assert standard() is standard()
+
+
+def test_what_is_replaced_is_replaced_whole_and_the_other_side_stays() -> None:
+    own = AuToFap(12, "L", 6, 0.0, 1.0, 0.0, 99.0)
+    mapping = standard().replaced({(12, "L"): (own,)}, "mine")
+    assert [row for row in mapping.rows if (row.au, row.side) == (12, "L")] == [own]
+    others = [row for row in mapping.rows if (row.au, row.side) != (12, "L")]
+    assert others == [row for row in standard().rows if (row.au, row.side) != (12, "L")]
+    assert mapping.sources == ("au_to_fap.csv", "mine")
+
+
+def test_a_unit_can_be_told_to_ask_nothing() -> None:
+    mapping = standard().replaced({(25, ""): ()}, "mine")
+    assert 25 not in {row.au for row in mapping.rows}

@@ -1,0 +1,52 @@
+"""Polylines become hinges and stay what they were."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.animation.axis import AU_NAMES, au
+from realizer.animation.fap.piecewise_matrix import Demand
+from realizer.core.array_types import Float32
+from realizer.tables import AuToFap
+
+AT = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0)
+
+
+def asked(rows: tuple[AuToFap, ...], fap: int) -> Float32:
+    """What the rows ask of a FAP as AU26 rises."""
+    aus = np.zeros((len(AU_NAMES()), len(AT)), np.float32)
+    aus[au(26)[0].column] = AT
+    live = tuple(range(len(aus)))
+    asking = Demand.of(rows).among(live)
+    raised, lowered = asking.of(aus)
+    raised[: len(lowered)] -= lowered
+    total = np.zeros((68, len(AT)), np.float32)
+    total[asking.faps] = raised
+    found: Float32 = total[fap - 1]
+    return found
+
+
+def test_a_gap_between_two_pieces_is_level() -> None:
+    rows = (AuToFap(26, "", 3, 0.1, 0.3, 0.0, 100.0), AuToFap(26, "", 3, 0.7, 0.9, 100.0, 300.0))
+    assert asked(rows, 3) == pytest.approx([0, 0, 50, 100, 100, 100, 300, 300], abs=1e-3)
+
+
+def test_no_rows_ask_nothing() -> None:
+    assert not asked((), 3).any()
+
+
+def test_the_mask_holds_what_rows_and_speech_may_use() -> None:
+    mask = Demand.of((AuToFap(9, "L", 63, 0.0, 1.0, 0.0, 30.0),)).mask
+    assert mask[62]
+    assert mask[2]  # speech opens the jaw
+    assert not mask[[0, 1, 30]].any()
+
+
+def test_what_goes_up_and_then_down_raises_and_lowers() -> None:
+    rows = (AuToFap(26, "", 3, 0.0, 0.5, 0.0, 100.0), AuToFap(26, "", 3, 0.5, 1.0, 100.0, -100.0))
+    asking = Demand.of(rows).among((au(26)[0].column,))
+    raised, lowered = asking.of(np.array([AT], np.float32))
+    assert asking.faps.tolist() == [2]
+    assert raised[0] == pytest.approx([0, 20, 40, 60, 100, 20, 0, 0], abs=1e-3)
+    assert lowered[0] == pytest.approx([0, 0, 0, 0, 0, 0, 60, 100], abs=1e-3)

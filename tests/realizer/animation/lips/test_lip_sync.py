@@ -1,0 +1,266 @@
+"""Lips: what phonemes must look like, and laws for any sequence of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from realizer.animation.blend import blend
+from realizer.animation.channel import Channel, Layer
+from realizer.animation.fap.conversion import to_fap
+from realizer.animation.lips.lip_sync import lip_channels
+from realizer.animation.lips.visemes import coarticulation, phoneme_features
+from realizer.speech.utterance import Phoneme
+from realizer.tables import faps
+
+IPA = sorted(phoneme_features())
+NUMBER = {row.name: row.fap for row in faps()}
+BILABIALS = [s for s, f in phoneme_features().items() if f.place == "bilabial" and f.manner != "fricative"]
+
+
+def say(text: str, length: float = 0.1, stressed: bool = True) -> tuple[Phoneme, ...]:
+    """Phonemes of `length` seconds each; "_" is a pause of 0.3 s."""
+    phonemes: list[Phoneme] = []
+    for ipa in text.split():
+        start = phonemes[-1].end if phonemes else 0.0
+        pause = ipa == "_"
+        end = start + (0.3 if pause else length)
+        phonemes.append(Phoneme(start, end, "" if pause else ipa, int(stressed)))
+    return tuple(phonemes)
+
+
+def values(channels: tuple[Channel, ...], fap: int) -> np.ndarray:
+    (found,) = (c.values for c in channels if NUMBER.get(c.target.name) == fap)
+    return found
+
+
+def gap(channels: tuple[Channel, ...]) -> np.ndarray:
+    """How far the inner lips are apart, MNS units; FAP 4 counts down, FAP 5 up."""
+    return -values(channels, 4) - values(channels, 5)
+
+
+def middle(text: str, fap: int) -> float:
+    """The FAP's greatest deviation in "_ t X t _"."""
+    found = values(lip_channels(say(f"_ t {text} t _", 0.14), 0.0), fap)
+    return float(found[np.abs(found).argmax()])
+
+
+def opening(text: str) -> float:
+    return float(gap(lip_channels(say(f"_ t {text} t _", 0.14), 0.0)).max())
+
+
+phonemes_of_speech = st.lists(
+    st.tuples(
+        st.sampled_from([*IPA, "", "", "oʊ", "aɪ", "əl", "ɔːɹ"]), st.floats(0.02, 0.5), st.integers(0, 2)
+    ),
+    min_size=1,
+    max_size=25,
+).map(
+    lambda rows: tuple(
+        Phoneme(sum(r[1] for r in rows[:k]), sum(r[1] for r in rows[: k + 1]), ipa, stress)
+        for k, (ipa, _, stress) in enumerate(rows)
+    )
+)
+
+
+@pytest.mark.parametrize("closed", BILABIALS)
+@pytest.mark.parametrize("vowel", ["ɑ", "i", "u"])
+def test_bilabials_close_the_lips_in_a_frame_of_any_phase(closed: str, vowel: str) -> None:
+    channels = lip_channels(say(f"_ {vowel} {closed} {vowel} _", 0.05), 0.0)
+    faps_at = lambda t: to_fap(blend(channels, t)).integers()  # noqa: E731
+    for phase in np.arange(0, 0.04, 0.005):
+        times = np.arange(phase, 0.75, 0.04)
+        frames = faps_at(times)
+        inside = (times > 0.32) & (times < 0.43)
+        for upper, lower in ((4, 5), (8, 10), (9, 11), (51, 52)):
+            between = -frames[inside, upper - 1] - frames[inside, lower - 1]
+            assert between.min() <= 0, (phase, upper)
+
+
+@pytest.mark.parametrize("bitten", ["f", "v", "ɱ", "ʋ"])
+def test_labiodentals_bring_the_lower_lip_to_the_teeth(bitten: str) -> None:
+    channels = lip_channels(say(f"_ ɑ {bitten} ɑ _"), 0.0)
+    inside = slice(43, 47)
+    assert values(channels, 5)[inside].min() > 50  # raised
+    assert values(channels, 4)[inside].max() < -50  # the upper lip clears the teeth
+    assert gap(channels)[inside].min() > 70  # and the teeth show between
+    assert gap(channels)[inside].max() < 130
+
+
+def test_open_vowels_open_more_than_close_ones() -> None:
+    assert opening("ɑ") > opening("æ") > opening("ɛ") > opening("e") > opening("i") > opening("u")
+    assert 11 * 46 < opening("ɑ") < 14 * 46  # 11 to 14 mm
+    assert 3.5 * 46 < opening("i") < 5.5 * 46
+    assert 2 * 46 < opening("u") < 4 * 46
+
+
+def test_the_jaw_goes_with_the_vowel() -> None:
+    jaws = [middle(v, 3) for v in ("ɑ", "ɛ", "i")]
+    assert jaws == sorted(jaws, reverse=True)
+    assert middle("s", 3) < middle("k", 3)
+
+
+def test_spread_vowels_are_wide_and_round_ones_narrow_and_forward() -> None:
+    assert middle("i", 6) > 30
+    assert middle("u", 6) < -60
+    assert middle("u", 17) > 100 > abs(middle("i", 17))
+    assert middle("y", 17) > 100
+    assert middle("ʃ", 17) > 60
+
+
+def test_the_tongue_shows_for_th_and_rises_for_l() -> None:
+    assert middle("θ", 45) > 2 * abs(middle("k", 45))
+    assert middle("l", 44) > 100
+    assert middle("k", 46) > 80
+
+
+def test_rounding_starts_before_its_vowel() -> None:
+    plain = lip_channels(say("_ t s t i _"), 0.0)
+    round_ = lip_channels(say("_ t s t u _"), 0.0)
+    before = slice(40, 50)  # the s, 0.1 to 0.2 s before the vowel
+    assert (values(round_, 17)[before] > values(plain, 17)[before] + 10).all()
+
+
+def test_h_takes_the_mouth_of_its_neighbour() -> None:
+    channels = lip_channels(say("_ h ɑ _", 0.12), 0.0)
+    assert gap(channels)[36] > 0.5 * gap(channels).max()
+
+
+def test_stressed_vowels_reach_further() -> None:
+    strong = gap(lip_channels(say("_ t ɑ t _"), 0.0)).max()
+    weak = gap(lip_channels(say("_ t ɑ t _", stressed=False), 0.0)).max()
+    assert 0.7 * strong < weak < 0.95 * strong
+
+
+@pytest.mark.parametrize("vowel", ["ɑ", "ɛ", "i", "u"])
+def test_the_shorter_a_vowel_is_the_less_of_its_shape_it_reaches(vowel: str) -> None:
+    """Undershoot: what is missing grows as vowels get shorter, and faster the shorter they are."""
+    lengths = (0.03, 0.05, 0.08, 0.12, 0.18, 0.27)
+    opened, jaw, width = np.array(
+        [
+            (gap(said).max(), values(said, 3).max(), np.abs(values(said, 6)).max())
+            for said in (lip_channels(say(f"_ t {vowel} t {vowel} t _", length), 0.0) for length in lengths)
+        ]
+    ).T
+    for reached in (opened, jaw, width):
+        assert (np.diff(reached) > 0).all()
+        assert (np.diff(np.diff(reached) / np.diff(lengths)) < 0).all()
+        assert 0.5 < reached[1] / reached[-1] < 0.85
+
+
+def test_quick_speech_closes_its_lips_all_the_same() -> None:
+    for length in (0.03, 0.05, 0.1):
+        assert gap(lip_channels(say("_ ɑ p ɑ _", length), 0.0))[30:].min() <= 0
+
+
+def loud(text: str, volume: float) -> tuple[Channel, ...]:
+    return lip_channels(tuple(replace(p, volume=volume) for p in say(text)), 0.0)
+
+
+def test_loud_vowels_open_jaw_and_lips_further_and_soft_ones_less() -> None:
+    volumes = (0.0, 0.5, 1.0, 1.4, 2.0, 4.0)
+    said = [loud("_ t ɑ t _", volume) for volume in volumes]
+    for reached in ([gap(s).max() for s in said], [values(s, 3).max() for s in said]):
+        assert reached == sorted(reached)
+        assert reached[1] < 0.9 * reached[2]
+        assert reached[4] > 1.15 * reached[2]
+    assert gap(said[0]).max() > 0.5 * gap(said[2]).max()  # a whisper is still seen
+    assert gap(said[-1]).max() < 20 * 46
+
+
+@pytest.mark.parametrize("volume", [0.0, 0.25, 4.0])
+def test_loudness_leaves_rounding_and_closures_as_they_are(volume: float) -> None:
+    usual, other = loud("_ u p ɑ f ɑ _", 1.0), loud("_ u p ɑ f ɑ _", volume)
+    for fap in (16, 17, 53):
+        assert np.array_equal(values(usual, fap), values(other, fap))
+    p, f = slice(44, 47), slice(64, 67)
+    assert gap(other)[p].max() <= 0
+    assert values(other, 5)[f].min() > 50
+    assert np.allclose(gap(usual)[f], gap(other)[f], atol=25)
+
+
+def test_long_pauses_let_go_of_the_lips_and_short_ones_do_not() -> None:
+    first = say("ɑ t ɑ")
+    for pause, free in ((0.2, False), (0.35, False), (0.8, True)):
+        start = first[-1].end + pause
+        second = tuple(Phoneme(p.start + start, p.end + start, p.ipa, 1) for p in first)
+        channels = lip_channels((*first, Phoneme(first[-1].end, start, ""), *second), 0.0)
+        lips = next(c for c in channels if c.target.name == "lips")
+        inside = lips.values[(lips.times > first[-1].end) & (lips.times < start)]
+        assert (inside.min() == 0) == free
+        between = gap(channels)[(lips.times > first[-1].end) & (lips.times < start)]
+        assert (between.min() > 100) == (pause == 0.2)
+
+
+def test_nothing_said_moves_nothing() -> None:
+    assert lip_channels((), 0.0) == ()
+    assert lip_channels(say("_ _"), 0.0) == ()
+    assert lip_channels(say("ʔ h"), 0.0) == ()
+
+
+def test_a_later_start_moves_every_key() -> None:
+    for here, later in zip(lip_channels(say("ɑ p"), 0.0), lip_channels(say("ɑ p"), 2.5), strict=True):
+        assert np.allclose(later.times, here.times + 2.5)
+        assert np.array_equal(later.values, here.values)
+        assert here.layer is Layer.SPEECH
+
+
+@given(phonemes_of_speech)
+@example((Phoneme(0, 0.021484375, "f", 0),))
+def test_any_speech_begins_and_ends_at_rest_and_never_jumps(phonemes: tuple[Phoneme, ...]) -> None:
+    speed = coarticulation()["speed"]
+    for channel in lip_channels(phonemes, 0.0):
+        assert np.isfinite(channel.values).all()
+        assert channel.values[0] == pytest.approx(0, abs=1e-9)
+        assert channel.values[-1] == pytest.approx(0, abs=1e-9)
+        assert (np.diff(channel.times) > 0).all()
+        assert channel.times[-1] <= max(phonemes[-1].end, 0.02) + 1e-9
+        slope = np.abs(np.diff(channel.values) / np.diff(channel.times)).max()
+        if channel.target.name == "open_jaw":
+            assert slope <= speed["jaw"] * 1.001
+        elif channel.target.name != "lips":
+            # The lower lip that stops at the upper one may add the speed of both.
+            assert slope <= 2 * speed["lips"] * 1.001
+
+
+@given(phonemes_of_speech)
+def test_any_speech_is_symmetrical_and_within_what_a_face_can_do(phonemes: tuple[Phoneme, ...]) -> None:
+    channels = lip_channels(phonemes, 0.0)
+    if not channels:
+        return
+    for row in faps():
+        if any(NUMBER.get(c.target.name) == row.fap for c in channels):
+            found = values(channels, row.fap)
+            assert np.array_equal(found, row.sign * values(channels, row.mirror))
+            assert found.min() >= row.least
+            assert found.max() <= row.most
+    assert gap(channels).min() >= -37  # lips press; they do not pass through each other
+    assert gap(channels).max() < 14 * 46
+
+
+@given(phonemes_of_speech)
+def test_any_bilabial_closes(phonemes: tuple[Phoneme, ...]) -> None:
+    channels = lip_channels(phonemes, 0.0)
+    for phoneme in phonemes:
+        if phoneme.ipa in BILABIALS:
+            times = channels[0].times
+            centre = (phoneme.start + phoneme.end) / 2
+            near = np.abs(times - centre) <= 0.0225
+            assert gap(channels)[near].max() <= 1e-6
+
+
+@pytest.mark.parametrize("room", [0.0, 0.05, 0.1, 2.0])
+def test_the_lips_make_ready_for_a_first_closure_where_there_is_room(room: float) -> None:
+    lips, *_ = lip_channels(say("b ɑ t _", 0.08), 3.0, room=room)
+    early = min(room, coarticulation()["pauses"]["attack"])
+    assert lips.times[0] == pytest.approx(3.0 - early)
+    assert lips.values[0] == 0
+    begins = lips.times < 3.05
+    steepest = np.diff(lips.values[begins]) / np.diff(lips.times[begins])
+    # Taken over as long as there is room, they go slower.
+    assert steepest.max() < 1.6 / max(early, coarticulation()["pauses"]["least"])
+    assert lips.values[(lips.times > 3.025) & (lips.times < 3.2)].min() == pytest.approx(1, abs=1e-6)

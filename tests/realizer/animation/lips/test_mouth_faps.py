@@ -1,0 +1,37 @@
+"""The FAPs of a shape of the mouth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer import tables
+from realizer.animation.lips.mouth_faps import mouth_faps
+from realizer.animation.lips.visemes import SHAPE, shape_table
+
+
+def shape(**parts: float) -> np.ndarray:
+    return np.array([[parts.get(name, 0.0) for name in SHAPE]])
+
+
+def test_an_open_mouth_is_negative_in_both_lips() -> None:
+    got = mouth_faps(shape(jaw=300, upper=100, lower=200))
+    assert (got[3][0], got[4][0], got[5][0]) == (300, -100, -200)
+    assert all(got[fap][0] < 0 for fap in (8, 9, 10, 11, 51, 52, 55, 56, 57, 58))
+
+
+def test_the_jaw_does_not_go_above_its_rest() -> None:
+    assert mouth_faps(shape(jaw=-50))[3][0] == 0
+
+
+def test_both_sides_and_both_contours_go_along() -> None:
+    got = mouth_faps(shape(width=-40, corner=8))
+    assert {got[fap][0] for fap in (6, 7, 53, 54)} == {-40}
+    assert {got[fap][0] for fap in (12, 13, 59, 60)} == {8}
+
+
+@pytest.mark.parametrize("viseme", range(15))
+def test_every_viseme_is_within_the_range_of_the_standard(viseme: int) -> None:
+    for fap, values in mouth_faps(shape_table()[0][[viseme]]).items():
+        row = tables.faps()[fap - 1]
+        assert row.least <= values[0] <= row.most

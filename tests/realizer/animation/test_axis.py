@@ -1,0 +1,59 @@
+"""The axis of what can be animated."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer import tables
+from realizer.animation.axis import AU_NAMES, PRESENCES, au, axis, fap, presence, rank, region
+
+
+def test_the_axis_is_aus_then_68_faps_then_presences_then_ranks() -> None:
+    names = list(axis())
+    faps = len(AU_NAMES())
+    presences = faps + 68
+    ranks = presences + len(PRESENCES)
+    assert names[:faps] == list(AU_NAMES())
+    assert names[faps:presences] == [row.name for row in tables.faps()]
+    assert names[presences:ranks] == list(PRESENCES)
+    assert all(name.startswith("rank ") for name in names[ranks:])
+    assert [target.column for target in axis().values()] == list(range(len(names)))
+
+
+def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
+    assert [t.name for t in au(12)] == ["12L", "12R"]
+    assert [t.name for t in au(12, "RIGHT")] == ["12R"]
+    assert [t.name for t in au(26, "LEFT")] == ["26"]
+    with pytest.raises(KeyError):
+        au(99)
+
+
+def test_every_au_but_those_that_turn_something_has_a_rank() -> None:
+    assert [rank(number).name for number in (1, 12, 43)] == ["rank 1", "rank 12", "rank 43"]
+    for turn in (51, 63, 99):
+        with pytest.raises(KeyError):
+            rank(turn)
+
+
+@pytest.mark.parametrize(
+    ("target", "wanted"),
+    [
+        (au(61)[0], "eyes"),
+        (au(66)[0], "eyes"),
+        (au(54)[0], "head"),
+        (au(12)[0], "face"),
+        (au(6)[0], "face"),
+        (au(5)[0], "face"),
+        (fap(23), "eyes"),
+        (fap(48), "head"),
+        (fap(19), "face"),
+        (presence("eyes"), "eyes"),
+        (presence("lips"), "face"),
+        (presence("blinks"), "idle"),
+        (presence("motion"), "idle"),
+        (presence("successive"), "face"),
+        (rank(12), "face"),
+    ],
+)
+def test_a_target_belongs_to_a_region(target: object, wanted: str) -> None:
+    assert region(target) == wanted  # type: ignore[arg-type]

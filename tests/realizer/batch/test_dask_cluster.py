@@ -1,0 +1,113 @@
+"""A real Dask scheduler and real workers on this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from realizer.batch.dask_cluster import Cluster
+from realizer.batch.task import Options, Task
+from realizer.batch.worker import Outcome, Worker
+from realizer.core.errors import RealizerError
+
+pytest.importorskip("distributed")
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    """A Dask program that has said that it is there."""
+    command = [sys.executable, "-W", "ignore", "-m", "dask", *arguments, "--no-dashboard"]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def said(process: subprocess.Popen[str], words: str) -> str:
+    """The first line on its standard error with these words."""
+    assert process.stderr is not None
+    seen = ""
+    for line in process.stderr:
+        if words in line:
+            return line
+        seen += line
+    raise AssertionError(seen)
+
+
+@pytest.fixture
+def scheduler() -> Iterator[str]:
+    process = start("scheduler", "--host", "127.0.0.1", "--port", "0")
+    try:
+        yield said(process, "Scheduler at:").split()[-1]
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def workers(scheduler: str, tmp_path: Path) -> Iterator[list[subprocess.Popen[str]]]:
+    options = ("--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory", str(tmp_path))
+    processes = [start("worker", scheduler, *options) for _ in range(2)]
+    try:
+        for process in processes:
+            said(process, "Registered to:")
+        yield processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+def by_name(outcomes: list[Outcome]) -> dict[str, Outcome]:
+    return {outcome.row["document"]: outcome for outcome in outcomes}
+
+
+def test_a_cluster_gives_what_one_worker_gives_here_though_one_of_its_workers_is_killed(
+    scheduler: str, workers: list[subprocess.Popen[str]], tasks: list[Task], options: Options
+) -> None:
+    here = Worker(options)
+    expected = by_name([here.perform(task) for task in tasks])
+    crew = Cluster(options, scheduler)
+    try:
+        outcomes = crew.perform(tasks)
+        got = [next(outcomes)]
+        os.kill(workers[0].pid, signal.SIGKILL)
+        got += outcomes
+    finally:
+        crew.close()
+    assert len(got) == len(tasks)
+    assert by_name(got) == expected
+
+
+def test_a_scheduler_that_is_killed_is_told_in_words(tasks: list[Task], options: Options) -> None:
+    scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0")
+
+    def given() -> Iterator[Task]:
+        yield tasks[0]
+        scheduler.kill()
+        scheduler.communicate()
+        yield from tasks[1:]
+
+    crew = Cluster(options, said(scheduler, "Scheduler at:").split()[-1])
+    try:
+        with pytest.raises(RealizerError, match="the scheduler went away"):
+            list(crew.perform(given()))
+    finally:
+        crew.close()
+
+
+def test_an_address_without_a_scheduler_is_told(options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.batch.dask_cluster.PATIENCE", 0.2)
+    with pytest.raises(RealizerError, match="wanted a Dask scheduler there"):
+        Cluster(options, "tcp://127.0.0.1:9")
+
+
+def test_who_waits_for_the_first_worker_is_told(
+    scheduler: str, options: Options, caplog: pytest.LogCaptureFixture
+) -> None:
+    cluster = Cluster(options, scheduler)
+    assert list(cluster.perform([])) == []
+    cluster.close()
+    assert f"--dask {scheduler}: it has no worker yet" in caplog.text

@@ -1,0 +1,73 @@
+"""Local workers: all outcomes whatever dies, and the same ones."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from realizer.batch.process_pool import TRIES, Processes
+from realizer.batch.task import Options, Task
+from realizer.batch.worker import Outcome, Worker
+
+
+def by_name(outcomes: list[Outcome]) -> dict[str, Outcome]:
+    named = {outcome.row["document"]: outcome for outcome in outcomes}
+    assert len(named) == len(outcomes)
+    return named
+
+
+@pytest.fixture
+def expected(tasks: list[Task], options: Options) -> dict[str, Outcome]:
+    worker = Worker(options)
+    return by_name([worker.perform(task) for task in tasks])
+
+
+def test_two_workers_give_what_one_gives_here(
+    tasks: list[Task], options: Options, expected: dict[str, Outcome]
+) -> None:
+    crew = Processes(options, 2)
+    assert by_name(list(crew.perform(tasks))) == expected
+    assert crew.pids == ()
+
+
+def test_a_worker_that_is_killed_loses_nothing(
+    tasks: list[Task], options: Options, expected: dict[str, Outcome]
+) -> None:
+    crew = Processes(options, 1)
+    outcomes = crew.perform(tasks)
+    got = [next(outcomes)]
+    (at_work,) = crew.pids  # it was given its second document before the first outcome came out
+    os.kill(at_work, signal.SIGKILL)
+    got += outcomes
+    assert by_name(got) == expected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deadly(Options):
+    """Options that end the process they come to."""
+
+    def __reduce__(self) -> Any:
+        return os._exit, (3,)
+
+
+def test_a_document_whose_worker_always_dies_is_given_up(tasks: list[Task], options: Options) -> None:
+    deadly = Deadly(formats=options.formats, voice=options.voice)
+    outcomes = list(Processes(deadly, 1).perform(tasks[:1]))
+    for outcome in outcomes:
+        assert outcome.row["status"] == "failed"
+        assert outcome.row["error"] == f"its process ended {TRIES} times (exit status 3)"
+
+
+def test_workers_end_with_whoever_asked_for_them(tasks: list[Task], options: Options) -> None:
+    crew = Processes(options, 2)
+    outcomes = crew.perform(tasks)
+    next(outcomes)
+    pids = crew.pids
+    outcomes.close()
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)

@@ -1,0 +1,267 @@
+"""The client in an event loop, against the real service: send, play, iterate frames, be told of errors."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bml_schema.feedback import WarningFeedback
+from realizer.client import ClientError, connect
+from realizer.core.settings import Settings
+from realizer.face.load import load_face
+from realizer.protocol.wire import WireFrame
+from realizer.server.serve import Server
+
+WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
+LIMIT = 30  # s
+
+
+def serving(test) -> None:
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
+            await test(server.url)
+
+    asyncio.run(run())
+
+
+def test_a_block_is_followed_to_its_end() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.send(WAIT.format("b"))
+            ids = [getattr(f, "id", None) async for f in client.until_end()]
+            assert [i for i in ids if i] == ["b:start", "b:w:start", "b:w:end", "b:end"]
+            await client.send(WAIT.format("c"))
+            assert [f async for f in client.until_end("c")][-1].id == "c:end"
+
+    serving(test)
+
+
+def test_a_refused_block_ends_the_waiting() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.send('<bml id="b"><required><head id="n" lexeme="NONE"/></required></bml>')
+            assert isinstance([f async for f in client.until_end()][-1], WarningFeedback)
+            await client.send("<bml id='x'><oops")
+            assert isinstance([f async for f in client.until_end()][-1], WarningFeedback)
+
+    serving(test)
+
+
+def test_what_is_planned_is_followed_and_does_not_mix_with_answers() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.subscribe("schedule")
+            await client.send(WAIT.format("b"))
+            told = []
+            async for message in client.frames("schedule"):
+                assert isinstance(message, dict)
+                told += [block["state"] for block in message["blocks"]]
+                if "DONE" in told:
+                    break
+            assert told[0] != "DONE"
+            assert (await client.ask("ping"))["type"] == "pong"
+
+    serving(test)
+
+
+def test_frames_of_two_streams_do_not_mix() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            told = await client.subscribe("fap", fps=50)
+            await client.subscribe("au", fps=50, encoding="json")
+            assert len(told["names"]) == 68
+            numbers = []
+            async for frame in client.frames("fap"):
+                assert isinstance(frame, WireFrame)
+                numbers.append(frame.frame)
+                if len(numbers) == 5:
+                    break
+            assert numbers == list(range(told["frame"], told["frame"] + 5))
+            async for frame in client.frames("au"):
+                assert frame["type"] == "au"
+                break
+
+    serving(test)
+
+
+def test_an_error_of_the_service_is_raised() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ClientError, match="wanted a stream of"):
+                await client.subscribe("smell")
+            assert (await client.ask("ping"))["type"] == "pong"
+
+    serving(test)
+
+
+def test_play_waits_for_the_end_and_says_when_it_was() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.play(WAIT.format("b"))
+            assert (end.id, end.status) == ("b:end", "DONE")
+            # Whoever iterates gets the feedback all the same.
+            assert [f async for f in client.until_end("b")][-1] == end
+            ends = await asyncio.gather(client.play(WAIT.format("c")), client.play(WAIT.format("d")))
+            assert [end.id for end in ends] == ["c:end", "d:end"]
+            with pytest.raises(ClientError, match="lexeme") as caught:
+                await client.play('<bml id="e"><required><head id="n" lexeme="NONE"/></required></bml>')
+            assert caught.value.code == "refused"
+
+    serving(test)
+
+
+@pytest.mark.parametrize("nothing", ["", " \n", "<!-- later -->", '<?xml version="1.0"?>'])
+def test_nothing_to_play_is_refused_at_once(nothing: str) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ClientError, match="wanted <bml>, got nothing"):
+                await client.play(nothing)
+
+    serving(test)
+
+
+def test_the_welcome_says_what_there_is_and_the_state_what_plays() -> None:
+    async def test(url: str) -> None:
+        async with connect(f"{url}?session=show") as client:
+            assert (client.session, client.welcome["version"]) == ("show", 1)
+            assert "NOD" in client.welcome["capabilities"]["lexemes"]["head"]
+            await client.control("set", aus={"12L": 0.5})
+            layers: dict[str, Any] = {}
+            while "direct" not in layers:  # it is reached smoothly
+                layers = (await client.state())["characters"][0]["layers"]
+            assert layers["direct"]["aus"].keys() == {"12L"}
+
+    serving(test)
+
+
+def test_errors_that_nobody_asked_for_are_kept_and_spoil_no_answer() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client.control("set", aus={"12": 7})
+            assert (await client.ask("ping", id=1))["id"] == 1
+            assert [error["where"] for error in client.errors] == ["set.aus.12"]
+            with pytest.raises(ValueError, match="which are answered; got stop"):
+                await client.ask("stop")
+
+    serving(test)
+
+
+def test_a_service_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.client.connection.PROTOCOL", 2)
+
+    async def test(url: str) -> None:
+        with pytest.raises(ClientError, match="wanted version 1 of the protocol, got 2") as caught:
+            async with connect(url):
+                pass
+        assert caught.value.code == "version"
+
+    serving(test)
+
+
+def test_a_service_that_asks_for_a_token_gets_it() -> None:
+    secret = "a-token-of-many-letters-and-0123456789"
+
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", token=secret)
+        async with asyncio.timeout(LIMIT), Server(settings) as server:
+            async with connect(server.url, token=secret) as client:
+                assert (await client.play(WAIT.format("b"))).id == "b:end"
+            for token in (None, "another"):
+                with pytest.raises(ClientError, match="token"):
+                    async with connect(server.url, token=token):
+                        pass
+
+    asyncio.run(run())
+
+
+def test_feedback_ends_with_the_connection() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            await client._socket.close()
+            assert [f async for f in client.feedback()] == []
+            with pytest.raises(ClientError, match="has ended"):
+                await client._wait(lambda: False)
+
+    serving(test)
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        lambda client: client.send(WAIT.format("b")),
+        lambda client: client.play(WAIT.format("b")),
+        lambda client: client.control("stop"),
+        lambda client: client.ask("ping"),
+        lambda client: client.subscribe("fap"),
+    ],
+)
+def test_whatever_is_said_over_a_connection_that_has_ended_is_an_error_of_ours(say: Any) -> None:
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent")
+        async with asyncio.timeout(LIMIT), Server(settings) as server, connect(server.url) as client:
+            await server.close()
+            with pytest.raises(ClientError, match="the connection has ended: the service ends") as caught:
+                await say(client)
+            assert caught.value.code == "connection"
+
+    asyncio.run(run())
+
+
+def test_what_the_service_refuses_of_an_address_is_told_in_its_words() -> None:
+    async def test(url: str) -> None:
+        for bad, says in (
+            (f"{url}?session=a b", "session: wanted 1..64 letters"),
+            (
+                f"{url}?session=a&seen=abc",
+                "seen: wanted the number of the last feedback that came, got 'abc'",
+            ),
+            (url.replace("/ws", "/other"), "wanted a WebSocket at /ws or /check"),
+            (url.replace("ws:", "http:"), "http"),
+        ):
+            with pytest.raises(ClientError, match=says):
+                async with connect(bad.replace(" ", "%20")):
+                    pass
+
+    serving(test)
+
+
+def test_a_mesh_is_read_by_the_face_it_has_though_that_changes_while_it_runs() -> None:
+    async def test(url: str) -> None:
+        rests = {face: load_face(face) for face in ("ada", "ben")}
+        async with connect(url) as client:
+            await client.control("character", face="ada")
+            await client.subscribe("fap")
+            told = await client.subscribe("mesh", fps=50)
+            assert told["face"] == "ada"
+            numbers, shown = [], []
+            async for frame in client.frames("mesh"):
+                assert isinstance(frame, WireFrame)
+                assert frame.told is not None
+                numbers.append(frame.frame)
+                shown.append(frame.told["face"])
+                # A face moves by centimetres; by another one's scale it would be another face.
+                assert np.abs(frame.vertices - rests[shown[-1]].vertices).max() < 0.03
+                if shown == ["ada"] * 3:
+                    await client.control("character", face="ben")
+                if shown[-3:] == ["ben"] * 3:
+                    break
+            assert frame.told["type"] == "changed"
+            assert frame.told["frame"] == frame.frame - 2
+            assert numbers == list(range(told["frame"], told["frame"] + len(numbers)))
+            assert not client.errors
+
+    serving(test)
+
+
+def test_nobody_there_is_an_os_error() -> None:
+    async def run() -> None:
+        async with Server(Settings(port=0, voice="silent")) as server:
+            url = server.url
+        with pytest.raises(OSError, match="Connect"):
+            async with connect(url):
+                pass
+
+    asyncio.run(run())

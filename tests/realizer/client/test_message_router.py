@@ -1,0 +1,124 @@
+"""Messages are sorted by what they are: answers to whom asked, errors of others aside, frames by stream."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
+from realizer.client.message_router import KEPT, ClientError, Mail, Until
+from realizer.protocol.wire import FrameKind, WireError, pack
+
+
+@pytest.fixture
+def mail() -> Mail:
+    return Mail()
+
+
+def error(where: str | None, code: str = "invalid") -> str:
+    said = {"type": "error", "code": code, "message": "wanted another"}
+    return json.dumps(said if where is None else {**said, "where": where})
+
+
+def test_an_answer_is_the_one_of_its_question(mail) -> None:
+    mail.ask("ping")
+    mail.put('{"type":"state"}')
+    mail.put(error("set.aus"))
+    mail.put(error("video", "render"))
+    assert not mail.answered
+    mail.put('{"type":"pong","time":1}')
+    assert mail.answer() == {"type": "pong", "time": 1}
+    assert [one["where"] for one in mail.errors] == ["set.aus", "video"]
+
+
+@pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", "type", None])
+def test_an_error_about_what_was_asked_is_raised(mail, where) -> None:
+    mail.ask("subscribe")
+    mail.put(error(where))
+    with pytest.raises(ClientError, match="wanted another") as caught:
+        mail.answer()
+    assert caught.value.code == "invalid"
+    assert not mail.errors
+
+
+@pytest.mark.parametrize("kind", list(FrameKind))
+def test_frames_are_kept_by_stream_the_newest_ones(mail, kind) -> None:
+    for k in range(KEPT + 5):
+        mail.put(pack(kind, k, k / 25, np.zeros(2, "<f4").tobytes()))
+    ((_, frames),) = mail.frames.items()
+    assert [frame.frame for frame in frames] == list(range(5, KEPT + 5))
+
+
+def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
+    mesh = {"stream": "mesh", "index": 1, "scale": 2.0, "offset": [0.0, 0.0, 1.0]}
+    frame = pack(FrameKind.MESH, 0, 0.0, np.array([1, 2, 3], "<i2").tobytes(), character=1)
+    mail.ask("subscribe")
+    mail.put(json.dumps({"type": "subscribed", "fps": 25.0, **mesh}))
+    mail.put(frame)
+    mail.put(json.dumps({"type": "changed", **mesh, "scale": 1.0}))
+    mail.put(frame)
+    mail.put(frame[:2] + b"\0" + frame[3:])  # of another character
+    first, second, other = mail.of("mesh")
+    assert first.vertices.tolist() == [[2.0, 4.0, 7.0]]
+    assert second.vertices.tolist() == [[1.0, 2.0, 4.0]]
+    assert second.told["fps"] == 25.0
+    assert first == second
+    with pytest.raises(WireError, match="wanted a mesh whose stream was told of, got MESH"):
+        _ = other.vertices
+    assert mail.answer()["scale"] == 2.0
+    assert not mail.errors
+
+
+def test_json_frames_and_schedules_are_frames(mail) -> None:
+    mail.put('{"type":"arkit","frame":1,"time":0.04,"values":[0.5]}')
+    mail.put('{"type":"schedule","time":0,"whole":true,"blocks":[]}')
+    assert {stream: len(kept) for stream, kept in mail.frames.items()} == {"arkit": 1, "schedule": 1}
+
+
+def planned(end: float | None) -> PredictionFeedback:
+    return PredictionFeedback(blocks=(BlockPrediction(id="b", global_start=0.0, global_end=end),))
+
+
+def block(id: str, time: float) -> BlockProgress:
+    return BlockProgress(id=id, global_time=time)
+
+
+def warning(id: str) -> WarningFeedback:
+    return WarningFeedback(id=id, type="PARSING_FAILURE")
+
+
+@pytest.mark.parametrize(
+    ("told", "last"),
+    [
+        ([block("b:start", 1.0), block("b:end", 2.0)], "b:end"),
+        ([block("a:end", 1.0), block("b:end", 2.0)], "b:end"),
+        ([planned(None), warning("b")], "b"),
+        ([planned(3.0), warning("b"), block("b:end", 3.0)], "b:end"),
+        ([warning("b:n"), block("b:start", 1.0)], None),
+    ],
+)
+def test_a_block_is_over_with_its_end_or_its_refusal(told, last) -> None:
+    until = Until("b")
+    for feedback in told:
+        until.tell(feedback)
+    assert (until.last.id if until.last else None) == last
+    assert until.over == (last is not None)
+    if last == "b":
+        with pytest.raises(ClientError):
+            until.end()
+
+
+@pytest.mark.parametrize(
+    ("bml", "block"),
+    [
+        ('<bml id="a"/><bml id="b"/>', "b"),
+        ('<bml id="a"/><!-- <bml id="b"/> -->', "a"),
+        ('<bml id="a&amp;b"/>', "a&b"),
+        ("<bml/>", None),
+    ],
+)
+def test_the_last_block_is_the_last_that_is_no_comment(mail, bml, block) -> None:
+    mail.sent(bml)
+    assert mail.last_block == block

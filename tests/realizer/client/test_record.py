@@ -1,0 +1,102 @@
+"""A film of what was drawn live: as long as its block, with its picture and its sound."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from realizer.client import ClientError, connect
+from realizer.client.record import RATE
+from realizer.client.record import _each as each
+from realizer.client.record import _sound as sound_of
+from realizer.core.settings import Settings
+from realizer.protocol.wire import FrameKind, WireFrame, pack, unpack
+from realizer.server.serve import Server
+
+LIMIT = 120  # s
+FPS = 5
+SIZE = 128
+LOOK = '<faceFacs id="f{au}" au="{au}" amount="{amount}" start="0" attackPeak="0.2" relax="2.6" end="2.8"/>'
+HELD = f'<bml id="b">{LOOK.format(au=12, amount=1)}{LOOK.format(au=26, amount=0.8)}</bml>'
+
+
+def serving(test) -> None:
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent", idle=False)
+        async with asyncio.timeout(LIMIT), Server(settings) as server:
+            await test(server.url)
+
+    asyncio.run(run())
+
+
+@pytest.mark.gl
+def test_the_film_of_a_block_shows_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="needs the film extra")
+    import realizer
+    from realizer.render import Renderer
+
+    film = tmp_path / "live.mp4"
+
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.film(film, HELD, fps=FPS, size=[SIZE, SIZE])
+            assert end.id == "b:end"
+
+    serving(test)
+    played = realizer.realize(HELD, fps=FPS, idle=False)
+    with Renderer("default", (SIZE, SIZE)) as renderer:
+        (still,) = renderer.draw(played.poses[8:9])
+        (calm,) = renderer.draw(played.poses[:1])
+    with av.open(str(film)) as container:
+        assert [stream.type for stream in container.streams] == ["video", "audio"]
+        pictures = [f.to_ndarray(format="rgb24").astype(int) for f in container.decode(video=0)]
+    assert len(pictures) in (15, 16)
+    off = np.abs(pictures[8] - still).mean()
+    # As near as the two encoders leave it, and nowhere near the resting face.
+    assert off < 4
+    assert np.abs(pictures[8] - calm).mean() > off + 0.5
+
+
+def test_a_suffix_that_is_no_film_is_refused(tmp_path: Path) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ClientError, match=r"wanted a film \(.mp4 or .webm\), got live.gif"):
+                await client.film(tmp_path / "live.gif", HELD)
+
+    serving(test)
+
+
+def test_a_folder_that_is_not_there_is_said_before_anything_is_played(tmp_path: Path) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(FileNotFoundError, match="nowhere"):
+                await client.film(tmp_path / "nowhere" / "x.mp4", '<bml id="b"/>')
+            assert not client._mail.feedback
+
+    serving(test)
+
+
+def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
+    packets = [
+        unpack(pack(FrameKind.SOUND, k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))
+        for k in range(4)
+    ]
+    packets.append(unpack(pack(FrameKind.SOUND, 2, 1.04, b"", forget=True)))
+    pcm = sound_of(packets, 1.01, 0.1)
+    step = RATE // 100
+    assert [int(pcm[k * step]) for k in range(5)] == [1, 2, 2, 0, 0]
+
+
+def test_a_picture_that_did_not_come_leaves_the_one_before() -> None:
+    def picture(frame: int, grey: int) -> WireFrame:
+        buffer = io.BytesIO()
+        Image.new("RGB", (16, 16), (grey,) * 3).save(buffer, "PNG")
+        return unpack(pack(FrameKind.PICTURE, frame, frame / 10, buffer.getvalue()))
+
+    shown = each([picture(0, 10), picture(1, 20), picture(4, 50)], 0.1, 10, 5)
+    assert [int(one[0, 0, 0]) for one in shown] == [20, 20, 20, 50, 50]

@@ -1,0 +1,73 @@
+"""Looking expressions up, by what they mean and by what they show."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.expressions import by_action_units, by_meaning, shipped
+from realizer.expressions.search import stem
+
+
+def names(found) -> list[str]:
+    return [one.name for one, _ in found]
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("surprise", "SURPRISE"),
+        ("surprised!", "template:surprise"),
+        ("sorry about that", "template:regret"),
+        ("I don't know", "template:sadness"),
+        ("furious", "ANGER"),
+        ("angry", "ANGER"),
+        ("happy", "HAPPINESS"),
+        ("I am so happy", "template:happiness"),
+        ("scared", "FEAR"),
+        ("sarcasm", "template:ironic smile"),
+        ("a friendly greeting", "SMILE"),
+        ("nose", "template:disgust"),
+        ("smiel", "SMILE"),
+    ],
+)
+def test_an_expression_is_found_by_what_it_means(text: str, meant: str) -> None:
+    found = by_meaning(text, shipped().values())
+    best = [one.name for one, score in found if score == found[0][1]]
+    assert meant in best
+
+
+def test_more_of_the_words_and_better_places_come_first() -> None:
+    found = by_meaning("raised left brow", shipped().values())
+    assert names(found)[0] == "RAISE_LEFT_BROW"
+    scores = [score for _, score in found]
+    assert scores == sorted(scores, reverse=True)
+    assert all(0 < score <= 1 for score in scores)
+
+
+def test_words_that_nobody_knows_find_nothing() -> None:
+    assert by_meaning("qqqq", shipped().values()) == []
+    assert by_meaning("...", shipped().values()) == []
+
+
+@pytest.mark.parametrize("one", shipped().values(), ids=lambda one: one.name)
+def test_what_is_asked_for_as_it_is_shown_is_found_first(one) -> None:
+    (_, best), *_ = found = by_action_units(one.aus, shipped().values())
+    assert best == pytest.approx(1)
+    assert one.name in {other.name for other, score in found if score == pytest.approx(1)}
+
+
+def test_sides_count_and_so_does_how_much() -> None:
+    left = {(1, "LEFT"): 1.0, (2, "LEFT"): 1.0}
+    found = names(by_action_units(left, shipped().values()))
+    assert found[0] == "RAISE_LEFT_BROW"
+    assert "RAISE_RIGHT_BROW" not in found
+    assert names(by_action_units({(9, "BOTH"): 1.0}, shipped().values())) == ["template:disgust", "DISGUST"]
+    assert by_action_units({(28, "BOTH"): 1.0}, shipped().values()) == []
+
+
+def test_endings_do_not_count() -> None:
+    assert len({stem(word) for word in ("surprise", "surprised", "surprising", "surprises")}) == 1
+    assert stem("worried") == stem("worry") == stem("worries")
+    assert stem("happiness") == stem("happy") == stem("happily")
+    assert stem("friendliness") == stem("friendly")
+    assert stem("nod") == "nod"

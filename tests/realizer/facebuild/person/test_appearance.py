@@ -1,0 +1,25 @@
+"""A recipe's look: figures over plain ones, refused where unknown."""
+
+import pytest
+
+from realizer.core.errors import FaceError
+from realizer.facebuild.person.appearance import look_of
+
+
+def test_what_a_recipe_does_not_say_is_plain() -> None:
+    plain, own = look_of({}), look_of({"stubble": 0.7})
+    assert (plain.stubble, own.stubble) == (0.0, 0.7)
+    assert own.lips == plain.lips
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ({"beard": 1}, "wanted one of brow_thick"),
+        ({"lips": "red"}, "lips: wanted a number"),
+        ({"age": True}, "age"),
+    ],
+)
+def test_what_is_no_figure_is_refused(table: dict[str, object], says: str) -> None:
+    with pytest.raises(FaceError, match=says):
+        look_of(table)

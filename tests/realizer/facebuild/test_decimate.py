@@ -1,0 +1,59 @@
+"""Surfaces lose vertices that nobody misses, and keep their shape, their rims and their two sides alike."""
+
+import numpy as np
+import pytest
+
+from realizer.facebuild.decimate import thinned
+
+
+def sheet(bend: float) -> tuple[np.ndarray, np.ndarray]:
+    """A square of 21 x 21 vertices, 20 cm wide, symmetric about x = 0, arched by `bend`."""
+    line = np.linspace(-0.1, 0.1, 21)
+    x, y = np.meshgrid(line, line)
+    at = np.stack([x.ravel(), y.ravel(), bend * np.cos(x.ravel() * 15)], 1)
+    k = np.arange(20)[:, None] * 21 + np.arange(20)
+    a = k.ravel()
+    return at, np.concatenate([np.stack([a, a + 1, a + 22], 1), np.stack([a, a + 22, a + 21], 1)]).astype(
+        np.int32
+    )
+
+
+def area(at: np.ndarray, triangles: np.ndarray) -> float:
+    a, b, c = (at[triangles[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def test_a_flat_sheet_needs_few_vertices_and_keeps_its_outline() -> None:
+    at, triangles = sheet(0)
+    kept, left = thinned(at, triangles, np.full(len(at), 0.001))
+    assert len(kept) < len(at) / 4
+    assert area(at[kept], left) == pytest.approx(0.04)
+    a, b, c = (at[kept][left[:, k]] for k in range(3))
+    assert (np.cross(b - a, c - a)[:, 2] > 0).all()
+
+
+def test_what_has_no_tolerance_stays() -> None:
+    at, triangles = sheet(0)
+    tolerance = np.where(at[:, 1] > 0, 0.001, 0)
+    kept, _ = thinned(at, triangles, tolerance)
+    assert set(np.flatnonzero(tolerance == 0)) <= set(kept)
+    assert len(kept) < len(at)
+
+
+@pytest.mark.parametrize("tolerance", [0.0005, 0.002])
+def test_a_bent_sheet_changes_by_no_more_than_it_may(tolerance: float) -> None:
+    at, triangles = sheet(0.02)
+    kept, left = thinned(at, triangles, np.full(len(at), tolerance))
+    assert len(kept) < len(at)
+    middle = at[kept][left].mean(axis=1)
+    assert np.abs(middle[:, 2] - 0.02 * np.cos(middle[:, 0] * 15)).max() < 2.5 * tolerance
+
+
+def test_no_hole_comes_and_each_edge_has_two_sides() -> None:
+    at, triangles = sheet(0.02)
+    kept, left = thinned(at, triangles, np.full(len(at), 0.002))
+    edges = np.sort(np.concatenate([left[:, [0, 1]], left[:, [1, 2]], left[:, [2, 0]]]), axis=1)
+    pairs, count = np.unique(edges, axis=0, return_counts=True)
+    assert count.max() == 2
+    assert len(kept) - len(pairs) + len(left) == 1  # Euler's number of a disc
+    assert sorted(set(left.ravel())) == list(range(len(kept)))

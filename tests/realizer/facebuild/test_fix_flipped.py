@@ -1,0 +1,52 @@
+"""Fields that turn triangles over are stiffened until none does; feature points keep their moves."""
+
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Float64
+from realizer.facebuild.fix_flipped import turned, untangled
+from realizer.facebuild.parts import grid
+
+SIDE = 15
+X, Y = np.meshgrid(np.linspace(-7, 7, SIDE), np.linspace(-7, 7, SIDE))
+AT = np.stack([X.ravel(), Y.ravel(), np.zeros(SIDE * SIDE)], 1)
+TRIANGLES = grid(SIDE, SIDE)
+MIDDLE = SIDE * SIDE // 2
+
+
+def bump(width: float) -> Float64:
+    size = np.clip(1 - np.hypot(*AT[:, :2].T) / width, 0, 1)
+    return np.asarray(size[:, None] * [1.0, 0, 0])
+
+
+def mended(fields: list[Float64], plays: list[tuple[Float64, Any, float]], fixed: list[int]) -> Float64:
+    return untangled(np.stack(fields), AT, TRIANGLES, plays, fixed)
+
+
+def test_a_narrow_bump_that_is_pushed_through_its_neighbours_is_widened() -> None:
+    field = bump(1.6)
+    assert turned(AT, AT + 2.5 * field, TRIANGLES).any()
+    (wide,) = mended([field], [(np.array([2.5]), 0.0, 0.0)], [MIDDLE])
+    assert not turned(AT, AT + 2.5 * wide, TRIANGLES).any()
+    assert np.array_equal(wide[MIDDLE], field[MIDDLE])
+
+
+def test_a_field_that_turns_nothing_over_stays_as_it_is() -> None:
+    field = bump(6)
+    plays = [(np.array([way]), 0.0, 0.0) for way in (2.0, -2.0)]
+    assert np.array_equal(mended([field], plays, [])[0], field)
+
+
+def test_what_moves_along_counts() -> None:
+    field = bump(1.6)
+    together = [(np.array([2.5]), 2.5 * (bump(7) - field), 0.0)]
+    assert np.array_equal(mended([field], together, [MIDDLE])[0], field)
+
+
+def test_fields_that_add_up_to_one_still_do_when_one_of_them_is_mended() -> None:
+    field = bump(1.6)
+    rest = [1.0, 0, 0] - field
+    one, other = mended([field, rest], [(np.array([2.5, 0.0]), 0.0, 0.0)], [MIDDLE])
+    assert not np.array_equal(one, field)
+    assert np.allclose(one + other, [1.0, 0, 0])

@@ -1,0 +1,64 @@
+"""Cutting and refining surfaces, and the lips' splines."""
+
+import numpy as np
+import pytest
+
+from realizer.facebuild.person.lips import hats
+from realizer.facebuild.submesh import Patch, vertex_normals
+
+GRID = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
+QUADS = np.array(
+    [[r * 4 + c, r * 4 + c + 1, r * 4 + c + 5, r * 4 + c + 4] for r in range(3) for c in range(3)]
+)
+
+
+@pytest.fixture
+def sheet() -> Patch:
+    return Patch.of_quads(QUADS, len(GRID))
+
+
+def area(patch: Patch) -> float:
+    at = patch.positions(GRID)
+    a, b, c = (at[patch.triangles[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def test_a_cut_leaves_a_straight_edge_and_nothing_beyond(sheet: Patch) -> None:
+    cut, _ = sheet.clipped(sheet.positions(GRID)[:, 0] - 1.25)
+    assert cut.positions(GRID)[:, 0].min() == pytest.approx(1.25)
+    assert area(cut) == pytest.approx(3 * 1.75)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_refining_makes_four_of_each_triangle(sheet: Patch, flat: bool) -> None:
+    fine, _ = sheet.subdivided(flat)
+    assert len(fine.triangles) == 4 * len(sheet.triangles)
+    # Loop's rule rounds the four corners of a sheet; flat keeps every place.
+    assert area(fine) == pytest.approx(9, abs=0 if flat else 0.3)
+    assert np.allclose(vertex_normals(fine.positions(GRID), fine.triangles), [0, 0, 1])
+
+
+def test_cut_and_refined_vertices_are_mixes_of_base_vertices(sheet: Patch) -> None:
+    fine = sheet.clipped(sheet.positions(GRID)[:, 1] - 0.4)[0].subdivided()[0]
+    assert np.allclose(np.asarray(fine.mix.sum(axis=1)).ravel(), 1)
+    assert np.allclose(fine.positions(GRID + np.array([0, 0, 2.0]))[:, 2], 2)
+
+
+def test_the_lips_splines_sum_to_one_and_hold_their_knots() -> None:
+    u = np.linspace(-1, 1, 201)
+    assert np.allclose(hats(u).sum(axis=0), 1)
+    assert np.allclose(hats(np.array([-1, -0.5, 0, 0.5, 1])), np.eye(5), atol=1e-6)
+
+
+def test_a_threaded_loop_has_twice_its_vertices_and_stays_round() -> None:
+    turn = np.arange(8) * np.pi / 4
+    rings = [np.stack([r * np.cos(turn), r * np.sin(turn), 0 * turn], 1) for r in (1.0, 2.0)]
+    base = np.concatenate(rings)
+    k = np.arange(8)
+    quads = np.stack([k, 8 + k, 8 + (k + 1) % 8, (k + 1) % 8], 1)
+    patch = Patch.of_quads(quads, 16)
+    fine = patch.threaded([list(range(8)), list(range(8, 16))])
+    assert len(fine) == 32
+    away = np.linalg.norm(fine.positions(base), axis=1)
+    assert np.all((np.abs(away - 1) < 0.01) | (np.abs(away - 2) < 0.02))
+    assert np.allclose(vertex_normals(fine.positions(base), fine.triangles), [0, 0, 1])

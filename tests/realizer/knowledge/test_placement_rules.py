@@ -1,0 +1,81 @@
+"""Which expression goes where in a text, and why."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.knowledge.placement_rules import place
+from realizer.knowledge.sentences import sentences
+from realizer.tables.emotional_words import word_list
+from realizer.tables.knowledge import Role, knowledge
+
+
+def placed(text: str, role: Role = "speaker", mood: str = "") -> list[tuple[str, tuple[str, ...]]]:
+    known = knowledge()
+    found = place(sentences(text), known, role, known.mood(mood) if mood else None, word_list("en"))
+    return [(one.word.text, one.rule.show) for one in found]
+
+
+@pytest.mark.parametrize(
+    ("text", "shows"),
+    [
+        ("Do you come home today?", [("today", ("surprise",))]),
+        ("Go away!", [("away", ("anger",))]),
+        ("What a beautiful day!", []),
+        ("This makes me furious.", [("furious", ("anger",))]),
+        ("That is nonsense.", [("nonsense", ("anger",))]),
+        ("They saw a horrible accident.", [("horrible", ("surprise", "grief"))]),
+        ("Yes.", [("Yes", ("surprise",))]),
+        ("I understand that.", [("I", ("surprise",))]),
+        ("They are fascinating.", []),
+        ("I am so sorry.", []),
+        ("Nonsense!", [("Nonsense", ("anger",))]),
+        ("Really?!", [("Really", ("surprise",))]),
+    ],
+)
+def test_what_a_speaker_shows(text: str, shows: list[tuple[str, tuple[str, ...]]]) -> None:
+    assert placed(text) == shows
+
+
+@pytest.mark.parametrize("text", ["Do not be afraid.", "I am not so very angry.", "That isn’t nonsense."])
+def test_a_negation_turns_a_word_around(text: str) -> None:
+    assert placed(text) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "shows"),
+    [
+        ("Do you know it?", "sadness"),
+        ("My dog is sick.", "regret"),
+        ("That is nonsense.", "disbelief"),
+        ("It was horrible.", "astonishment"),
+        ("I won the race!", "astonishment"),
+    ],
+)
+def test_what_a_listener_shows(text: str, shows: str) -> None:
+    assert [show for _, (show,) in placed(text, "listener")] == [shows]
+
+
+def test_a_listener_shows_far_less_than_a_speaker() -> None:
+    text = "Are you here? It was horrible. " * 10
+    assert 0 < len(placed(text, "listener")) < len(placed(text)) / 3
+
+
+def test_a_sad_mood_leaves_out_what_would_come_too_soon() -> None:
+    text = "Are you here now, on this island? " * 4
+    assert len(placed(text)) == 4
+    assert len(placed(text, mood="confused")) > len(placed(text, mood="depressed")) > 0
+
+
+def test_a_rule_that_stays_is_kept_in_any_mood() -> None:
+    text = "Nonsense, nonsense I say. Are you mad?"
+    assert [word for word, _ in placed(text, mood="disorientation")] == ["Nonsense"]
+    assert [word for word, _ in placed("Rubbish. Nonsense.", mood="disorientation")] == [
+        "Rubbish",
+        "Nonsense",
+    ]
+
+
+def test_without_words_only_punctuation_counts() -> None:
+    found = place(sentences("Nonsense. Czy to ty?"), knowledge(), words=None)
+    assert [(one.word.text, one.rule.when) for one in found] == [("ty", "question")]

@@ -1,0 +1,31 @@
+"""What is done to a block that was announced is kept until it comes, and no longer."""
+
+from __future__ import annotations
+
+from bml_schema import parse
+from realizer.playback.announced_blocks import Expected
+
+BLOCK = parse('<bml id="a"/>')
+
+
+def test_a_block_is_expected_from_its_announcement_until_it_arrives() -> None:
+    expected = Expected()
+    assert "a" not in expected
+    expected.add(BLOCK)
+    assert "a" in expected
+    expected.arrive(BLOCK)
+    assert "a" not in expected
+
+
+def test_what_was_done_meanwhile_is_its_fate_once() -> None:
+    expected = Expected()
+    expected.add(BLOCK)
+    fate = expected.fate("a")
+    assert fate is not None
+    fate.revoked = True
+    assert expected.arrive(BLOCK).revoked
+    assert not expected.arrive(BLOCK).revoked
+
+
+def test_nothing_is_known_of_a_block_nobody_announced() -> None:
+    assert Expected().fate("a") is None

@@ -1,0 +1,160 @@
+"""What behaviours do to others: interrupt, activate, change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bml_schema import parse
+from realizer.pipeline import realize
+from realizer.playback.audio_mix import heard
+from realizer.playback.player import Player
+from realizer.realization import Realization
+from realizer.speech import SilentVoice
+
+BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+SMILE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.4" relax="4" end="5"/>'
+
+
+def play(*inside: str) -> Realization:
+    """Blocks a, b, c ... that begin together."""
+    documents = [
+        f'<bml id="{name}" {BMLA}{text if text.startswith(" ") else ">" + text}</bml>'
+        for name, text in zip("abcdef", inside, strict=False)
+    ]
+    return realize("".join(documents), voice=SilentVoice(), idle=False, fps=50)
+
+
+def told(played: Realization, part: str) -> list[str]:
+    return [f for f in played.feedback if part in f and "predictionFeedback" not in f]
+
+
+def interrupt(more: str = "", start: float = 1.0, target: str = "a") -> str:
+    return f'<bmla:interrupt id="i" target="{target}" start="{start}"{more}/>'
+
+
+def test_an_interrupt_ends_the_whole_block_where_nothing_else_is_said() -> None:
+    played = play(SMILE, interrupt())
+    (end,) = told(played, '"a:end"')
+    assert 'globalTime="1"' in end
+    assert "INTERRUPTED" in end
+    assert not told(played, "a:s:relax")
+
+
+def test_an_interrupted_face_relaxes_without_a_jump() -> None:
+    played = play(SMILE, interrupt())
+    steps = np.abs(np.diff(played.aus.aus, axis=0)).max()
+    assert played.aus.aus[49].max() > 0.3
+    assert played.duration == pytest.approx(1.3)
+    assert played.aus.aus[65].max() == 0
+    assert steps < 0.12  # in a fiftieth of a second
+
+
+def test_some_behaviours_relax_and_the_block_goes_on() -> None:
+    nod = '<head id="n" lexeme="NOD" start="2"/>'
+    played = play(SMILE + nod, interrupt(' include="s"'))
+    (relax,), (end,) = told(played, "a:s:relax"), told(played, "a:s:end")
+    assert 'time="1"' in relax
+    assert 'time="1.3"' in end
+    assert told(played, "a:n:end")
+    assert "DONE" in told(played, '"a:end"')[0]
+    assert played.schedules[0].at("s", "end") == pytest.approx(1.3)
+
+
+def test_what_is_excluded_goes_on() -> None:
+    nod = '<head id="n" lexeme="NOD" start="2"/>'
+    played = play(SMILE + nod, interrupt(' exclude="s"'))
+    assert not told(played, "a:n:")
+    assert 'time="5"' in told(played, "a:s:end")[0]
+
+
+def test_a_set_that_is_all_that_is_left_ends_the_block() -> None:
+    played = play(SMILE + '<head id="n" lexeme="NOD"/>', interrupt(' include="s"', start=3.0))
+    assert "INTERRUPTED" in told(played, '"a:end"')[0]
+
+
+def test_interrupting_a_block_that_has_ended_is_nothing_and_one_never_heard_of_is_a_warning() -> None:
+    assert not play('<wait id="w" duration="0.2"/>', interrupt()).warnings
+    played = play(SMILE, interrupt(target="nobody"))
+    assert [f for f in told(played, "warningFeedback") if "b:i" in f and "nobody" in f]
+
+
+def test_a_required_interrupt_that_cannot_be_done_ends_its_own_block() -> None:
+    played = play(f"<required>{interrupt(target='nobody')}</required>{SMILE}")
+    (end,) = told(played, '"a:end"')
+    assert "INTERRUPTED" in end
+    (warning,) = told(played, "warningFeedback")
+    assert 'id="a"' in warning
+    assert played.feedback.index(warning) < played.feedback.index(end)
+
+
+def test_activate_starts_a_preplanned_block() -> None:
+    played = play(f' bmla:preplan="true">{SMILE}', '<bmla:activate id="x" target="a" start="2"/>')
+    assert 'globalTime="2"' in told(played, '"a:start"')[0]
+    assert played.schedules[0].start == 2.0
+    assert played.duration == 7.0
+
+
+def test_activating_what_does_not_wait_is_a_warning() -> None:
+    played = play(SMILE, '<bmla:activate id="x" target="a" start="2"/>')
+    assert [f for f in told(played, "warningFeedback") if "b:x" in f]
+
+
+def change(parameter: str, trajectory: str, times: str, target: str = "a:s") -> str:
+    return (
+        f'<bmla:parametervaluechange id="p" target="{target}" paramId="{parameter}" {times}>'
+        f"<bmla:trajectory {trajectory}/></bmla:parametervaluechange>"
+    )
+
+
+def strongest(played: Realization, time: float) -> float:
+    return float(played.aus.aus[round(time * played.fps)].max())
+
+
+def test_an_amount_goes_evenly_to_its_new_value() -> None:
+    linear = change("amount", 'type="linear" targetValue="1"', 'start="1" end="3"')
+    plain, played = play(SMILE), play(SMILE, linear)
+    ratios = [strongest(played, t) / strongest(plain, t) for t in (1.0, 2.0, 3.0, 3.5)]
+    assert ratios == pytest.approx([1.0, 1.5, 2.0, 2.0], abs=0.01)
+
+
+def test_an_amount_changes_at_once_but_without_a_jump() -> None:
+    played = play(SMILE, change("amount", 'type="instant" targetValue="0.1"', 'start="1"'))
+    assert strongest(played, 1.2) == pytest.approx(strongest(played, 0.9) / 5, abs=0.01)
+    assert np.abs(np.diff(played.aus.aus, axis=0)).max() < 0.2
+
+
+def test_an_initial_value_comes_first() -> None:
+    linear = change("amount", 'type="linear" initialValue="1" targetValue="0.5"', 'start="1" end="3"')
+    plain, played = play(SMILE), play(SMILE, linear)
+    assert strongest(played, 1.12) / strongest(plain, 1.12) == pytest.approx(2.0, abs=0.05)
+    assert strongest(played, 3.0) / strongest(plain, 3.0) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "target"), [("colour", "a:s"), ("amount", "a:nobody"), ("amount", "nobody:s")]
+)
+def test_a_parameter_that_is_not_there_is_a_warning(parameter: str, target: str) -> None:
+    played = play(SMILE, change(parameter, 'type="instant" targetValue="1"', 'start="1"', target))
+    assert [f for f in told(played, "warningFeedback") if "b:p" in f and "EXECUTION_FAILURE" in f]
+
+
+@pytest.mark.espeak
+def test_the_volume_of_a_speech_falls() -> None:
+    from realizer.speech import find_voice
+
+    voice = find_voice("espeak")
+    try:
+        player = Player(idle=False, history=float("inf"))
+        quiet = change("volume", 'type="linear" targetValue="0"', 'start="0.5" end="1"')
+        for text in ('<speech id="s"><text>one two three four five six</text></speech>', quiet):
+            name = "a" if "speech" in text else "b"
+            block = parse(f'<bml id="{name}" {BMLA}>{text}</bml>')
+            player.submit(block, 0.0, {b: voice.say(s) for b, s in player.wants(block).items()})
+        player.due(float("inf"))
+        (speaking,) = player.speech()
+        sound = np.abs(heard(speaking, 22050))
+        assert sound[: 22050 // 2].max() > 1000
+        assert sound[22050 + 1 :].max() == 0
+    finally:
+        voice.close()

@@ -1,0 +1,99 @@
+"""How a block stands to those that are alive."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bml_schema import Block, SyncRef, parse
+from realizer.behaviours import KINDS
+from realizer.behaviours.kind import World
+from realizer.playback.active_block import Playing, Wait
+from realizer.playback.block_links import awaited, before, ended, followers, held, instants
+from realizer.playback.block_planner import plan
+from realizer.scheduling.timing import Schedule
+
+
+def block(id: str, said: str = "", inside: str = '<gaze id="g" target="x"/>') -> Block:
+    return parse(f'<bml id="{id}" xmlns:bmla="http://www.asap-project.org/bmla" {said}>{inside}</bml>')
+
+
+def alive(id: str, character: int = 0, start: float = 0.0, waits: list[Wait] | None = None) -> Playing:
+    made = Playing(plan(block(id), KINDS, World()), KINDS, World(), character, 0, start, waits or [])
+    made.lay(made.plan, start)
+    return made
+
+
+def ids(waits: list[Wait]) -> list[tuple[str, bool]]:
+    return [(w.block.block.id, w.subsiding) for w in waits]
+
+
+def test_append_names_only_the_last_of_those_that_wait_for_each_other() -> None:
+    first = alive("a")
+    second = alive("b", waits=[Wait(first)])
+    apart = alive("c")
+    other = alive("d", character=1)
+    never = alive("e", start=float("inf"))
+    everyone = [first, second, apart, other, never]
+    assert ids(awaited(block("x", 'composition="APPEND"'), 0, everyone)) == [("b", False), ("c", False)]
+
+
+def test_one_that_waits_for_the_subsiding_only_may_end_sooner_and_both_are_named() -> None:
+    first = alive("a")
+    second = alive("b", waits=[Wait(first, subsiding=True)])
+    assert len(awaited(block("x", 'composition="APPEND"'), 0, [first, second])) == 2
+
+
+def test_what_is_before_a_block_is_found_by_any_chain() -> None:
+    first = alive("a")
+    second = alive("b", waits=[Wait(first)])
+    assert before([Wait(second, subsiding=True)]) == {id(first), id(second)}
+
+
+def test_lists_name_blocks_of_any_character_and_forget_the_unknown() -> None:
+    everyone = [alive("a"), alive("b", character=1), alive("c")]
+    said = 'bmla:appendAfter="b,nobody" bmla:chunkAfter="c"'
+    assert ids(awaited(block("x", said), 0, everyone)) == [("b", False), ("c", True)]
+
+
+def test_followers_are_named_with_what_they_wait_for() -> None:
+    said = 'bmla:prependBefore="a" bmla:chunkBefore="b"'
+    assert followers(block("x", said)) == [("a", False), ("b", True)]
+
+
+def test_replace_ends_its_character_and_interrupt_whom_it_names() -> None:
+    everyone = [alive("a"), alive("b", character=1), alive("c", character=1)]
+    assert [p.block.id for p in ended(block("x", 'composition="REPLACE"'), 0, everyone)] == ["a"]
+    assert [p.block.id for p in ended(block("x", 'bmla:interrupt="c"'), 0, everyone)] == ["c"]
+
+
+def test_what_is_held_is_what_the_others_of_a_character_claim() -> None:
+    everyone = [alive("a"), alive("b", start=5.0), alive("c", character=1)]
+    assert [(c.block, c.begin) for c in held(0, everyone)] == [("a", 0.0), ("b", 5.0)]
+    assert [c.block for c in held(0, everyone, without=everyone[:1])] == ["b"]
+
+
+SCHEDULES = {
+    "a": Schedule("a", {"h": ("start", "stroke:2", "end")}, {"h": np.array([0.0, 1.0, 2.0])}, start=10.0),
+    "p": Schedule("p", {}, {}, start=float("inf")),
+}
+
+
+@pytest.mark.parametrize(
+    ("ref", "time"),
+    [
+        (SyncRef(block="a", behaviour="h", sync="end", offset=0.5), 2.5),
+        (SyncRef(block="a", behaviour="h", sync="stroke", index=2), 1.0),
+        (SyncRef(block="a", behaviour="bml", sync="start"), 0.0),
+        (SyncRef(block="a", behaviour="bml", sync="end", offset=1.0), 3.0),
+        (SyncRef(block="a", behaviour="h", sync="ready"), None),
+        (SyncRef(block="a", behaviour="nobody", sync="end"), None),
+        (SyncRef(block="a", behaviour="bml", sync="relax"), None),
+        (SyncRef(block="p", behaviour="bml", sync="start"), None),
+        (SyncRef(block="nobody", behaviour="h", sync="end"), None),
+    ],
+)
+def test_a_point_of_another_block_has_an_instant_where_that_is_known(
+    ref: SyncRef, time: float | None
+) -> None:
+    assert instants(SCHEDULES.get, 10.0)(ref) == time

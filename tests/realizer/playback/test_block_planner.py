@@ -1,0 +1,101 @@
+"""One block, planned: what is dropped, what it is told of, what is left to play."""
+
+from __future__ import annotations
+
+import pytest
+
+from bml_schema import parse
+from realizer.behaviours import KINDS, VOCABULARY
+from realizer.behaviours.kind import World
+from realizer.pipeline import realize
+from realizer.playback.block_planner import Plan, plan
+from realizer.speech import SilentVoice
+
+
+def planned(content: str, world: World = World()) -> Plan:  # noqa: B008 - a frozen value
+    return plan(parse(f'<bml id="b">{content}</bml>', VOCABULARY), KINDS, world)
+
+
+def test_every_behaviour_that_is_scheduled_is_expanded() -> None:
+    made = planned('<head id="h" lexeme="NOD"/><gesture id="g" lexeme="BEAT"/>')
+    assert set(made.schedule.times) == set(made.channels) == {"h", "g"}
+    assert made.channels["h"]
+    assert made.channels["g"] == (), "a face shows no gesture"
+
+
+def test_a_problem_of_the_parser_is_one_warning_with_its_place() -> None:
+    (warning,) = planned('<head id="h" lexeme="NOD" amount="7"/>').schedule.warnings
+    assert (warning.id, warning.type) == ("b:h", "PARSING_FAILURE")
+    assert warning.text.count("line 1") == 1
+
+
+def test_a_fault_of_a_kind_drops_the_behaviour_with_one_warning() -> None:
+    made = planned('<faceLexeme id="f" lexeme="SMIRKLE"/><head id="h" lexeme="NOD"/>')
+    (warning,) = made.schedule.warnings
+    assert warning.id == "b:f"
+    assert warning.text.startswith("line 1, /bml/faceLexeme[1]: lexeme: ")
+    assert set(made.channels) == {"h"}
+
+
+def test_a_target_that_is_not_in_the_scene_warns_and_plays() -> None:
+    made = planned('<gaze id="g" target="cupp"/>', World(scene={"cup": (0.1, 0.0, 0.5)}))
+    assert [w.type for w in made.schedule.warnings] == ["NO_SUCH_TARGET"]
+    assert made.channels["g"]
+
+
+def test_a_required_fault_fails_the_block_with_one_warning_of_its_own() -> None:
+    made = planned('<required><faceLexeme id="f" lexeme="SMIRKLE"/></required><head id="h" lexeme="NOD"/>')
+    assert made.schedule.failed
+    assert [w.id for w in made.schedule.warnings] == ["b"]
+    assert made.channels == {}
+
+
+SPEECH = '<speech id="s"{}><text>one two <sync id="m"/>three four</text></speech>'
+
+
+def natural() -> float:
+    return realize(f'<bml id="b">{SPEECH.format("")}</bml>', voice=SilentVoice()).schedules[0].end
+
+
+@pytest.mark.parametrize("ratio", [0.7, 1.5])
+def test_a_speech_is_spoken_at_another_rate_where_it_fits_no_other_way(ratio: float) -> None:
+    end = natural() * ratio
+    said = SPEECH.format(f' start="0" end="{end}"')
+    played = realize(f'<bml id="b">{said}</bml>', voice=SilentVoice())
+    assert not played.warnings
+    assert played.schedules[0].at("s", "end") == pytest.approx(end)
+    assert played.speech[0][1].duration == pytest.approx(end)
+
+
+def test_a_speech_is_left_as_it_is_where_others_can_give_way() -> None:
+    face = '<faceLexeme id="f" lexeme="SMILE" start="s:start" attackPeak="s:m" end="s:end"/>'
+    played = realize(f'<bml id="b">{SPEECH.format("")}{face}</bml>', voice=SilentVoice())
+    assert played.schedules[0].at("s", "end") == pytest.approx(natural())
+
+
+def test_a_speech_that_would_have_to_be_gabbled_is_dropped() -> None:
+    said = SPEECH.format(f' start="0" end="{natural() * 0.3}"')
+    played = realize(f'<bml id="b">{said}</bml>', voice=SilentVoice())
+    assert [w.id for w in played.warnings] == ["b:s"]
+    assert played.speech == ()
+
+
+def test_two_speeches_tied_at_both_ends_meet() -> None:
+    both = (
+        '<speech id="s"><text>one two three</text></speech>'
+        '<speech id="t" start="s:end + 0.1" end="4"><text>four five six seven</text></speech>'
+    )
+    played = realize(f'<bml id="b">{both}</bml>', voice=SilentVoice())
+    assert not played.warnings
+    assert played.schedules[0].at("t", "end") == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("mark", [0.5, 0.7])
+@pytest.mark.parametrize("voice", ["silent", pytest.param("espeak", marks=pytest.mark.espeak)])
+def test_a_speech_tied_at_a_mark_is_spoken_at_the_rate_that_brings_it_there(mark: float, voice: str) -> None:
+    tie = f'<constraint><synchronize><sync ref="s:m"/><sync ref="{mark}"/></synchronize></constraint>'
+    text = '<speech id="s" start="0"><text>hello my <sync id="m"/> dear friend of mine</text></speech>'
+    played = realize(f'<bml id="b">{text}<required>{tie}</required></bml>', voice=voice)
+    assert not played.warnings
+    assert played.schedules[0].at("s", "m") == pytest.approx(mark)
+    assert played.speech[0][1].marks["m"] == pytest.approx(mark)

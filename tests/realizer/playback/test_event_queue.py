@@ -1,0 +1,88 @@
+"""What is due comes in order, once, and can be taken out again."""
+
+from __future__ import annotations
+
+from bml_schema import parse
+from realizer.behaviours import KINDS
+from realizer.behaviours.kind import World
+from realizer.playback.active_block import Playing
+from realizer.playback.block_planner import plan
+from realizer.playback.event_queue import Calendar
+from realizer.playback.feedback_events import Phase, State
+
+FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
+
+
+def playing(number: int, start: float) -> Playing:
+    planned = plan(parse(f'<bml id="a">{FACE}</bml>'), KINDS, World(), start=start)
+    made = Playing(planned, KINDS, World(), character=0, number=number, floor=start)
+    made.lay(planned, start)
+    made.order = number
+    return made
+
+
+def test_events_come_in_order_and_not_before_their_time() -> None:
+    calendar = Calendar()
+    calendar.put(playing(1, 2.0))
+    calendar.put(playing(0, 0.0))
+    assert calendar.next == 0.0
+    due = list(calendar.due(2.0))
+    assert [(e.time, e.block) for e in due] == [(0, 0), (0, 0), (0.5, 0), (2, 0), (2, 0), (2, 1), (2, 1)]
+    assert [e.phase for e in due[:2]] == [Phase.START, Phase.SYNC]
+    assert calendar.next == 2.5
+
+
+def test_what_is_put_in_while_events_happen_comes_in_its_turn() -> None:
+    calendar = Calendar()
+    calendar.put(playing(0, 0.0))
+    seen = []
+    for event in calendar.due(10.0):
+        seen.append((event.time, event.block))
+        if len(seen) == 1:
+            calendar.put(playing(1, 0.25))
+    assert seen == sorted(seen)
+    assert (0.25, 1) in seen
+
+
+def test_of_a_block_that_is_dropped_nothing_more_comes_and_the_others_go_on() -> None:
+    calendar = Calendar()
+    first, second = playing(0, 0.0), playing(1, 0.0)
+    calendar.put(first)
+    calendar.put(second)
+    list(calendar.due(1.0))
+    assert calendar.pending(first) == {("s", "relax"), ("s", "end")}
+    calendar.drop(first)
+    assert calendar.pending(first) == set()
+    assert {e.block for e in calendar.due(10.0)} == {1}
+    assert calendar.next is None
+
+
+def test_a_block_that_is_put_in_again_comes_once() -> None:
+    calendar = Calendar()
+    block = playing(0, 0.0)
+    calendar.put(block)
+    calendar.drop(block)
+    calendar.put(block)
+    assert [e.phase for e in calendar.due(10.0)].count(Phase.END) == 1
+
+
+def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> None:
+    calendar = Calendar()
+    beside = playing(1, 5.0)
+    calendar.put(beside)
+    for later in range(200):
+        block = playing(0, 100.0 - later / 10)
+        calendar.drop(block)
+        calendar.put(block)
+        assert calendar.next == 5.0
+    assert len(calendar._firsts) < 50
+    assert [e.block for e in calendar.due(1000.0)] == [1] * 7 + [0] * 7
+    assert calendar.next is None
+
+
+def test_a_block_that_plays_does_not_start_or_subside_again() -> None:
+    calendar = Calendar()
+    block = playing(0, 0.0)
+    block.state = State.SUBSIDING
+    calendar.put(block, only={("s", "end")})
+    assert [(e.phase, e.sync) for e in calendar.due(10.0)] == [(Phase.SYNC, "end"), (Phase.END, "")]

@@ -1,0 +1,62 @@
+"""Feedback made of a schedule: everything once, in the order of report."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bml_schema import parse, parse_feedback
+from realizer.playback.feedback_events import (
+    Event,
+    Phase,
+    State,
+    acknowledgement,
+    events,
+    prediction,
+    progress,
+    sync_progress,
+)
+from realizer.scheduling.timing import Schedule
+
+BLOCK = parse('<bml id="b" characterId="Ann"><gazeShift id="g" target="x"/><head id="h" lexeme="NOD"/></bml>')
+SCHEDULE = Schedule(
+    "b",
+    {"g": ("start", "end"), "h": ("start", "stroke", "end")},
+    {"g": np.array([0.0, 1.0]), "h": np.array([0.0, 0.5, 1.0])},
+    start=10.0,
+)
+
+
+def test_sync_points_come_in_the_order_of_time_then_of_the_document() -> None:
+    due = sorted(events(BLOCK, SCHEDULE, 0, 7))
+    assert [f"{e.name}:{e.sync}" for e in due] == ["g:start", "h:start", "h:stroke", "g:end", "h:end"]
+    assert [e.time for e in due] == [10.0, 10.0, 10.5, 11.0, 11.0]
+
+
+def test_a_sync_point_is_told_on_both_clocks() -> None:
+    told = sync_progress(BLOCK, "h", "stroke", 10.5, 10.0)
+    assert (told.id, told.time, told.global_time, told.character_id) == ("b:h:stroke", 0.5, 10.5, "Ann")
+
+
+def test_at_one_instant_the_earlier_block_ends_before_the_later_one_starts() -> None:
+    due = [Event(11.0, 1, Phase.START), Event(11.0, 0, Phase.END), *events(BLOCK, SCHEDULE, 0, 7)]
+    assert [(e.order, e.phase) for e in sorted(due)[-2:]] == [(0, Phase.END), (1, Phase.START)]
+
+
+def test_feedback_reads_back_as_it_was_written() -> None:
+    for told in (
+        acknowledgement(BLOCK, 10.0),
+        prediction(BLOCK, SCHEDULE, State.LURKING, SCHEDULE.behaviours),
+        progress(BLOCK, "end", 11.0, State.DONE),
+    ):
+        assert parse_feedback(told.to_xml()) == told
+
+
+def test_a_prediction_names_the_sync_points_it_is_given() -> None:
+    told = prediction(BLOCK, SCHEDULE, State.PENDING, SCHEDULE.behaviours)
+    assert (told.blocks[0].global_start, told.blocks[0].global_end) == (10.0, 11.0)
+    assert told.blocks[0].status == "PENDING"
+    assert {b.id: {p: r.offset for p, r in b.syncs.items()} for b in told.behaviours} == {
+        "b:g": {"start": 0.0, "end": 1.0},
+        "b:h": {"start": 0.0, "stroke": 0.5, "end": 1.0},
+    }
+    assert prediction(BLOCK, SCHEDULE, State.IN_EXEC).behaviours == ()

@@ -1,0 +1,244 @@
+"""Blocks that are tied to each other are solved together while they play."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bml_schema import Block, PredictionFeedback, SyncPointProgress, parse
+from realizer.playback.block_manager import ANTICIPATORS
+from realizer.playback.player import Player
+from realizer.playback.replanning import touched
+from realizer.scheduling.timing import Schedule
+from realizer.speech.utterance import Phoneme, Utterance
+
+
+class Stage:
+    def __init__(self) -> None:
+        self.player = Player(idle=False, history=float("inf"))
+        self.told: list[SyncPointProgress] = []
+        self.predicted: list[PredictionFeedback] = []
+
+    def send(self, id: str, inside: str, at: float = 0.0, said: str = "") -> Schedule:
+        schedule = self.player.submit(self.block(id, inside, said), at)
+        self.until(at)
+        return schedule
+
+    @staticmethod
+    def block(id: str, inside: str, said: str = "") -> Block:
+        return parse(f'<bml id="{id}" xmlns:bmla="http://www.asap-project.org/bmla" {said}>{inside}</bml>')
+
+    def until(self, now: float) -> None:
+        for feedback in self.player.due(now):
+            if isinstance(feedback, SyncPointProgress):
+                self.told.append(feedback)
+            elif isinstance(feedback, PredictionFeedback):
+                self.predicted.append(feedback)
+
+    def times(self) -> dict[str, float]:
+        self.until(1e6)
+        assert len({f.id for f in self.told}) == len(self.told), "each once"
+        return {f.id: f.global_time for f in self.told}
+
+
+FACE = '<faceLexeme id="f" lexeme="SMILE"{}/>'
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+def test_a_new_block_and_a_running_one_share_the_stretch_between_them(stage: Stage) -> None:
+    alone = stage.send("a", FACE.format(""))
+    # A wait of 9 s is tied to the whole of the face, at half a second: the face must be longer, it shorter.
+    stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
+    times = stage.times()
+    assert times["b:w:end"] == pytest.approx(times["a:f:end"])
+    assert alone.end + 0.5 < times["a:f:end"] < 9.2
+    assert times["a:f:start"] == 0.0
+
+
+def test_what_has_passed_stays_and_what_was_reported_never_changes(stage: Stage) -> None:
+    stage.send("a", FACE.format(""))
+    stage.until(0.6)
+    early = {f.id: f.global_time for f in stage.told}
+    stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.6)
+    times = stage.times()
+    assert {id: times[id] for id in early} == early
+    assert times["a:f:relax"] > 0.6
+
+
+def test_a_point_that_has_passed_is_a_fixed_time(stage: Stage) -> None:
+    stage.send("a", FACE.format(' attackPeak="0.4"'))
+    stage.until(1.0)
+    before = stage.player.end
+    stage.send("b", '<head id="n" lexeme="NOD" stroke="a:f:attackPeak + 2"/>', at=1.0)
+    assert stage.times()["b:n:stroke"] == pytest.approx(2.4)
+    assert stage.player.end == pytest.approx(max(before, stage.player.end))
+
+
+def test_new_predictions_tell_of_what_has_moved_and_of_nothing_else(stage: Stage) -> None:
+    stage.send("a", FACE.format("") + '<wait id="apart" duration="1"/>')
+    stage.predicted.clear()
+    stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
+    of_a = [p for p in stage.predicted if p.blocks[0].id == "a"]
+    assert len(of_a) == 1
+    assert [b.id for b in of_a[0].behaviours] == ["a:f"]
+    assert of_a[0].behaviours[0].syncs["end"].offset == pytest.approx(stage.times()["a:f:end"], abs=1e-6)
+
+
+def test_a_block_nobody_refers_to_is_left_alone(stage: Stage) -> None:
+    first = stage.send("a", FACE.format(""))
+    stage.send("b", FACE.format(""), at=0.2)
+    assert stage.player.latest(first).end == first.end
+
+
+def test_a_demand_that_cannot_be_met_costs_the_newer_behaviour(stage: Stage) -> None:
+    first = stage.send("a", FACE.format(' start="0" end="2"'))
+    late = stage.send("b", '<wait id="w" start="a:f:end" end="bml:start + 1"/>', at=0.5)
+    assert not late.times
+    assert [w.id for w in late.warnings] == ["b:w"]
+    assert "a:f:end = 2" in late.warnings[0].text
+    assert stage.player.latest(first).end == 2.0
+
+
+def test_the_face_passes_into_its_new_course_without_a_jump(stage: Stage) -> None:
+    stage.send("a", FACE.format(""))
+    for at in (0.2, 0.7, 1.2):
+        stage.send(f"b{at}", f'<wait id="w" duration="{9 * at}" start="0" end="a:f:end"/>', at=at)
+    stage.until(100)
+    times = np.arange(0, stage.player.end, 0.002)
+    course = stage.player.frames(times).aus.max(axis=1)
+    assert course.max() > 0.3
+    assert np.abs(np.diff(course)).max() < 0.02
+    assert np.abs(np.diff(course, 2)).max() < 4e-4
+
+
+def test_a_block_that_waits_for_one_that_moves_starts_when_that_ends(stage: Stage) -> None:
+    stage.send("a", FACE.format(""))
+    after = stage.send("c", '<wait id="w" duration="1"/>', said='composition="APPEND"')
+    stage.send("b", '<wait id="w" duration="9" start="0" end="a:f:end"/>', at=0.1)
+    assert stage.player.latest(after).start == pytest.approx(stage.times()["a:f:end"])
+
+
+def test_a_block_tied_to_a_behaviour_that_is_interrupted_follows_it(stage: Stage) -> None:
+    stage.send(
+        "a", FACE.format(' start="0" attackPeak="0.5" relax="4" end="5"') + '<wait id="w" duration="9"/>'
+    )
+    stage.send("b", '<head id="n" lexeme="NOD" start="a:f:end"/>')
+    stage.send("i", '<bmla:interrupt id="i" target="a" include="f"/>', at=1.0)
+    assert stage.times()["b:n:start"] == pytest.approx(1.3)
+
+
+def test_blocks_are_touched_by_any_chain_of_points_to_come() -> None:
+    stage = Stage()
+    stage.send("a", FACE.format(""))
+    stage.send("b", '<head id="n" lexeme="NOD" start="a:f:end"/>')
+    stage.send("c", FACE.format(""))
+    new = stage.block("x", '<wait id="w" start="b:n:end"/>')
+    alive = stage.player._blocks.cast.alive()
+    assert [p.block.id for p in touched(new, alive, 0.0)] == ["a", "b"]
+    assert touched(new, alive, 60.0) == []
+    assert touched(stage.block("y", FACE.format("")), alive, 0.0) == []
+
+
+BEAT = '<head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/>'
+
+
+def test_a_behaviour_follows_a_point_that_is_anticipated(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
+    stage.send("a", BEAT)
+    stage.until(1.0)
+    stage.player.anticipate("clock", {"beat": 2.5}, 1.0)
+    stage.player.anticipate("clock", {"beat": 4.0}, 2.2)
+    times = stage.times()
+    assert times["a:n:stroke"] == pytest.approx(4.0)
+    assert times["a:n:start"] < 2.2, "it had begun by then"
+
+
+def test_of_many_anticipators_the_oldest_are_forgotten_but_not_what_a_block_is_tied_to(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
+    stage.send("a", BEAT)
+    for number in range(ANTICIPATORS + 5):
+        stage.player.anticipate(f"other-{number}", {"beat": 9.0}, 0.0)
+    known = stage.player.cast.anticipators
+    assert len(known) == ANTICIPATORS
+    assert {"clock", f"other-{ANTICIPATORS + 4}"} <= set(known)
+    assert "other-0" not in known
+    stage.player.anticipate("clock", {"beat": 4.0}, 1.0)
+    assert stage.times()["a:n:stroke"] == pytest.approx(4.0)
+
+
+def test_what_has_passed_does_not_follow_an_estimate_that_comes_late(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 1.0}, 0.0)
+    stage.send("a", BEAT)
+    stage.until(1.2)
+    stage.player.anticipate("clock", {"beat": 2.0}, 1.2)
+    assert stage.times()["a:n:stroke"] == pytest.approx(1.0)
+
+
+def test_a_point_that_should_have_been_already_is_to_be_at_once(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 9.0}, 0.0)
+    stage.send("a", BEAT)
+    stage.until(3.0)
+    stage.player.anticipate("clock", {"beat": 2.0}, 3.0)
+    times = stage.times()
+    assert times["a:n:start"] == pytest.approx(3.0)
+    assert 3.0 < times["a:n:stroke"] < 3.1, "its preparation takes its least time"
+
+
+def test_a_point_nobody_anticipates_costs_the_behaviour(stage: Stage) -> None:
+    schedule = stage.send("a", BEAT)
+    assert not schedule.times
+    assert [w.id for w in schedule.warnings] == ["a:n"]
+
+
+def test_a_preplanned_block_moves_nobody_before_it_is_activated(stage: Stage) -> None:
+    first = stage.send("a", FACE.format(""))
+    stage.send("p", '<wait id="w" duration="9" start="0" end="a:f:end"/>', said='bmla:preplan="true"')
+    assert stage.player.latest(first).end == first.end
+    stage.send("x", '<bmla:activate id="x" target="p"/>', at=0.3)
+    assert stage.player.latest(first).end > first.end
+
+
+TALK = '<speech id="s"><text>one <sync id="m"/>two</text></speech><head id="n" lexeme="NOD" stroke="s:m"/>'
+
+
+def spoken(mark: float, end: float) -> Utterance:
+    return Utterance(end, (), (Phoneme(0.0, end, "a"),), {"m": mark})
+
+
+def test_a_voice_that_turns_out_slower_takes_the_rest_with_it() -> None:
+    stage = Stage()
+    stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
+    stage.until(0.5)
+    assert stage.player.respeak("a", "s", spoken(1.6, 3.0), 0.5)
+    times = stage.times()
+    assert times["a:s:m"] == times["a:n:stroke"] == pytest.approx(1.6)
+    assert times["a:s:end"] == pytest.approx(3.0)
+
+
+def test_a_mark_that_was_told_stays_where_it_was() -> None:
+    stage = Stage()
+    stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
+    stage.until(1.2)
+    assert stage.player.respeak("a", "s", spoken(1.6, 3.0), 1.2)
+    times = stage.times()
+    assert times["a:s:m"] == pytest.approx(1.0)
+    assert times["a:s:end"] == pytest.approx(3.0)
+
+
+def test_a_speech_that_is_over_is_not_spoken_again() -> None:
+    stage = Stage()
+    stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
+    stage.until(9.0)
+    assert not stage.player.respeak("a", "s", spoken(1.6, 3.0), 9.0)
+    assert not stage.player.respeak("nobody", "s", spoken(1.6, 3.0), 9.0)
+
+
+def test_a_block_that_fails_moves_nobody(stage: Stage) -> None:
+    first = stage.send("a", FACE.format(""))
+    refused = stage.send("b", '<required><wait id="w" start="a:f:end" end="0"/></required>', at=0.1)
+    assert refused.failed
+    assert stage.player.latest(first).end == first.end

@@ -1,0 +1,83 @@
+"""Who has to go where two want the same."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.playback.resources import PASSES, Claim, losses
+
+
+def claim(
+    name: str, begin: float, end: float, *, what: str = "voice", block: str = "b", rank: int = 0
+) -> Claim:
+    return Claim(what, begin, end, block, name, (0.0, False, rank))
+
+
+def lost(wanted: list[Claim], held: list[Claim] | None = None) -> list[str]:
+    return [loss.claim.behaviour for loss in losses(wanted, held or [])]
+
+
+def test_of_two_that_want_the_voice_the_later_one_goes() -> None:
+    assert lost([claim("a", 0, 2), claim("b", 1, 3, rank=1)]) == ["b"]
+
+
+def test_what_only_touches_does_not_disturb() -> None:
+    assert lost([claim("a", 0, 2), claim("b", 2, 3, rank=1)]) == []
+
+
+def test_different_things_do_not_disturb() -> None:
+    assert lost([claim("a", 0, 2), claim("b", 0, 2, what="gaze", rank=1)]) == []
+
+
+def test_what_an_earlier_block_holds_stays_with_it() -> None:
+    held = [claim("old", 0, 2, what="gaze", block="a")]
+    assert lost([claim("new", 1, 3, what="gaze")], held) == ["new"]
+
+
+def test_a_gaze_passes_into_the_next_of_its_block_but_not_into_one_it_contains() -> None:
+    assert lost([claim("a", 0, 2, what="gaze"), claim("b", 1, 3, what="gaze", rank=1)]) == []
+    assert lost([claim("a", 0, 2, what="gaze"), claim("b", 0, 2, what="gaze", rank=1)]) == ["b"]
+    assert lost([claim("a", 0.5, 1, what="gaze"), claim("b", 0, 2, what="gaze", rank=1)]) == ["b"]
+
+
+def test_a_base_state_passes_into_that_of_another_block() -> None:
+    held = [claim("old", 0, 0.5, what="base gaze", block="a")]
+    assert lost([claim("new", 0.3, 0.8, what="base gaze")], held) == []
+
+
+def test_one_that_goes_does_not_stand_in_the_way_of_a_third() -> None:
+    both = [claim("b", 0, 9, rank=1), claim("b", 0, 9, what="gaze", rank=1)]
+    third = claim("c", 3, 4, what="gaze", rank=2)
+    assert lost([claim("a", 0, 2), *both, third]) == ["b"]
+
+
+def test_the_sentence_counts_from_the_start_of_the_block() -> None:
+    (loss,) = losses([claim("n", 11, 13)], [claim("s", 10, 12, block="x")], 10.0)
+    assert str(loss) == "wanted the voice from 1 to 3 s, but x:s has it from 0 to 2 s"
+
+
+@given(
+    st.lists(
+        st.builds(
+            lambda what, begin, length, rank: (what, begin, begin + length, rank),
+            st.sampled_from(["voice", *PASSES]),
+            st.integers(0, 10),
+            st.integers(0, 5),
+            st.integers(0, 3),
+        ),
+        max_size=12,
+    )
+)
+def test_what_is_left_does_not_disturb_and_everything_lost_has_a_winner(
+    rows: list[tuple[str, int, int, int]],
+) -> None:
+    wanted = [
+        Claim(what, begin, end, "b", f"c{n}", (0.0, False, rank))
+        for n, (what, begin, end, rank) in enumerate(rows)
+    ]
+    found = losses(wanted, [])
+    gone = {loss.claim.behaviour for loss in found}
+    left = [c for c in wanted if c.behaviour not in gone]
+    assert not any(a.disturbs(b) for a in left for b in left if a is not b)
+    assert all(loss.winner in left and loss.claim.disturbs(loss.winner) for loss in found)

@@ -1,0 +1,76 @@
+"""What becomes of accepted blocks: they are laid, moved, cut off, stopped, and their followers with them."""
+
+from __future__ import annotations
+
+from bml_schema import BlockProgress, parse
+from realizer.behaviours import KINDS
+from realizer.behaviours.kind import World
+from realizer.playback.active_block import Playing, Wait
+from realizer.playback.character import Character
+from realizer.playback.feedback_events import State
+from realizer.playback.timeline import Course
+
+
+def taken_in(course: Course, id: str, after: Playing | None = None, state: State = State.LURKING) -> Playing:
+    block = parse(f'<bml id="{id}"><wait id="w" duration="2"/></bml>')
+    planned, _ = course.plan(block, 0, World(), 0.0, 0.0)
+    waits = [] if after is None else [Wait(after)]
+    made = Playing(planned, KINDS, World(), 0, course.cast.next_number, 0.0, waits, state)
+    made.lay(planned, made.earliest)
+    course.cast.add(made)
+    course.set_out(made)
+    return made
+
+
+def course() -> Course:
+    return Course(KINDS, [Character(None)])
+
+
+def test_a_block_that_is_stopped_gives_its_place_to_its_followers() -> None:
+    blocks = course()
+    first = taken_in(blocks, "a")
+    second = taken_in(blocks, "b", after=first)
+    third = taken_in(blocks, "c", after=second)
+    first.state = State.IN_EXEC
+    blocks.stop(first, 0.5)
+    assert (first.state, first.end) == (State.INTERRUPTED, 0.5)
+    assert (second.start, third.start) == (0.5, 2.5)
+    ends = [f for f in blocks.reports.take() if isinstance(f, BlockProgress)]
+    assert [(f.id, f.status) for f in ends] == [("a:end", "INTERRUPTED")]
+
+
+def test_one_that_has_not_started_is_revoked_and_nothing_happens_in_it_any_more() -> None:
+    blocks = course()
+    first = taken_in(blocks, "a")
+    blocks.stop(first, 0.0)
+    assert first.state is State.REVOKED
+    assert blocks.calendar.next is None
+    assert blocks.cast.find("a") is None
+
+
+def test_a_block_that_is_not_activated_is_on_no_calendar() -> None:
+    blocks = course()
+    pending = taken_in(blocks, "p", state=State.PENDING)
+    assert blocks.calendar.next is None
+    pending.state = State.LURKING
+    assert blocks.move(pending, 3.0)
+    assert blocks.calendar.next == pending.start == 0.0
+
+
+def test_blocks_line_up_behind_all_others_and_in_their_own_order() -> None:
+    blocks = course()
+    first = taken_in(blocks, "a")
+    second = taken_in(blocks, "b", after=first)
+    third = taken_in(blocks, "c")
+    blocks.line_up(first)
+    assert third.order < first.order < second.order
+
+
+def test_whatever_changes_what_is_shown_is_a_new_revision() -> None:
+    blocks = course()
+    before = blocks.revision
+    first = taken_in(blocks, "a")
+    assert blocks.revision > before
+    before = blocks.revision
+    blocks.stop(first, 0.0)
+    assert blocks.revision > before

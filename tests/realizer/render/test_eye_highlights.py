@@ -1,0 +1,40 @@
+"""The lights on the eyes: where they stand, and what a page is told of them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from realizer.render.eye_highlights import Glints
+from realizer.render.light import preset, unit
+
+FRONT = np.array([0, 0, 1], np.float32)
+
+
+def test_each_eye_has_a_cap_between_the_key_and_who_looks(balls):
+    face, _ = balls
+    points = Glints(face, preset(), FRONT)(face.vertices)
+    assert len(points) == 22
+    for name, cap in zip(("left_eye", "right_eye"), np.split(points, 2), strict=True):
+        first, last = face.parts[name]
+        centre = face.vertices[first:last].mean(axis=0)
+        out = unit(cap[0] - centre)
+        assert out[2] > 0.5
+        assert out[0] < 0  # the key stands at the character's right
+
+
+def test_it_follows_the_eye_that_moves_and_the_page_can_tell_where(balls):
+    face, _ = balls
+    glints = Glints(face, preset(), FRONT)
+    moved = face.vertices + np.array([0.01, -0.02, 0.005], np.float32)
+    assert glints(moved) - glints(face.vertices) == pytest.approx(
+        np.tile([0.01, -0.02, 0.005], (len(glints(moved)), 1)), abs=1e-5
+    )
+    for eye, cap in zip(
+        json.loads(json.dumps(glints.to_json()))["eyes"], np.split(glints(moved), 2), strict=True
+    ):
+        weights = np.array(eye["weights"])
+        centre = weights @ moved[eye["first"] : eye["first"] + len(weights)]
+        assert np.linalg.norm(cap - centre, axis=1) == pytest.approx(eye["radius"], rel=0.01)

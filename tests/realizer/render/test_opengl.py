@@ -1,0 +1,108 @@
+"""Pictures of a head of balls, by silhouette; the GL context lives in this process here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from realizer.render.cameras import camera_for
+from realizer.render.light import preset
+from realizer.render.opengl import Canvas
+
+pytestmark = pytest.mark.gl("gl")
+
+SIZE = (320, 240)
+
+
+@pytest.fixture
+def canvas(balls) -> Iterator[Canvas]:
+    """One a test: closing one ends the display of all in the process."""
+    face, _ = balls
+    canvas = Canvas(face, SIZE, camera_for(face), preset())
+    yield canvas
+    canvas.close()
+
+
+def skin(picture):
+    """Where it is warm: the backdrop is blue-grey."""
+    return picture[..., 0].astype(int) > picture[..., 2].astype(int) + 15
+
+
+def test_the_silhouette_is_the_projected_egg(canvas, balls):
+    face, normals = balls
+    picture = canvas.draw(face.vertices, normals)
+    assert picture.shape == (240, 320, 3)
+    rows, columns = np.nonzero(skin(picture))
+    outline = camera_for(face).project(face.vertices, SIZE)
+    assert rows.min() == pytest.approx(outline[:, 1].min(), abs=2)
+    assert rows.max() == pytest.approx(outline[:, 1].max(), abs=2)
+    assert columns.min() == pytest.approx(outline[:, 0].min(), abs=2)
+    assert columns.max() == pytest.approx(outline[:, 0].max(), abs=2)
+
+
+def test_the_eyes_are_white_and_stand_where_they_project(canvas, balls):
+    face, normals = balls
+    picture = canvas.draw(face.vertices, normals)
+    for x, y in camera_for(face).project([[0.032, 0, 0], [-0.032, 0, 0]], SIZE).round().astype(int):
+        assert picture[y, x].min() > 170
+
+
+def test_new_vertices_move_the_picture_and_old_ones_bring_it_back(canvas, balls):
+    face, normals = balls
+    still = canvas.draw(face.vertices, normals)
+    moved = canvas.draw(face.vertices + np.float32([0.02, 0, 0]), normals)
+    shift = camera_for(face).project([[0.02, 0, -0.05], [0, 0, -0.05]], SIZE)[:, 0]
+    centre = [np.nonzero(skin(p))[1].mean() for p in (still, moved)]
+    assert centre[1] - centre[0] == pytest.approx(shift[0] - shift[1], abs=1.5)
+    assert np.array_equal(canvas.draw(face.vertices, normals), still)
+
+
+def test_the_key_stands_at_the_picture_s_upper_left(canvas, balls):
+    face, normals = balls
+    picture = canvas.draw(face.vertices, normals).astype(float).sum(2)
+    where = skin(canvas.draw(face.vertices, normals))
+    rows, columns = np.nonzero(where)
+    left = columns < columns.mean()
+    upper = rows < rows.mean()
+    brightness = picture[rows, columns]
+    assert brightness[left & upper].mean() > brightness[~left & upper].mean() + 20
+    assert brightness[left & upper].mean() > brightness[left & ~upper].mean() + 20
+
+
+def test_edges_are_smooth(canvas, balls):
+    """MSAA x4: along the outline there are tones between skin and backdrop."""
+    face, normals = balls
+    picture = canvas.draw(face.vertices, normals)
+    row = picture[100, :, 0].astype(int)
+    step = np.abs(np.diff(row))
+    assert step.max() < 120
+    between = canvas.draw(face.vertices + np.float32([0.0003, 0, 0]), normals)
+    assert not np.array_equal(between, picture)
+
+
+def test_the_backdrop_is_a_soft_neutral_gradient(canvas, balls):
+    face, normals = balls
+    picture = canvas.draw(face.vertices, normals).astype(int)
+    corner, beside = picture[2, 2], picture[90, 40]
+    assert (beside > corner).all()
+    assert np.ptp(corner) < 20
+    assert np.abs(np.diff(picture[:, 3].sum(1))).max() < 30
+
+
+def test_odd_sizes_are_not_sheared(balls):
+    """Rows of 3 x 101 bytes are no multiple of four, GL's default row alignment."""
+    face, normals = balls
+    canvas = Canvas(face, (101, 77), camera_for(face), preset())
+    picture = canvas.draw(face.vertices, normals)
+    canvas.close()
+    columns = np.nonzero(skin(picture))[1]
+    assert columns.mean() == pytest.approx(50, abs=1)
+
+
+def test_draw_fills_the_given_memory(canvas, balls):
+    face, normals = balls
+    out = np.zeros((240, 320, 3), np.uint8)
+    assert canvas.draw(face.vertices, normals, out) is out
+    assert np.array_equal(out, canvas.draw(face.vertices, normals))

@@ -1,0 +1,86 @@
+"""Pictures without OpenGL: as OpenGL draws them, but for the samples along edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.face.deform import deform
+from realizer.face.load import load_face
+from realizer.face.surface import normals
+from realizer.render.backdrop import backdrop
+from realizer.render.cameras import camera_for
+from realizer.render.light import preset
+from realizer.render.software import OnboardCanvas
+
+pytestmark = pytest.mark.gl("onboard")
+
+SIZE = (256, 256)
+
+
+@pytest.fixture(scope="module")
+def face():
+    return load_face("default")
+
+
+def pose(face, **faps):
+    row = np.zeros((1, 68), np.float32)
+    for name, value in faps.items():
+        row[0, int(name[3:]) - 1] = value
+    vertices = deform(face, row)
+    return vertices[0], normals(face, vertices)[0]
+
+
+@pytest.mark.gl("gl")
+@pytest.mark.parametrize("camera", ["front", "three-quarter", "profile", "close"])
+@pytest.mark.parametrize("light", ["portrait", "evening"])
+def test_both_ways_draw_the_same_picture(face, camera, light):
+    from realizer.render.opengl import Canvas
+
+    eye, lamp = camera_for(face, camera), preset(light)
+    behind = backdrop(SIZE, lamp)[..., :3].astype(int)
+    card, own = Canvas(face, SIZE, eye, lamp), OnboardCanvas(face, SIZE, eye, lamp)
+    try:
+        for shape in (pose(face), pose(face, fap3=900, fap5=-900, fap19=500, fap49=8000)):
+            a, b = card.draw(*shape).astype(int), own.draw(*shape).astype(int)
+            differs = np.abs(a - b)
+            assert differs.mean() < 0.6
+            assert (differs.max(axis=2) > 24).mean() < 0.01
+            assert np.abs(a.mean((0, 1)) - b.mean((0, 1))).max() < 0.3
+            head = [np.abs(p - behind).max(axis=2) > 24 for p in (a, b)]
+            assert 0.1 < head[0].mean() < 0.95
+            assert (head[0] ^ head[1]).mean() < 0.004
+    finally:
+        card.close()
+
+
+def test_the_chin_and_the_pupils_stand_where_the_camera_projects_them(face):
+    camera = camera_for(face)
+    picture = OnboardCanvas(face, SIZE, camera, preset()).draw(*pose(face)).astype(int)
+    for point in ("3.5", "3.6"):
+        x, y = camera.project(face.points[point], SIZE)[0].round().astype(int)
+        assert picture[y - 2 : y + 3, x - 2 : x + 3].sum(2).min() < 150
+    x, y = camera.project(face.points["9.3"], SIZE)[0].round().astype(int)
+    red, _, blue = picture[y, x]
+    assert red > blue + 30
+
+
+def test_one_sample_a_pixel_is_the_same_picture_with_rough_edges(face):
+    fine = OnboardCanvas(face, SIZE, camera_for(face), preset()).draw(*pose(face)).astype(int)
+    plain = OnboardCanvas(face, SIZE, camera_for(face), preset(), smooth=False).draw(*pose(face)).astype(int)
+    assert 0.05 < np.abs(fine - plain).mean() < 2.5
+
+
+def test_draw_fills_the_given_memory(face):
+    canvas = OnboardCanvas(face, (64, 48), camera_for(face), preset())
+    out = np.zeros((48, 64, 3), np.uint8)
+    assert canvas.draw(*pose(face), out) is out
+    assert np.array_equal(canvas.draw(*pose(face)), out)
+    canvas.close()
+
+
+def test_vertices_behind_the_lens_are_left_out(face):
+    vertices, ups = pose(face)
+    behind = vertices + np.float32([0, 0, 9])
+    picture = OnboardCanvas(face, (64, 48), camera_for(face), preset()).draw(behind, ups)
+    assert not (picture[..., 0].astype(int) - picture[..., 2] > 10).any()

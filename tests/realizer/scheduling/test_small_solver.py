@@ -1,0 +1,63 @@
+"""In plain floats a problem has the times it has in arrays, and what breaks something is left to those."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+
+from realizer.scheduling import solve as solver
+from realizer.scheduling.problem import ORIGIN
+from realizer.scheduling.small_solver import direct
+from tests.realizer.scheduling.recipes import Body, Recipe, built, possible, tenths, wild
+
+FREE = Body([1.0, 1.0], 0.1, 1.0, False, None)
+
+
+def in_arrays(recipe: Recipe, earliest: float = 0.0) -> solver.Solution:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solver, "FEW", 0)
+        found = solver.solve(built(recipe, earliest=earliest))
+    assert isinstance(found, solver.Solution)
+    return found
+
+
+@settings(max_examples=200)
+@given(possible() | wild, tenths)
+def test_the_times_and_the_cost_are_those_found_in_arrays(recipe: Recipe, earliest: float) -> None:
+    recipe = recipe._replace(orders=[])
+    found = direct(built(recipe, earliest=earliest))
+    assume(found is not None)
+    time, cost = found
+    other = in_arrays(recipe, earliest)
+    np.testing.assert_allclose(time, other.time, rtol=0.0, atol=1e-9)
+    problem = built(recipe, earliest=earliest)
+    for first, timing in zip(problem.first, problem.timings, strict=True):
+        own = time[first : first + len(timing.points)]
+        assert own == sorted(own), "in order, whatever rounding did"
+    assert cost == pytest.approx(other.cost, abs=1e-9)
+    assert time[ORIGIN] == 0.0
+
+
+def test_two_that_hold_each_other_share_what_is_missing_and_start_at_once() -> None:
+    short, long = FREE, Body([1.0, 2.0], 0.1, 1.0, False, None)
+    found = direct(built(Recipe([short, long], [((0, 0), (1, 0), 0.0), ((0, 2), (1, 2), 0.0)], [], [])))
+    assert found is not None
+    assert found[0][3] == pytest.approx(found[0][6])
+    assert found[0][1] == found[0][4] == 0.0
+    assert 2.0 < found[0][3] < 3.0
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        Recipe([FREE], [], [((0, 0), (0, 1), 0.5)], []),
+        Recipe([FREE], [], [], [((0, 0), 1.0), ((0, 0), 1.5)]),
+        Recipe([FREE], [], [], [((0, 0), 1.0), ((0, 2), 1.15)]),
+        Recipe([FREE._replace(most=1.2)], [], [], [((0, 0), 1.0), ((0, 2), 4.0)]),
+        Recipe([FREE], [], [], [((0, 0), -1.0)]),
+    ],
+    ids=["an order", "a clash", "least gaps", "greatest gaps", "too soon"],
+)
+def test_what_has_more_to_it_is_left_to_arrays(recipe: Recipe) -> None:
+    assert direct(built(recipe)) is None

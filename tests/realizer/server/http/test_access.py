@@ -1,0 +1,234 @@
+"""Who may come in: tokens, pages of elsewhere, a service that is full; and how fast messages are read."""
+
+from __future__ import annotations
+
+import json
+import logging
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import jwt
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.hashes import SHA256
+
+from realizer.core.settings import Settings, SettingsError
+from realizer.protocol.messages import MAX_CONTROL
+from realizer.server.http.access import Guard, Pace
+from realizer.server.http.jwt_tokens import Pass
+from realizer.server.runtime.session_registry import HubError
+
+TOKEN = "Xk-secret-7"
+SECRET = "a secret that is long enough to be one"
+
+
+def guard(**settings) -> Guard:
+    return Guard(Settings(**settings))
+
+
+@pytest.mark.parametrize(
+    ("target", "headers"),
+    [
+        (f"/ws?session=a&token={TOKEN}", {}),
+        ("/ws", {"authorization": f"Bearer {TOKEN}"}),
+        ("/ws", {"authorization": f"bearer  {TOKEN} "}),
+    ],
+)
+def test_a_token_comes_in_the_address_or_a_header(target: str, headers: dict[str, str]) -> None:
+    assert guard(token=TOKEN).request(target, headers)
+
+
+@pytest.mark.parametrize(
+    ("target", "headers"),
+    [
+        ("/ws?token=another", {}),
+        ("/ws?token=", {"authorization": "Bearer another"}),
+        ("/ws", {"authorization": "Bearer " + TOKEN + "x"}),
+        ("/ws", {"authorization": "Bearer é\udcff"}),
+    ],
+)
+@pytest.mark.parametrize("later", [True, False])
+def test_a_wrong_token_is_refused_at_once_and_not_repeated(
+    target: str, headers: dict[str, str], later: bool
+) -> None:
+    with pytest.raises(HubError, match="wanted that of this service") as refused:
+        guard(token=TOKEN).request(target, headers, later=later)
+    assert refused.value.status == 401
+    assert TOKEN not in str(refused.value)
+    assert "another" not in str(refused.value).replace("got another one", "")
+
+
+def test_without_a_token_a_client_may_still_greet_with_it() -> None:
+    g = guard(token=TOKEN)
+    assert g.request("/ws", {}, later=True) is None
+    assert g.greets(json.dumps({"type": "hello", "token": TOKEN})) == Pass()
+    with pytest.raises(HubError, match="got none"):
+        g.request("/metrics", {})
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "",
+        "{",
+        "[]",
+        b"\x00",
+        '<bml id="b"/>',
+        '{"type": "hello"}',
+        '{"type": "hello", "token": "x"}',
+        '{"type": "hello", "token": ["' + TOKEN + '"]}',
+        '{"type": "state", "token": "' + TOKEN + '"}',
+    ],
+)
+def test_any_other_first_message_is_no_greeting(message: str | bytes) -> None:
+    with pytest.raises(HubError, match="token: wanted") as refused:
+        guard(token=TOKEN).greets(message)
+    assert refused.value.status == 401
+    assert TOKEN not in str(refused.value)
+
+
+def test_a_first_message_that_is_large_is_not_even_read() -> None:
+    large = json.dumps({"type": "hello", "token": TOKEN, "session": "x" * MAX_CONTROL})
+    with pytest.raises(HubError, match="a first hello"):
+        guard(token=TOKEN).greets(large)
+
+
+@pytest.mark.parametrize("both", [{}, {"token": TOKEN}])
+def test_a_signed_token_comes_in_the_same_places(both: dict[str, str]) -> None:
+    g = guard(jwt_key=SECRET, **both)
+    signed = jwt.encode({"session": "show"}, SECRET, "HS256")
+    bound = Pass(frozenset({"show"}))
+    assert g.request(f"/ws?session=show&token={signed}", {}) == bound
+    assert g.request("/ws", {"authorization": f"Bearer {signed}"}) == bound
+    assert g.request("/ws", {}, later=True) is None
+    assert g.greets(json.dumps({"type": "hello", "token": signed})) == bound
+
+
+def test_beside_a_key_the_token_of_the_service_opens_everything() -> None:
+    g = guard(jwt_key=SECRET, token=TOKEN)
+    assert g.request(f"/ws?token={TOKEN}", {}) == Pass()
+    with pytest.raises(
+        HubError, match=r"that of this service .* or a JWT of this service's key .*, got another one"
+    ):
+        g.request("/ws?token=another", {})
+
+
+def test_a_refusal_says_why_a_signed_token_is_not_taken() -> None:
+    old = jwt.encode({"exp": 1}, SECRET, "HS256")
+    with pytest.raises(HubError, match=r"REALIZER_JWT_KEY\), got one that has expired") as refused:
+        guard(jwt_key=SECRET).request(f"/ws?token={old}", {}, later=True)
+    assert refused.value.status == 401
+    assert old not in str(refused.value)
+
+
+def test_without_a_token_in_the_settings_nobody_is_asked() -> None:
+    assert guard().request("/ws?token=anything", {})
+
+
+@pytest.mark.parametrize(
+    ("host", "headers", "origins", "welcome"),
+    [
+        ("127.0.0.1", {}, (), True),
+        ("127.0.0.1", {"origin": "http://localhost:3000"}, (), True),
+        ("127.0.0.1", {"origin": "http://[::1]:8765"}, (), True),
+        ("127.0.0.1", {"origin": "https://evil.example"}, (), False),
+        ("127.0.0.1", {"origin": "null"}, (), False),
+        ("127.0.0.1", {"origin": "null"}, ("null",), True),
+        # A name of the attacker's that points to this machine.
+        ("127.0.0.1", {"origin": "http://evil.example:8765", "host": "evil.example:8765"}, (), False),
+        ("127.0.0.1", {"origin": "http://localhost.evil.example"}, (), False),
+        ("0.0.0.0", {"origin": "http://face.example:8765", "host": "face.example:8765"}, (), True),
+        ("0.0.0.0", {"origin": "http://evil.example", "host": "face.example:8765"}, (), False),
+        ("0.0.0.0", {"origin": "http://localhost", "host": "face.example"}, (), False),
+        ("0.0.0.0", {"origin": "https://evil.example"}, ("https://app.example/",), False),
+        ("0.0.0.0", {"origin": "https://app.example"}, ("https://app.example/",), True),
+        ("0.0.0.0", {"origin": "https://evil.example"}, ("*",), True),
+        ("0.0.0.0", {"origin": "http://["}, (), False),
+    ],
+)
+def test_pages_of_elsewhere_stay_out(
+    host: str, headers: dict[str, str], origins: tuple[str, ...], welcome: bool
+) -> None:
+    g = guard(host=host, origins=origins)
+    if welcome:
+        assert g.request("/ws", headers)
+        return
+    with pytest.raises(HubError, match="REALIZER_ORIGINS lets more in") as refused:
+        g.request("/ws", headers)
+    assert refused.value.status == 403
+
+
+def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
+    guard(max_memory=10**7).room()
+    full = guard(max_memory=64)
+    with pytest.raises(HubError, match=r"wanted at most 64 \(REALIZER_MAX_MEMORY sets it\)") as refused:
+        full.room()
+    assert refused.value.status == 503
+
+
+def test_no_secret_is_in_what_settings_say_of_themselves() -> None:
+    settings = Settings(
+        token=TOKEN, stomp_password=TOKEN, jwt_key=SECRET, journal=f"redis://:{TOKEN}@127.0.0.1:6379/0"
+    )
+    assert TOKEN not in repr(settings)
+    assert SECRET not in repr(settings)
+    with pytest.raises(SettingsError, match=r"jwt_key: wanted a PEM file .*, got something else"):
+        Settings(jwt_key=SECRET[:31])
+    with pytest.raises(SettingsError, match="setting token: wanted a word, got something else"):
+        Settings(token=[TOKEN])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("flaw", ["another key", "no key", "a pass phrase", "no certificate"])
+def test_a_certificate_that_cannot_be_used_is_told_with_its_files_and_nobody_is_asked(
+    flaw: str, tmp_path: Path
+) -> None:
+    cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "localhost")])
+    private, other = ec.generate_private_key(ec.SECP256R1()), ec.generate_private_key(ec.SECP256R1())
+    start = datetime(2020, 1, 1)
+    made = x509.CertificateBuilder(name, name, private.public_key(), 1, start, start + timedelta(days=1))
+    pem, lock = serialization.Encoding.PEM, serialization.BestAvailableEncryption(b"opensesame")
+    kept = lock if flaw == "a pass phrase" else serialization.NoEncryption()
+    written = (other if flaw == "another key" else private).private_bytes(
+        pem, serialization.PrivateFormat.PKCS8, kept
+    )
+    cert.write_bytes(b"none" if flaw == "no certificate" else made.sign(private, SHA256()).public_bytes(pem))
+    key.write_bytes(written)
+    chosen = guard(tls_cert=cert, tls_key=None if flaw == "no key" else key)
+    with pytest.raises(SettingsError, match=r"setting tls_cert: wanted .*cert\.pem and "):
+        chosen.tls()
+
+
+def test_the_library_below_does_not_log_requests_where_there_is_a_token() -> None:
+    logger = logging.getLogger("websockets.server")
+    before = logger.level
+    try:
+        guard(token=TOKEN)
+        assert not logger.isEnabledFor(logging.DEBUG)
+    finally:
+        logger.setLevel(before)
+
+
+def test_a_client_that_keeps_to_its_rate_never_waits() -> None:
+    pace = Pace(10)
+    assert all(pace.wait(k / 10) == 0.0 for k in range(1000))
+
+
+def test_of_a_flood_it_is_told_once_which_limit_it_met() -> None:
+    pace = Pace(2)
+    told = [pace.wait(0.0) > 0 and pace.news for _ in range(10)]
+    assert told[:4] == [False] * 4
+    assert told[4] == "wanted at most 2 messages a second; more are read later (REALIZER_MAX_RATE sets it)"
+    assert told[5:] == [None] * 5
+    pace.wait(60.0)
+    assert [pace.wait(60.0) > 0 and pace.news for _ in range(4)][-1] == told[4]  # and again, after a pause
+
+
+def test_a_flood_is_read_at_the_rate_after_a_first_burst() -> None:
+    pace, now, read = Pace(10), 0.0, 0
+    while now < 60.0:
+        now += pace.wait(now)
+        read += 1
+    assert 600 <= read <= 10 * 62 + 1

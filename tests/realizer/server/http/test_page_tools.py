@@ -1,0 +1,100 @@
+"""What the page's tools ask: faults, feelings, poses; and what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from realizer.animation.fap.fap_reader import read_fap
+from realizer.core.settings import Settings
+from realizer.server.http.page_tools import MOST_TEXT, DeskError, faults, feeling, pose
+from realizer.tables import faps
+
+NAMES = [row.name for row in faps()]
+
+
+def told(text: str) -> list[dict]:
+    return json.loads(faults(text, Settings()))["faults"]
+
+
+def test_a_fault_has_its_place_and_a_sound_text_none() -> None:
+    text = '<bml id="a">\n  <head id="n" lexeme="NIX"/>\n</bml>'
+    (fault,) = told(text)
+    (spot,) = fault["spots"]
+    line = text.split("\n")[spot["line"] - 1]
+    assert line[spot["column"] - 1 :][: spot["length"]] == "NIX"
+    assert "NOD" in fault["text"]
+    assert told(text.replace("NIX", "NOD")) == []
+
+
+def test_advice_is_told_as_such() -> None:
+    (fault,) = told('<bml id="a"><head id="n" lexeme="NOD" start="300"/></bml>')
+    assert fault["type"] == "ADVICE"
+
+
+@pytest.mark.parametrize("text", ["", "no markup", "<", "<bml", "\ud800", "<bml id='a'>" * 300])
+def test_any_text_is_answered(text: str) -> None:
+    assert isinstance(told(text), list)
+
+
+def test_what_is_too_long_to_be_checked_while_it_is_typed_is_said() -> None:
+    answer = json.loads(faults("x" * (MOST_TEXT + 1), Settings()))
+    assert answer["faults"] == []
+    assert str(MOST_TEXT) in answer["skipped"]
+
+
+def test_a_place_on_the_wheel_is_action_units_and_a_published_profile_is_faps() -> None:
+    own = json.loads(feeling('{"angle": 45, "activation": 7}'))
+    assert own["shares"] == {"fear": 1.0}
+    assert own["values"]["20L"] == own["values"]["20R"] > 0.5
+    published = json.loads(feeling('{"angle": 45, "activation": 5, "profile": "published"}'))
+    assert set(published["values"]) <= set(NAMES)
+    one = json.loads(feeling('{"name": "fear 8", "profile": "published"}'))
+    assert one["values"] != published["values"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("", "JSON"),
+        ("[]", "got list"),
+        ('{"angle": 9, "activation": 70}', "wanted 0..7, got 70"),
+        ('{"angle": "north"}', "feeling: "),
+        ('{"name": "hangry"}', "wanted one of"),
+        ("{}", "wanted one of a name"),
+    ],
+)
+def test_what_is_no_feeling_is_refused(asked: str, said: str) -> None:
+    with pytest.raises(DeskError, match=said):
+        feeling(asked)
+
+
+def test_a_pose_is_a_fap_file_of_one_frame_that_is_read_again() -> None:
+    text = pose('{"type": "set", "aus": {"12L": 1}, "faps": {"open_jaw": 300, "53": 20}}', "ben", Settings())
+    clip = read_fap(text)
+    assert clip.notes == ()
+    assert clip.values.shape == (1, 68)
+    row = dict(zip(NAMES, clip.values[0].tolist(), strict=True))
+    assert (row["open_jaw"], row["stretch_l_cornerlip_o"]) == (300, 20)
+    assert row["raise_l_cornerlip_o"] > 100
+    assert row["raise_r_cornerlip_o"] == 0
+
+
+def test_a_pose_of_nothing_is_the_neutral_face() -> None:
+    assert not np.any(read_fap(pose('{"type": "set"}', None, Settings())).values)
+
+
+@pytest.mark.parametrize(
+    ("asked", "face", "said"),
+    [
+        ('{"type": "stop"}', None, "type set"),
+        ('{"type": "set", "aus": {"99": 1}}', None, "'99'"),
+        ('{"type": "set", "aus": {"12": 7}}', None, "aus"),
+        ('{"type": "set"}', "nobody", "nobody"),
+    ],
+)
+def test_what_is_no_pose_is_refused(asked: str, face: str | None, said: str) -> None:
+    with pytest.raises(DeskError, match=said):
+        pose(asked, face, Settings())

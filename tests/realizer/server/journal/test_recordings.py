@@ -1,0 +1,185 @@
+"""Records: files that are gone on with, begun anew beside, or that are none."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from realizer.cli import cli
+from realizer.server.journal import Entry, JournalError, Kept
+from realizer.server.journal.recordings import FolderJournal, read_record
+
+ENTRIES = [Entry(0.1 * k, "text", 1, f"message {k}") for k in range(6)]
+HEAD = {"settings": {"fps": 25.0}, "scene": None}
+HOLDS = """
+import sys
+from pathlib import Path
+from realizer.server.journal.folder import FolderJournal
+record = FolderJournal(Path(sys.argv[1]), {"settings": {"fps": 25.0}, "scene": None})
+record.begin("s", 1e9)
+print("holds", flush=True)
+sys.stdin.read()
+"""
+
+
+def wrote(folder: Path, entries: list[Entry], parts: dict[str, str] | None = None) -> Path:
+    """The record of a process that has died since."""
+    record = FolderJournal(folder, HEAD)
+    if parts:
+        record.resume("s", Kept(1e9, entries, parts))
+    else:
+        record.begin("s", 1e9)
+        for entry in entries:
+            record.add("s", entry)
+    record.close()
+    (path,) = folder.iterdir()
+    return path
+
+
+def gone_on(folder: Path, kept: Kept) -> list[Path]:
+    """The records there are when a session was taken over and one thing more was done."""
+    record = FolderJournal(folder, HEAD)
+    record.resume("s", kept)
+    record.add("s", Entry(9.0, "tick"))
+    record.close()
+    return sorted(folder.iterdir(), key=lambda path: (len(path.name), path.name))
+
+
+@pytest.mark.parametrize("written", [0, 4, 5, 6])
+def test_a_record_goes_on_with_what_it_lacks(written: int, tmp_path: Path) -> None:
+    path = wrote(tmp_path, ENTRIES[:written])
+    with path.open("a") as broken:
+        broken.write('{"at": 0.')
+    assert gone_on(tmp_path, Kept(1e9, ENTRIES)) == [path]
+    assert read_record(path).entries == (*ENTRIES, Entry(9.0, "tick"))
+
+
+def test_a_record_goes_on_behind_a_checkpoint_of_which_it_knows_nothing(tmp_path: Path) -> None:
+    path = wrote(tmp_path, ENTRIES[:5])
+    assert gone_on(tmp_path, Kept(1e9, ENTRIES[3:], {"state": "{}"})) == [path]
+    assert read_record(path).entries == (*ENTRIES, Entry(9.0, "tick"))
+    assert not read_record(path).parts
+
+
+def test_one_that_began_with_a_checkpoint_goes_on_too(tmp_path: Path) -> None:
+    path = wrote(tmp_path, ENTRIES[:2], {"state": "{}"})
+    assert gone_on(tmp_path, Kept(1e9, ENTRIES, {"state": "{}"})) == [path]
+    assert read_record(path).entries == (*ENTRIES, Entry(9.0, "tick"))
+    assert read_record(path).parts == {"state": "{}"}
+
+
+@pytest.mark.parametrize(
+    ("written", "kept"),
+    [
+        (ENTRIES, Kept(1e9, ENTRIES[:3])),  # more than was kept
+        ([ENTRIES[0], ENTRIES[2]], Kept(1e9, ENTRIES)),  # a hole
+        (ENTRIES[:2], Kept(1e9, ENTRIES[4:], {"state": "{}"})),  # what the checkpoint stands for is not there
+        (ENTRIES, Kept(1e9, [], {"state": "{}"})),  # nobody knows whether it is
+    ],
+)
+def test_one_that_lacks_something_else_stays_and_another_begins(
+    written: list[Entry], kept: Kept, tmp_path: Path
+) -> None:
+    path = wrote(tmp_path, written)
+    before = path.read_bytes()
+    _, other = gone_on(tmp_path, kept)
+    assert path.read_bytes() == before
+    record = read_record(other)
+    assert record.entries == (*kept.entries, Entry(9.0, "tick"))
+    assert record.parts == kept.parts
+
+
+def test_one_of_other_settings_or_that_is_none_stays_and_another_begins(tmp_path: Path) -> None:
+    path = wrote(tmp_path, ENTRIES)
+    path.write_bytes(path.read_bytes().replace(b"25.0", b"30.0"))
+    path.with_stem(path.stem + "-2").write_bytes(b"\xff\xfe\n")
+    assert len(gone_on(tmp_path, Kept(1e9, ENTRIES))) == 3
+    assert len(gone_on(tmp_path, Kept(1e9, [*ENTRIES, Entry(9.0, "tick")]))) == 3
+
+
+def test_one_that_another_process_still_writes_is_not_touched(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", HOLDS, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"holds\n"
+        first, second = gone_on(tmp_path, Kept(1e9, ENTRIES))
+        other.kill()
+    assert read_record(first).entries == ()
+    assert read_record(second).entries == (*ENTRIES, Entry(9.0, "tick"))
+
+
+def test_a_record_that_cannot_begin_leaves_no_file(tmp_path: Path) -> None:
+    record = FolderJournal(tmp_path, HEAD)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
+    try:
+        with pytest.raises(JournalError, match=r"the record .*File too large"):
+            record.begin("s", 1e9)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    record.add("s", ENTRIES[0])
+    assert list(tmp_path.iterdir()) == []
+
+
+BEGIN = b'{"session": "s", "epoch": 0}\n'
+TICK = b'{"at": 5, "kind": "tick"}\n'
+
+
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
+        (b"", "1: wanted the head of a record, got ''"),
+        (b"\x89PNG\r\n\x1a\n\0\0\xff", "1: wanted the head of a record"),
+        (b"[]\n", "1: wanted the head of a record"),
+        (b"[" * 100_000, "1: wanted the head of a record"),
+        (b'{"session": "s", "epoch": NaN}\n', "1: wanted the head of a record"),
+        (b'{"session": "s", "epoch": 0, "parts": {"state": 7}}\n', "1: wanted the head of a record"),
+        (b'{"session": "s", "epoch": 0, "parts": {"state": "{}"}}\n', "checkpoint of session s cannot be"),
+        (BEGIN + b"\xff\xfe\n", "2: wanted UTF-8"),
+        (BEGIN + b'{"at": NaN, "kind": "tick"}\n', "2: at: wanted seconds"),
+        (BEGIN + b'{"at": 1e999, "kind": "tick"}\n', "2: at: wanted seconds"),
+        (BEGIN + TICK + b'{"at": 1, "kind": "tick"}\n', "3: at: wanted seconds, not before 5, got 1"),
+        (BEGIN + TICK + b"BML\n", "3: wanted an entry of a journal"),
+    ],
+)
+def test_what_is_no_record_is_told_of_with_its_line(content: bytes, fault: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    path.write_bytes(content)
+    told = CliRunner().invoke(cli, ["replay", str(path)])
+    assert told.exit_code == 1
+    assert fault in told.output
+
+
+@pytest.mark.parametrize("content", [BEGIN, BEGIN[:-1], BEGIN + TICK, BEGIN + TICK + b'{"at": 7, "ki'])
+def test_a_record_that_broke_off_early_is_one_still(content: bytes, tmp_path: Path) -> None:
+    path, out = tmp_path / "x.jsonl", tmp_path / "x.wav"
+    path.write_bytes(content)
+    assert CliRunner().invoke(cli, ["replay", str(path)]).output == ""
+    assert CliRunner().invoke(cli, ["replay", str(path), "-o", str(out)]).exit_code == 0
+    assert out.stat().st_size == 44 + (2 * 22050 * 5 if TICK in content else 0)
+
+
+def test_a_record_may_be_named_by_its_folder_where_there_is_no_other(tmp_path: Path) -> None:
+    with pytest.raises(JournalError, match=r"wanted one record .*, got 0"):
+        read_record(tmp_path)
+    path = wrote(tmp_path, ENTRIES)
+    (tmp_path / "notes.txt").write_text("something else")
+    assert read_record(tmp_path) == read_record(path)
+    other = tmp_path / "other.jsonl"
+    other.write_bytes(BEGIN)
+    told = CliRunner().invoke(cli, ["replay", str(tmp_path)])
+    assert told.exit_code == 1
+    assert f"got 2\n  {other}\n  {path}" in told.output
+
+
+def test_one_that_would_last_too_long_is_told_of_at_once_but_its_feedback_is_there(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    path.write_bytes(BEGIN + b'{"at": 1e9, "kind": "tick"}\n')
+    out = CliRunner().invoke(cli, ["replay", str(path), "-o", str(tmp_path / "x.fap")])
+    assert "at most 360000 frames" in str(out.exception)
+    assert CliRunner().invoke(cli, ["replay", str(path)]).exit_code == 0

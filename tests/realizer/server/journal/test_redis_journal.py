@@ -1,0 +1,123 @@
+"""A journal in Redis while its server hangs, dies and comes back."""
+
+from __future__ import annotations
+
+import signal
+import threading
+
+import pytest
+
+from realizer.server.journal import Entry, JournalError, Kept, journal_at, redis_journal
+from tests.realizer.server.journal.conftest import RedisServer
+
+FIRST, REFUSED, LAST = (Entry(at, "text", 1, f"<bml id='b{at:g}'/>") for at in (1.0, 2.0, 3.0))
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(redis_journal, "PATIENCE", 0.2)
+
+
+def test_a_server_that_is_killed_and_started_again_has_lost_nothing(redis_server: RedisServer) -> None:
+    journal = journal_at(redis_server.url)
+    journal.begin("s", 1.0)
+    journal.add("s", Entry(0.5, "join", 1))
+    journal.compact("s", {"state": "so far"})
+    journal.add("s", FIRST)
+    redis_server.kill()
+    with pytest.raises(JournalError, match="refused"):
+        journal.add("s", REFUSED)
+    redis_server.start()
+    journal.add("s", LAST)
+    assert journal_at(redis_server.url).take("s") == Kept(1.0, [FIRST, LAST], {"state": "so far"})
+
+
+def test_what_was_written_though_its_answer_never_came_is_not_kept_as_its_client_was_told(
+    redis_server: RedisServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(redis_journal, "PAUSE", 0.0)
+    journal = journal_at(redis_server.url)
+    journal.begin("s", 1.0)
+    journal.add("s", FIRST)
+    redis_server.process.send_signal(signal.SIGSTOP)
+    with pytest.raises(JournalError, match="Timeout"):
+        journal.add("s", REFUSED)
+    redis_server.process.send_signal(signal.SIGCONT)
+    journal.add("s", LAST)  # behind the one that was read meanwhile
+    assert journal.take("s") == Kept(1.0, [FIRST, LAST])
+
+
+def test_a_server_that_hangs_is_not_waited_for_by_one_after_the_other(
+    redis_server: RedisServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = journal_at(redis_server.url)
+    journal.begin("s", 1.0)
+    now = 1000.0
+    monkeypatch.setattr(redis_journal.time, "monotonic", lambda: now)
+    redis_server.process.send_signal(signal.SIGSTOP)
+    with pytest.raises(JournalError, match="Timeout"):
+        journal.add("s", REFUSED)
+    monkeypatch.setattr(redis_journal, "PATIENCE", float("inf"))
+    for _ in range(100):
+        with pytest.raises(JournalError, match="is asked again in a moment"):
+            journal.add("s", REFUSED)
+    redis_server.process.send_signal(signal.SIGCONT)
+    now += redis_journal.PAUSE
+    journal.add("s", LAST)
+    assert journal.take("s") == Kept(1.0, [LAST])
+
+
+def test_a_checkpoint_whose_answer_never_came_is_whole_or_was_not(
+    redis_server: RedisServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(redis_journal, "PAUSE", 0.0)
+    journal = journal_at(redis_server.url)
+    journal.begin("s", 1.0)
+    journal.compact("s", {"state": "old"})
+    journal.add("s", FIRST)
+    redis_server.process.send_signal(signal.SIGSTOP)
+    with pytest.raises(JournalError, match="Timeout"):
+        journal.compact("s", {"state": "new"})
+    redis_server.process.send_signal(signal.SIGCONT)
+    journal.add("s", LAST)
+    old, new = Kept(1.0, [FIRST, LAST], {"state": "old"}), Kept(1.0, [LAST], {"state": "new"})
+    assert journal.take("s") in (old, new)
+
+
+def test_whoever_looks_while_checkpoints_are_written_finds_the_old_or_the_new(where: str) -> None:
+    """Another process takes the session at any moment, again and again."""
+    journal, done = journal_at(where), threading.Event()
+    found: list[tuple[str, ...]] = []
+
+    def look() -> None:
+        other = journal_at(where)
+        while not done.is_set():
+            kept = other.take("torn")
+            if kept is not None:
+                found.append(
+                    (
+                        kept.parts.get("state", ""),
+                        kept.parts.get("clip:c", ""),
+                        *(e.kind for e in kept.entries),
+                    )
+                )
+        other.close()
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    try:
+        for k in range(200):
+            journal.begin("torn", 0.0)
+            try:
+                journal.add("torn", Entry(1.0, "tick"))
+                journal.compact("torn", {"state": f"{k}", "clip:c": f"{k}"})
+            except JournalError:
+                pass  # it was taken
+    finally:
+        done.set()
+        looking.join()
+    assert set(found)
+    for state, clip, *kinds in found:
+        assert state == clip
+        assert not (state and kinds)
+    journal.end("torn")

@@ -1,0 +1,208 @@
+"""Frames that a client got while a session was live are those of its replay, whatever it did meanwhile."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from realizer.animation.axis import AU_NAMES
+from realizer.core.array_types import Int32
+from realizer.core.settings import Settings
+from realizer.outputs.output import Drawing
+from realizer.protocol.wire import ClipPiece, pack_clip, unpack
+from realizer.render import Renderer
+from realizer.server.journal.journal_writer import Notes
+from realizer.server.journal.playback import played
+from realizer.server.journal.recordings import FolderJournal, Record, head, read_record
+from realizer.server.session.effects import Send, Speak
+from realizer.server.session.session import Session
+from realizer.speech import SilentVoice
+from realizer.speech.duration_fit import fitted
+from tests.waking import wakes
+
+SETTINGS = Settings(voice="silent", seed=3)
+OPENED = 100.0  # s, on the clock of who wakes the session
+WATCH = '{"type": "subscribe", "stream": "fap", "encoding": "binary"}'
+BROW = AU_NAMES().index("4L")
+PLAYED = [
+    '<speech id="s"><text>Hello, how are <sync id="m"/>you today?</text></speech>'
+    '<head id="n" lexeme="NOD" stroke="s:m"/>',
+    '<faceLexeme id="f" lexeme="SMILE" end="1"/>',
+    '<gaze id="g" target="cup" start="0.4" end="1.4"/>',
+    '<faceShift id="f"><faceLexeme id="l" lexeme="SMILE" amount="0.5"/></faceShift>',
+    '<head id="h" lexeme="SHAKE" repetition="2"/>',
+]
+
+
+def setting(**what: object) -> str:
+    return json.dumps({"type": "set", **what})
+
+
+def recorded(
+    folder: Path,
+    doings: Sequence[tuple[float, str | bytes]],
+    seconds: float,
+    late: Random | None = None,
+    watch: str = WATCH,
+) -> tuple[Record, list[bytes]]:
+    """A session to which that is done: its record, and what its client got of the stream it asked for.
+
+    Args:
+        doings: seconds on its clock, what is sent.
+        late: draws how late it is woken; None: never.
+    """
+    session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)
+    session.notes = Notes("s", record=FolderJournal(folder, head(SETTINGS, None)))
+    session.notes.begin(1e9)
+    session.connect(1, OPENED)
+    got: list[bytes] = []
+    answers: list[tuple[float, Speak]] = []
+    coming: list[tuple[float, str | bytes]] = [(OPENED, watch), *((OPENED + t, doing) for t, doing in doings)]
+    now = OPENED
+    while now < OPENED + seconds:
+        due = wakes(session)
+        soonest = [when for when, _ in (*coming[:1], *answers)]
+        now = max(now, min([OPENED + seconds, *soonest, due]))
+        now += 0.0 if late is None else late.uniform(0, 0.03)
+        if coming and coming[0][0] <= now:
+            session.receive(1, coming.pop(0)[1], now)
+        elif answers and answers[0][0] <= now:
+            order = answers.pop(0)[1]
+            session.spoken(order.id, fitted(SilentVoice(), order.say), now)
+        else:
+            session.tick(now)
+        for effect in session.outgoing():
+            if isinstance(effect, Speak):
+                answers.append((now + 0.2, effect))
+            elif isinstance(effect, Send) and isinstance(effect.data, bytes):
+                got.append(effect.data)
+    session.disconnect(1, now)
+    session.notes.end()
+    return read_record(folder), got
+
+
+def faps(got: list[bytes]) -> dict[int, Int32]:
+    """Frame -> (68,) its FAPs."""
+    return {unpack(one).frame: np.frombuffer(unpack(one).payload, "<i4") for one in got}
+
+
+def some(random: Random, seconds: float) -> list[tuple[float, str]]:
+    """Anything, in any order, about twice a second."""
+    doings: list[tuple[float, str]] = []
+    t = 0.1
+    while (t := t + random.expovariate(2.0)) < seconds:
+        value = random.choice([None, 0.3, 0.8])
+        doings.append(
+            (
+                t,
+                random.choice(
+                    [
+                        setting(aus={random.choice(["1", "12L", "26", "4"]): value}),
+                        setting(faps={"open_jaw": random.choice([None, 100, 50])}),
+                        setting(emotion=random.choice([None, {"type": "anger", "intensity": 0.7}])),
+                        '{"type": "stop"}',
+                        '{"type": "speech", "id": "turn", "append": "One two three. And so on. "}',
+                        '{"type": "speech", "id": "turn", "close": true}',
+                        *(
+                            f'<bml id="b{len(doings)}" composition="{composition}">'
+                            f"{random.choice(PLAYED)}</bml>"
+                            for composition in ("MERGE", "APPEND", "REPLACE")
+                        ),
+                    ]
+                ),
+            )
+        )
+    return doings
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_frame_is_as_it_was_got_though_the_session_was_woken_late(seed: int, tmp_path: Path) -> None:
+    random = Random(seed)
+    record, got = recorded(tmp_path, some(random, 6.0), 8.0, random if seed % 2 else None)
+    live = faps(got)
+    again = played(record)[0].faps.integers()
+    assert len(live) > 190
+    for number, row in live.items():
+        assert np.array_equal(again[number], row), number
+
+
+def test_an_output_lasts_until_the_record_ends_and_what_is_held_has_come_to_stand(tmp_path: Path) -> None:
+    doings = [(0.5, setting(aus={"4": 1})), (1.0, '{"type": "stop"}')]
+    record, _ = recorded(tmp_path / "held", doings, 3.0)
+    assert played(record)[0].duration == record.entries[-1].at == pytest.approx(3.0)
+    record, _ = recorded(tmp_path / "let go of", [*doings, (2.999, setting(aus=None))], 3.0)
+    faded = played(record)[0]
+    assert 3.2 < faded.duration < 3.5
+    brow = faded.aus.aus[:, BROW]
+    assert brow[40] > 0.9
+    assert brow[-1] < 0.05
+
+
+def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> None:
+    rate = 8000
+    pcm = np.random.default_rng(1).integers(-9000, 9000, 3 * rate).astype("<i2")
+    clip = pack_clip(ClipPiece("c", 0, rate, pcm.tobytes(), final=True))
+    says = (
+        '<bml xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt" id="b{}" composition="REPLACE"><speech id="s">'
+        '<text>Hello</text><description priority="1" type="audio/x-clip"><bmlt:audiofile fileName="clip:c"/>'
+        "</description></speech></bml>"
+    )
+    doings: list[tuple[float, str | bytes]] = [
+        (0.1, clip),
+        (0.2, says.format(1)),
+        (1.31, says.format(2)),
+        (2.77, '{"type": "stop"}'),
+    ]
+    hear = json.dumps({"type": "subscribe", "stream": "audio", "rate": rate})
+    record, got = recorded(tmp_path, doings, 4.0, watch=hear)
+    again = played(record)[0].sound(rate)
+    live = np.zeros_like(again)
+    for packet in map(unpack, got):
+        first = packet.frame * rate // 50
+        if packet.forget:
+            live[first:] = 0
+        else:
+            live[first : first + rate // 50] = np.frombuffer(packet.payload, "<i2")
+    assert len(again) == 4 * rate
+    assert 2.4 < np.count_nonzero(again) / rate < 2.7
+    assert np.array_equal(again, live)
+
+
+def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
+    doings = [(at, setting(faps={"open_jaw": value})) for at, value in ((0.5, 100), (1.5, None), (2.5, 60))]
+    record, _ = recorded(tmp_path, doings, 3.5)
+    jaw = played(record)[0].faps.integers()[:, 2]
+    assert [int(jaw[round(25 * at)]) for at in (0.4, 1.2, 2.3, 3.2)] == [0, 100, 0, 60]
+
+
+def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> None:
+    doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
+    record, got = recorded(tmp_path, doings, 2.0)
+    realization, _ = played(record)
+    again = realization.faps.integers()
+    assert all(np.array_equal(again[number], row) for number, row in faps(got).items())
+    (_, before), (changed, after) = realization.faces
+    assert (before.face_name, changed, after.face_name) == ("ada", 26, "ben")
+    assert (before.frames, after.frames) == (26, realization.frames - 26)
+    size = (48, 48)
+    pictures = list(Drawing(size=size).pictures(realization, size, [25, 26]))
+    assert len(pictures) == 2
+    with Renderer("ben", size) as renderer:
+        shown = renderer.draw(realization.poses[[25, 26]])
+    assert np.array_equal(pictures[1], shown[1])
+    assert np.abs(pictures[0].astype(int) - shown[0]).mean() > 5
+
+
+def test_a_character_that_comes_later_is_there_from_the_first_frame(tmp_path: Path) -> None:
+    doings = [(0.5, setting(character="a", aus={"1": 1})), (1.0, setting(character="b", aus={"4": 1}))]
+    record, _ = recorded(tmp_path, doings, 2.0)
+    realization, _ = played(record)
+    first, second = realization.characters.values()
+    assert first.faps.values.shape == second.faps.values.shape
+    assert not second.aus.aus[:24, BROW].any()
+    assert second.aus.aus[40, BROW] == pytest.approx(1)

@@ -1,0 +1,111 @@
+"""The engines: as many kinds of pictures at a time as there is room for, and the others notice nothing."""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from realizer.core.errors import RenderError
+from realizer.server.runtime.engines import IDLE, Studio
+from realizer.server.session.effects import Draw, Look
+
+
+@dataclass
+class Clock:
+    now: float = 0.0
+    asked: threading.Event | None = None  # is set when somebody asks
+
+    def __call__(self) -> float:
+        now = self.now
+        if self.asked is not None:
+            self.asked.set()
+        return now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def studio(clock) -> Iterator[Studio]:
+    studio = Studio(clock=clock)
+    yield studio
+    studio.close()
+
+
+def order(width: int, form: str = "jpeg") -> Draw:
+    look = Look((width, 16), "front", None, "#102030", 80, form)
+    return Draw(1, "default", np.zeros(68, np.float32), look)
+
+
+def width(picture: bytes) -> int:
+    return Image.open(io.BytesIO(picture)).width
+
+
+@pytest.mark.gl
+def test_one_kind_of_picture_too_many_is_refused_and_the_others_are_drawn(
+    studio, clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
+    for k in range(2):
+        clock.now = 0.1 * k
+        assert width(studio.draw(order(16 + k))) == 16 + k
+    refused = studio.draw(order(99))
+    assert isinstance(refused, RenderError)
+    assert "different pictures" in str(refused)
+    clock.now = 1.0
+    for form in ("jpeg", "png", "webp"):
+        picture = studio.draw(order(17, form))
+        assert Image.open(io.BytesIO(picture)).format == form.upper()
+        assert width(picture) == 17
+    # Nobody looks at the first one any more: it makes room.
+    clock.now = IDLE + 0.5
+    assert width(studio.draw(order(99))) == 99
+    assert isinstance(studio.draw(order(16)), RenderError)
+
+
+@pytest.mark.gl
+def test_a_renderer_that_takes_long_to_start_is_not_ended_for_another_one(
+    studio, clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
+    assert width(studio.draw(order(16))) == 16
+    begins = clock.asked = threading.Event()
+    starting = studio.drawers.submit(studio.draw, order(17))
+    assert begins.wait(60)
+    clock.now = IDLE + 1.0
+    clock.asked = None
+    assert width(starting.result(60)) == 17
+    # Who looks at the first one waited for the second one to start, for longer than otherwise counts.
+    assert isinstance(studio.draw(order(99)), RenderError)
+    assert width(studio.draw(order(16))) == 16
+    clock.now += IDLE
+    assert width(studio.draw(order(99))) == 99
+
+
+@pytest.mark.gl
+def test_a_renderer_that_draws_is_not_ended_for_another_one(
+    studio, clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
+    begins = clock.asked = threading.Event()
+    drawing = studio.drawers.submit(studio.draw, order(16))
+    assert begins.wait(60)
+    clock.asked = None
+    clock.now = 2 * IDLE
+    assert isinstance(studio.draw(order(99)), RenderError)
+    assert width(drawing.result(60)) == 16
+
+
+@pytest.mark.gl
+def test_a_face_that_is_not_there_is_an_answer(studio) -> None:
+    look = Look((16, 16), "front", None, None, 80)
+    answer = studio.draw(Draw(1, "nobody", np.zeros(68, np.float32), look))
+    assert "nobody" in str(answer)

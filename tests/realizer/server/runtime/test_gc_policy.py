@@ -1,0 +1,62 @@
+"""What holds itself is freed when there may be much of it, and not before."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Iterator
+
+import pytest
+
+from realizer.server.runtime import gc_policy
+from realizer.server.runtime.gc_policy import ENDED, Cycles
+
+
+class Knot:
+    """Holds itself."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+@pytest.fixture(autouse=True)
+def _alone() -> Iterator[None]:
+    """Python looks for no cycles while a test counts them."""
+    was = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    yield
+    if was:
+        gc.enable()
+
+
+def knot() -> weakref.ref[Knot]:
+    return weakref.ref(Knot())
+
+
+def test_they_are_looked_for_when_as_many_have_ended_as_are_there() -> None:
+    known, tied = Cycles(), knot()
+    for ended, alive, looked in (
+        (ENDED - 1, 0, False),
+        (ENDED, 300, False),
+        (299, 300, False),
+        (300, 300, True),
+    ):
+        known.ended = ended
+        assert tied() is not None
+        assert known.look(alive) is looked
+    assert tied() is None
+    assert known.ended == 0
+    assert not known.look(0)
+
+
+def test_they_are_looked_for_when_the_process_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
+    used = 200e6
+    monkeypatch.setattr(gc_policy, "memory", lambda: used)
+    known, tied = Cycles(), knot()
+    used = 390e6
+    assert not known.look(1000)
+    used = 410e6
+    assert known.look(1000)
+    assert tied() is None
+    assert not known.look(1000)  # that is how large it is now

@@ -1,0 +1,164 @@
+"""One timer for many things: each is woken at its time, in order, and none keeps the others waiting."""
+
+from __future__ import annotations
+
+import asyncio
+import heapq
+import itertools
+from collections.abc import Callable
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.server.runtime.timer_wheel import NEVER, STEP, TURN, Alarms
+
+
+class Clock:
+    """A clock with timers, which goes from one to the next at no time at all."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self._timers: list[tuple[float, int, asyncio.TimerHandle]] = []
+        self._numbers = itertools.count()
+        self.loop = asyncio.new_event_loop()
+        self.loop.close()  # a handle wants one, though it asks it for nothing
+
+    def time(self) -> float:
+        return self.now
+
+    def call_at(self, when: float, callback: Callable[[], None]) -> asyncio.TimerHandle:
+        handle = asyncio.TimerHandle(when, callback, (), self.loop)
+        heapq.heappush(self._timers, (when, next(self._numbers), handle))
+        return handle
+
+    def run(self, until: float) -> int:
+        """Returns how many timers rang."""
+        rang = 0
+        while self._timers and self._timers[0][0] <= until:
+            when, _, handle = heapq.heappop(self._timers)
+            self.now = max(self.now, when)
+            if not handle.cancelled():
+                rang += 1
+                handle._run()
+        self.now = until
+        return rang
+
+
+def alarms(clock: Clock, *, costs: float = 0.0) -> tuple[Alarms[str], list[tuple[str, float, float]]]:
+    """Alarms and what they woke: (thing, when it was to be, when it was)."""
+    woken: list[tuple[str, float, float]] = []
+
+    def wake(thing: str, when: float) -> None:
+        woken.append((thing, when, clock.now))
+        clock.now += costs
+
+    return Alarms(clock, wake), woken
+
+
+def test_each_is_woken_once_at_its_time() -> None:
+    clock = Clock()
+    some, woken = alarms(clock)
+    for thing, when in (("b", 2.0), ("a", 1.0), ("c", 3.0)):
+        some.set(thing, when)
+    clock.run(2.5)
+    assert woken == [("a", 1.0, 1.0), ("b", 2.0, 2.0)]
+    clock.run(9.0)
+    assert [thing for thing, *_ in woken] == ["a", "b", "c"]
+
+
+def test_what_is_set_again_is_woken_at_the_new_time_only() -> None:
+    clock = Clock()
+    some, woken = alarms(clock)
+    some.set("a", 1.0)
+    some.set("a", 3.0)
+    some.set("b", 3.0)
+    some.set("b", 2.0)
+    some.set("c", 2.0)
+    some.set("c", NEVER)
+    clock.run(9.0)
+    assert woken == [("b", 2.0, 2.0), ("a", 3.0, 3.0)]
+
+
+def test_one_that_is_due_is_not_put_off_by_who_sets_it_again() -> None:
+    clock = Clock()
+    some, woken = alarms(clock)
+    some.set("a", 1.0)
+    clock.now = 1.5
+    some.set("a", 1.6)
+    clock.run(1.55)
+    assert woken == [("a", 1.0, 1.5)]
+
+
+def test_what_is_due_within_a_step_needs_one_timer() -> None:
+    clock = Clock()
+    some, woken = alarms(clock)
+    for k in range(100):
+        some.set(str(k), 1.0 + k * STEP / 100)
+    assert clock.run(2.0) <= 3
+    assert len(woken) == 100
+    assert all(was - wanted <= STEP for _, wanted, was in woken)
+
+
+def test_who_wakes_for_long_lets_the_loop_do_other_things_in_between() -> None:
+    clock = Clock()
+    some, woken = alarms(clock, costs=TURN / 2)
+    for k in range(12):
+        some.set(str(k), 1.0)
+    assert clock.run(2.0) >= 4
+    assert [thing for thing, *_ in woken] == [str(k) for k in range(12)]
+
+
+def test_a_thing_may_set_itself_again_while_it_is_woken() -> None:
+    clock = Clock()
+    woken: list[float] = []
+
+    def wake(thing: str, when: float) -> None:
+        woken.append(when)
+        some.set(thing, when + 1.0)
+
+    some = Alarms(clock, wake)
+    some.set("a", 1.0)
+    clock.run(4.5)
+    assert woken == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_one_that_fails_leaves_the_others() -> None:
+    clock = Clock()
+    woken: list[str] = []
+    clock.loop.set_exception_handler(lambda loop, context: None)
+
+    def wake(thing: str, when: float) -> None:
+        woken.append(thing)
+        if thing == "a":
+            raise ValueError(thing)
+
+    some = Alarms(clock, wake)
+    some.set("a", 1.0)
+    some.set("b", 1.0)
+    clock.run(2.0)
+    assert woken == ["a", "b"]
+
+
+def test_after_close_nobody_is_woken() -> None:
+    clock = Clock()
+    some, woken = alarms(clock)
+    some.set("a", 1.0)
+    some.close()
+    some.set("b", 1.0)
+    clock.run(2.0)
+    assert woken == []
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.just(NEVER) | st.floats(0, 10)), max_size=300))
+def test_the_last_time_counts_whatever_was_set_before(steps: list[tuple[int, float]]) -> None:
+    clock = Clock()
+    some, woken = alarms(clock)
+    last: dict[str, float] = {}
+    for thing, when in steps:
+        some.set(str(thing), when)
+        if last.get(str(thing)) != 0.0 or when == NEVER:  # one that is due already stays
+            last[str(thing)] = when
+    clock.run(20.0)
+    assert {thing: when for thing, when, _ in woken} == {t: w for t, w in last.items() if w < NEVER}
+    assert len(woken) == len({thing for thing, *_ in woken})
+    assert all(wanted - STEP / 1000 <= was <= wanted + 2 * STEP for _, wanted, was in woken)

@@ -1,0 +1,133 @@
+"""What all workers answer to one request: their sum, the first refusal, or what is left of them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+
+import pytest
+
+from realizer.server.http.metrics import GAUGES, Metrics
+from realizer.server.runtime import worker_aggregation as module
+from realizer.server.runtime.worker_aggregation import gathered, is_for_all
+
+REQUEST = b"GET /metrics?token=x HTTP/1.1\r\nHost: here\r\nAuthorization: Bearer y\r\n\r\n"
+
+
+def answer(status: str, body: str) -> bytes:
+    head = f"HTTP/1.1 {status}\r\nContent-Type: text/plain\r\nContent-Length: {len(body)}\r\n"
+    return f"{head}X-Content-Type-Options: nosniff\r\n\r\n{body}".encode()
+
+
+def of(number: int) -> bytes:
+    return answer("200 OK", Metrics(worker=number).text(dict.fromkeys(GAUGES, number + 1), {}))
+
+
+def health(sessions: int) -> bytes:
+    return answer("200 OK", json.dumps({"status": "ok", "sessions": sessions, "connections": 2}))
+
+
+def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list[bytes]]:
+    """What a client gets of workers that answer so (None: says nothing), and what these were asked."""
+    heard: list[bytes] = []
+    kept: list[socket.socket] = []
+
+    async def give(number: int, given: socket.socket) -> None:
+        one = given.dup()
+        kept.append(one)
+        one.setblocking(False)
+
+        async def work() -> None:
+            loop = asyncio.get_running_loop()
+            heard.append(await loop.sock_recv(one, 10_000))
+            if (said := answers[number]) is not None:
+                for k in range(0, len(said), 1000):  # in several reads
+                    await loop.sock_sendall(one, said[k : k + 1000])
+                one.close()
+
+        tasks.append(asyncio.create_task(work()))
+
+    async def run() -> bytes:
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            ours.sendall(request)
+            if not request.endswith(b"\r\n\r\n"):
+                ours.shutdown(socket.SHUT_WR)
+            theirs.setblocking(False)
+            await gathered(theirs, len(answers), give)
+            await asyncio.gather(*tasks)
+            theirs.close()
+            return b"".join(iter(lambda: ours.recv(10_000), b""))
+
+    tasks: list[asyncio.Task[None]] = []
+    got = asyncio.run(run())
+    for one in kept:
+        one.close()
+    return got, heard
+
+
+def test_each_worker_is_asked_as_the_client_asked_and_answers_are_one() -> None:
+    got, heard = asked(of(0), of(1))
+    assert heard == [REQUEST, REQUEST]
+    head, _, body = got.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 200 OK\r\n")
+    assert b"nosniff" in head
+    assert b"Content-Length: %d\r\n" % len(body) in head
+    assert b"\nrealizer_sessions 3\n" in body
+
+
+def test_what_one_refuses_is_refused() -> None:
+    refusal = answer("401 Unauthorized", "token: wanted one")
+    assert asked(of(0), refusal)[0] == refusal
+
+
+def test_workers_that_say_nothing_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "PATIENCE", 0.2)
+    got, _ = asked(of(0), None)
+    assert b'realizer_worker_sessions{worker="0"} 1\n' in got
+    assert b'worker="1"' not in got
+    assert asked(b"")[0].startswith(b"HTTP/1.1 503 ")
+
+
+def test_health_is_the_sum_and_says_who_does_not_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "HASTE", 0.2)
+    request = REQUEST.replace(b"/metrics", b"/healthz")
+
+    def told(*answers: bytes | None) -> tuple[bytes, object]:
+        head, _, body = asked(*answers, request=request)[0].partition(b"\r\n\r\n")
+        assert b"Content-Length: %d" % len(body) in head
+        return head[9:12], json.loads(body)
+
+    whole = {"status": "ok", "sessions": 3, "connections": 4, "workers": 2}
+    assert told(health(1), health(2)) == (b"200", whole)
+    partly = {"status": "partly", "sessions": 1, "connections": 2, "workers": 3, "silent": [1, 2]}
+    assert told(health(1), None, b"") == (b"200", partly)
+    got, _ = asked(None, b"", request=request)
+    assert got.startswith(b"HTTP/1.1 503 ")
+    assert got.endswith(b"no worker answers")
+    assert b"Content-Length: %d\r\n" % len(b"no worker answers") in got
+
+
+def test_half_a_request_is_answered_by_nothing() -> None:
+    assert asked(of(0), request=b"GET /metrics HTTP/1.1\r\nHost") == (b"", [])
+
+
+@pytest.mark.parametrize(
+    ("line", "all_"),
+    [
+        ("GET /metrics HTTP/1.1", True),
+        ("GET /metrics?token=x HTTP/1.1", True),
+        ("GET /metrics?networker=1 HTTP/1.1", True),
+        ("GET /metrics?worker=1 HTTP/1.1", False),
+        ("GET /metrics?token=x&worker=1 HTTP/1.1", False),
+        ("GET /metricsx HTTP/1.1", False),
+        ("GET /healthz HTTP/1.1", True),
+        ("GET /healthz?worker=0 HTTP/1.1", False),
+        ("GET /ws?session=metrics HTTP/1.1", False),
+        ("POST /metrics HTTP/1.1", False),
+        ("", False),
+    ],
+)
+def test_only_a_request_that_names_no_worker_is_for_all(line: str, all_: bool) -> None:
+    assert is_for_all(line) is all_

@@ -1,0 +1,64 @@
+"""Names of control messages are found, and what is none of them is said."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.protocol.messages import Feeling, SetMessage
+from realizer.server.documents.limits import MAX_CHARACTERS
+from realizer.server.session.control_fields import Wrong, feeling_of, held, index_of
+
+
+def asked(**fields: object) -> SetMessage:
+    return SetMessage.model_validate({"type": "set", **fields})
+
+
+@pytest.mark.parametrize(
+    ("message", "values"),
+    [
+        (asked(aus={"12L": 0.5}), {"12L": 0.5}),
+        (asked(aus={"12": 0.5}), {"12L": 0.5, "12R": 0.5}),
+        (asked(aus={"25": None}), {"25": None}),
+        (asked(faps={"3": 100, "raise_l_i_eyebrow": None}), {"open_jaw": 100, "raise_l_i_eyebrow": None}),
+        (asked(aus=None), {"12L": None}),
+        (asked(faps=None, aus={"4": 1}), {"open_jaw": None, "4L": 1.0, "4R": 1.0}),
+        (asked(), {}),
+    ],
+)
+def test_names_are_those_of_sides_and_of_faps(message: SetMessage, values: dict[str, float | None]) -> None:
+    assert held(message, ["12L", "open_jaw"]) == values
+
+
+@pytest.mark.parametrize(
+    ("message", "where", "says"),
+    [
+        (asked(aus={"99": 0.5}), "aus", "wanted an AU number, with L or R for one side, got '99'"),
+        (asked(aus={"25L": 0.5}), "aus", "'25L'"),
+        (asked(faps={"2": 1}), "faps", "wanted the name or the number (3..68) of a FAP, got '2'"),
+        (asked(faps={"69": 1}), "faps", "'69'"),
+        (asked(faps={"\u00b3": 1}), "faps", "a FAP"),
+    ],
+)
+def test_what_is_no_name_is_said_with_its_field(message: SetMessage, where: str, says: str) -> None:
+    with pytest.raises(Wrong) as wrong:
+        held(message, [])
+    assert wrong.value.where == where
+    assert says in str(wrong.value)
+
+
+def test_a_feeling_is_what_it_moves() -> None:
+    assert feeling_of(None) == {}
+    assert feeling_of(Feeling(name="joy"))["12L"] > 0
+    with pytest.raises(Wrong) as wrong:
+        feeling_of(Feeling(name="nothing at all"))
+    assert wrong.value.where == "emotion.name"
+
+
+def test_a_character_that_is_new_has_a_place_while_there_is_room(drive) -> None:
+    session = drive().session
+    assert [index_of(session, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
+    for number in range(2, MAX_CHARACTERS):
+        assert index_of(session, f"c{number}") == number
+    with pytest.raises(Wrong, match="wanted at most 16 characters"):
+        index_of(session, "one more")
+    assert index_of(session, "Ben") == 1

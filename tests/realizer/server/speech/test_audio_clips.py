@@ -1,0 +1,225 @@
+"""Sound clips over the wire: pieces in order, limits in words, times that move the lips."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import wave
+
+import numpy as np
+import pytest
+from websockets.asyncio.client import connect
+
+from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback, parse_feedback
+from realizer.core.settings import Settings
+from realizer.protocol.messages import parse_control
+from realizer.protocol.wire import ClipPiece, FrameKind, pack_clip, unpack
+from realizer.server.serve import Server
+from realizer.server.speech import audio_clips
+from realizer.server.speech.audio_clips import ClipError, Clips
+
+RATE = 16000
+SOUND = np.rint(9000 * np.sin(np.arange(RATE) * 0.05)).astype("<i2")
+SPEAK = (
+    '<bml id="b" xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt"><speech id="s">{}'
+    '<description priority="1" type="audio/x-clip"><bmlt:audiofile fileName="clip:{}"/></description>'
+    "</speech></bml>"
+)
+
+
+def told(**fields):
+    return parse_control(json.dumps({"type": "speech", **fields}))
+
+
+def wav(pcm: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    with wave.open(buffer, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(RATE)
+        file.writeframes(pcm.tobytes())
+    return buffer.getvalue()
+
+
+def test_pieces_of_pcm_are_one_recording_when_the_last_has_come() -> None:
+    known = Clips()
+    known.take(ClipPiece("c", 0, RATE, SOUND[:1000].tobytes(), final=False))
+    assert not known.recordings
+    known.take(ClipPiece("c", 1, RATE, SOUND[1000:].tobytes()))
+    assert np.array_equal(known.recordings["c"].pcm, SOUND)
+    assert known.recordings["c"].rate == RATE
+
+
+def test_a_file_may_come_in_pieces_too_and_says_its_rate_itself() -> None:
+    known, content = Clips(), wav(SOUND)
+    known.take(ClipPiece("c", 0, 0, content[:777], final=False))
+    known.take(ClipPiece("c", 1, 0, content[777:]))
+    assert known.recordings["c"].rate == RATE
+    assert np.array_equal(known.recordings["c"].pcm, SOUND)
+
+
+def test_times_may_come_before_and_after_the_sound_and_in_parts() -> None:
+    known = Clips()
+    known.tell(told(clip="c", words=[{"start": 0, "text": "Hi"}], final=False))
+    known.take(ClipPiece("c", 0, RATE, SOUND.tobytes()))
+    assert not known.recordings, "more is to be told"
+    known.tell(told(clip="c", words=[{"start": 0.5, "end": 0.9, "text": "you"}]))
+    recording = known.recordings["c"]
+    assert [(w.start, w.end, w.text) for w in recording.words] == [(0, 0.5, "Hi"), (0.5, 0.9, "you")]
+    assert recording.text == "Hi you"
+    known.tell(told(clip="c", visemes=[{"start": 0.2, "viseme": "PP"}, {"start": 0.3, "viseme": "sil"}]))
+    assert [(p.start, p.ipa) for p in known.recordings["c"].phonemes] == [(0.2, "p"), (0.3, "")]
+    assert known.recordings["c"].words == (), "what is told anew replaces what was told"
+
+
+def test_a_clip_that_begins_anew_is_another() -> None:
+    known = Clips()
+    known.take(ClipPiece("c", 0, RATE, SOUND.tobytes()))
+    known.tell(told(clip="c", text="Hello"))
+    known.take(ClipPiece("c", 0, RATE, SOUND[:80].tobytes()))
+    assert len(known.recordings["c"].pcm) == 80
+    assert known.recordings["c"].text is None
+
+
+@pytest.mark.parametrize(
+    ("piece", "says"),
+    [
+        (ClipPiece("c", 1, RATE, b"ab"), "wanted piece 0, got 1"),
+        (ClipPiece("c", 0, 7, b"ab"), "got 7"),
+        (ClipPiece("c", 0, RATE, b"abc"), "two bytes"),
+        (ClipPiece("c", 0, RATE, b""), "wanted sound"),
+        (ClipPiece("c", 0, 0, b"no sound at all"), "wanted"),
+    ],
+)
+def test_a_piece_that_cannot_be_used_says_why(piece, says) -> None:
+    known = Clips()
+    with pytest.raises(ClipError, match=says) as error:
+        known.take(piece)
+    assert error.value.where == "clip:c"
+    assert not known.recordings
+
+
+def test_too_much_sound_is_refused_and_the_oldest_clips_make_room(monkeypatch) -> None:
+    monkeypatch.setattr(audio_clips, "MOST_BYTES", 100)
+    known = Clips()
+    known.take(ClipPiece("a", 0, RATE, bytes(60)))
+    known.take(ClipPiece("b", 0, RATE, bytes(60)))
+    assert list(known.recordings) == ["b"]
+    known.take(ClipPiece("c", 0, RATE, bytes(30), final=False))
+    with pytest.raises(ClipError, match="at most 100 bytes"):
+        known.take(ClipPiece("c", 1, RATE, bytes(90)))
+
+
+@pytest.mark.parametrize(
+    ("fields", "where"),
+    [
+        ({"words": [{"start": 1, "text": "a"}, {"start": 0, "text": "b"}]}, "speech.words"),
+        ({"visemes": [{"start": 0, "viseme": "PPP"}]}, "speech.visemes"),
+        ({"visemes": [{"start": 0, "viseme": 1}], "viseme_set": "mine"}, "speech.visemes"),
+    ],
+)
+def test_times_that_cannot_be_used_say_where(fields, where) -> None:
+    with pytest.raises(ClipError) as error:
+        Clips().tell(told(clip="c", **fields))
+    assert error.value.where == where
+
+
+# over a WebSocket ------------------------------------------------------------------------------------------
+
+
+def play(*messages, until: str = "b:end", **settings) -> list:
+    """What a service of its own sends up to a block progress."""
+    got: list = []
+
+    async def run() -> None:
+        async with (
+            asyncio.timeout(30),
+            Server(Settings(port=0, voice="silent", **settings)) as server,
+            connect(server.url, max_size=None) as socket,
+        ):
+            for message in messages:
+                await socket.send(json.dumps(message) if isinstance(message, dict) else message)
+            async for message in socket:
+                got.append(message)
+                if isinstance(message, str) and f'id="{until}"' in message:
+                    return
+
+    asyncio.run(run())
+    return got
+
+
+def feedback(messages: list) -> list:
+    return [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
+
+
+def test_a_document_speaks_a_clip_with_the_times_that_were_told() -> None:
+    got = play(
+        {"type": "subscribe", "stream": "audio", "rate": RATE},
+        pack_clip(ClipPiece("c1", 0, RATE, SOUND[:5000].tobytes(), final=False)),
+        pack_clip(ClipPiece("c1", 1, RATE, SOUND[5000:].tobytes())),
+        {
+            "type": "speech",
+            "clip": "c1",
+            "words": [{"start": 0.1, "end": 0.4, "text": "One"}, {"start": 0.62, "end": 0.9, "text": "two"}],
+        },
+        SPEAK.format('<text>One <sync id="m"/>two</text>', "c1"),
+    )
+    told = feedback(got)
+    assert not [f for f in told if isinstance(f, WarningFeedback)]
+    times = {f.id: f.time for f in told if isinstance(f, SyncPointProgress)}
+    assert times["b:s:m"] == pytest.approx(0.62, abs=1e-3)
+    assert times["b:s:end"] == pytest.approx(1.0, abs=1e-6)
+    packets = [unpack(m) for m in got if isinstance(m, bytes)]
+    start = next(f for f in told if isinstance(f, BlockProgress)).global_time
+    late = packets[1]  # the first one has silence before the start, or comes when the start is past
+    assert late.kind is FrameKind.SOUND
+    first = round(late.time * RATE) - round(start * RATE)
+    assert np.array_equal(late.values, SOUND[first : first + len(late.values)])
+
+
+def test_visemes_of_another_voice_close_the_lips_when_they_say_so() -> None:
+    visemes = [{"start": 0, "viseme": 2}, {"start": 0.5, "viseme": 21}, {"start": 0.6, "viseme": 2}]
+    got = play(
+        {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 50},
+        pack_clip(ClipPiece("c", 0, RATE, SOUND.tobytes())),
+        {"type": "speech", "clip": "c", "visemes": visemes, "viseme_set": "sapi"},
+        SPEAK.format("", "c"),
+        idle=False,
+    )
+    start = next(f for f in feedback(got) if isinstance(f, BlockProgress)).global_time
+    frames = [json.loads(m) for m in got if isinstance(m, str) and m.startswith('{"type":"fap"')]
+    gap = {round(f["time"] - start, 2): -f["values"][3] - f["values"][4] for f in frames}
+    closed = [t for t, value in gap.items() if 0.1 < t < 0.9 and value <= 0]
+    assert closed
+    assert all(0.42 < t < 0.68 for t in closed)
+
+
+def test_a_clip_of_which_nobody_tells_opens_the_jaw_as_it_is_loud() -> None:
+    sound = SOUND * (np.arange(RATE) < RATE // 2)
+    got = play(
+        {"type": "subscribe", "stream": "fap", "encoding": "json", "fps": 25},
+        pack_clip(ClipPiece("c", 0, 0, wav(sound.astype("<i2")))),
+        SPEAK.format("", "c"),
+        idle=False,
+    )
+    start = next(f for f in feedback(got) if isinstance(f, BlockProgress)).global_time
+    frames = [json.loads(m) for m in got if isinstance(m, str) and m.startswith('{"type":"fap"')]
+    jaw = {f["time"] - start: f["values"][2] for f in frames}
+    assert max(value for t, value in jaw.items() if t < 0.5) > 100
+    assert max(value for t, value in jaw.items() if 0.75 < t < 1.0) < 20
+
+
+def test_what_cannot_be_used_is_an_error_and_a_warning_and_the_connection_lives() -> None:
+    got = play(
+        pack_clip(ClipPiece("c", 3, RATE, SOUND.tobytes())),
+        b"\x01\x01 no clip, but a header as long as one",
+        SPEAK.format("", "c"),
+        SPEAK.format("<text>Hello</text>", "c").replace('id="b"', 'id="b2"'),
+        until="b2:end",
+    )
+    errors = [json.loads(m) for m in got if isinstance(m, str) and m.startswith("{")]
+    assert [(e["code"], e.get("where")) for e in errors] == [("clip", "clip:c"), ("unsupported", None)]
+    warnings = {f.id: f for f in feedback(got) if isinstance(f, WarningFeedback)}
+    assert "wanted a clip that was sent to its last piece" in warnings["b:s"].text
+    assert "clip:c" in warnings["b2:s"].text, "it is spoken all the same"

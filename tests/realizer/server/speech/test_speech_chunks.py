@@ -1,0 +1,105 @@
+"""A piece of a speech as a block: syncs, SSML, behaviours where they stand."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bml_schema import Block, write
+from realizer.server.speech.speech_chunks import Piece, clip_block, text_block
+
+PIECE = Piece("turn", 2)
+
+
+def said(block: Block) -> str:
+    return str(block["turn"].text)
+
+
+def test_a_text_is_a_speech_with_its_syncs() -> None:
+    block = text_block('R&D, 1 < 2: <sync id="m"/>"so &amp; so".', PIECE)
+    assert block.id == "turn.2"
+    assert said(block) == 'R&D, 1 < 2: "so & so".'
+    assert block["turn"].marked == ("m",)
+    assert block["turn"].descriptions == ()
+    assert block.problems == ()
+
+
+def test_a_behaviour_without_references_starts_where_it_stands() -> None:
+    block = text_block('<head lexeme="NOD"/>Yes <faceLexeme lexeme="SMILE"/>indeed.', PIECE)
+    nod, smile = block["b1"], block["b2"]
+    assert nod.syncs["start"].offset == 0
+    (mark,) = block["turn"].marked
+    assert (smile.syncs["start"].behaviour, smile.syncs["start"].sync) == ("turn", mark)
+    assert said(block) == "Yes indeed."
+
+
+def test_a_behaviour_with_references_is_taken_as_it_is() -> None:
+    block = text_block('Yes <sync id="m"/>indeed. <head id="n" lexeme="NOD" stroke="turn:m"/>', PIECE)
+    assert list(block["n"].syncs) == ["stroke"]
+    assert block["turn"].marked == ("m",)
+
+
+def test_a_reference_to_an_earlier_piece_finds_its_block() -> None:
+    piece = Piece("turn", 3, marks={"m": "turn.1"})
+    block = text_block('And <head id="n" lexeme="NOD" start="turn:m + 1" end="turn:end"/>so.', piece)
+    assert (block["n"].syncs["start"].block, block["n"].syncs["start"].offset) == ("turn.1", 1)
+    assert block["n"].syncs["end"].block is None
+
+
+def test_ssml_goes_to_the_voice_and_unknown_tags_nowhere() -> None:
+    block = text_block('A <b>bold</b> <emphasis level="strong">word</emphasis> <sync id="m"/>here', PIECE)
+    (description,) = block["turn"].descriptions
+    assert '<emphasis level="strong">word</emphasis>' in description.content
+    assert 'name="m"' in description.content
+    assert "bold" in description.content
+    assert said(block) == "A bold word here"
+
+
+def test_elements_with_an_inside_and_with_prefixes_are_read() -> None:
+    block = text_block(
+        'Oh <face><faceLexeme lexeme="SMILE"/></face>no <realizer:emotion name="joy"/>yes', PIECE
+    )
+    assert {node.id for node in block.behaviours} == {"turn", "b1", "b2"}
+    assert block.problems == ()
+
+
+def test_behaviours_alone_are_a_block_without_speech() -> None:
+    block = text_block(' <head id="n" lexeme="NOD"/> ', PIECE)
+    assert [node.id for node in block.behaviours] == ["n"]
+
+
+@pytest.mark.parametrize(
+    "text", ["<head lexeme='NOD'>Well", "<emphasis>Well", "Well</p>", "<x:head y='1'/>Well"]
+)
+def test_what_is_no_xml_is_spoken_without_its_tags(text) -> None:
+    assert said(text_block(text, PIECE)).strip() == "Well"
+
+
+def test_character_and_language_are_told() -> None:
+    block = text_block("Ja", Piece("turn", 1, character="Eva", language="de"))
+    assert block.character_id == "Eva"
+    assert block["turn"].text.language == "de"
+
+
+def test_a_clip_is_a_speech_too() -> None:
+    assert 'fileName="clip:c1"' in write(clip_block("c1", PIECE))
+
+
+@given(st.text(alphabet='ab<>/="&;sync \x00\ud800', max_size=60))
+def test_any_text_gives_a_block(text) -> None:
+    assert text_block(text, PIECE).id == "turn.2"
+
+
+@pytest.mark.parametrize("syncs", ['<sync id=""/>', '<sync id="m"/>some <sync id="m"/>', '<sync id="a b"/>'])
+def test_a_sync_that_cannot_be_is_told_and_costs_no_word(syncs: str) -> None:
+    block = text_block(f'Have {syncs}tea <head id="n" lexeme="NOD" start="1"/>here.', PIECE)
+    assert said(block).split()[-2:] == ["tea", "here."]
+    assert ["/sync[" in p.path or "sync" in p.text for p in block.problems] == [True]
+    assert block["n"].syncs["start"].offset == 1
+
+
+@pytest.mark.parametrize("tag", ['<sync id="m', "<sync", "</prosody", '<realizer:emotion name="joy'])
+def test_a_tag_that_breaks_off_is_not_spoken(tag: str) -> None:
+    assert said(text_block(f"Good morning. {tag}", PIECE)).strip() == "Good morning."
+    assert said(text_block("Is a <b?", PIECE)) == "Is a <b?"

@@ -1,0 +1,435 @@
+"""A speech that comes piece by piece: heard as it comes, syncs and behaviours in time, cut off at once."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from websockets.asyncio.client import connect
+
+from bml_schema.feedback import (
+    BlockProgress,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+    parse_feedback,
+)
+from realizer.core.settings import Settings
+from realizer.protocol.wire import ClipPiece, FrameKind, pack_clip, unpack
+from realizer.server.serve import Server
+from realizer.server.session.effects import Effect, Speak
+from realizer.server.speech import speech_streams
+from realizer.speech import SilentVoice
+from realizer.speech.duration_fit import fitted
+from realizer.speech.utterance import Phoneme, Utterance, Word
+from tests.realizer.server.conftest import RATE, Client, Driver
+
+EACH = 0.5  # s a piece
+
+
+class Talker(Driver):
+    """A voice that says each piece in half a second, with words and marks evenly spread."""
+
+    def do(self, effect: Effect) -> None:
+        if not isinstance(effect, Speak) or self.mute:
+            super().do(effect)
+            return
+        self.spoken.append(effect)
+        self.session.spoken(effect.id, said(effect), self.opened + self.now)
+        self.collect()
+
+    def append(self, text: str = "", **more) -> Client:
+        return self.send({"type": "speech", "id": "turn", "append": text, **more})
+
+
+def said(order: Speak) -> Utterance:
+    if order.say.recording is not None:
+        return fitted(SilentVoice(), order.say)
+    silent = SilentVoice().say(order.say)
+    part = EACH / (silent.duration or 1.0)
+    ends = np.linspace(0, EACH, len(silent.words) + 1)
+    words = tuple(Word(*span, w.text) for *span, w in zip(ends, ends[1:], silent.words, strict=False))
+    marks = {name: time * part for name, time in silent.marks.items()}
+    pcm = (np.arange(round(EACH * RATE)) % 20000 + 100).astype(np.int16)
+    return Utterance(EACH, words, (), marks, RATE, pcm)
+
+
+def times(client: Client) -> dict[str, float]:
+    """When everything that was told of happened."""
+    told = (f for f in client.feedback if isinstance(f, BlockProgress | SyncPointProgress))
+    return {f.id: f.global_time for f in told}
+
+
+def texts(driver: Driver) -> list[str]:
+    return [order.say.ssml.strip() for order in driver.spoken]
+
+
+def test_a_sentence_is_heard_when_it_is_whole_and_the_next_follows_it() -> None:
+    driver = Talker()
+    for token in ("Hel", "lo the", "re.", " How are", " you", "?"):
+        driver.append(token)
+        driver.run(driver.now + 0.1)
+    assert texts(driver) == ["Hello there."]
+    driver.append(close=True)
+    at = times(driver.run(5))
+    assert texts(driver) == ["Hello there.", "How are you?"]
+    assert at["turn:start"] == 0
+    assert at["turn.1:start"] == pytest.approx(0.3)
+    assert at["turn.2:start"] == pytest.approx(at["turn.1:end"])
+    assert at["turn:end"] == pytest.approx(at["turn.2:end"], abs=2e-3)
+    assert list(at)[-1] == "turn:end"
+
+
+def test_a_text_that_comes_late_is_said_when_it_comes() -> None:
+    driver = Talker()
+    driver.append("One. ")
+    driver.run(3.0)
+    driver.append("Two.", close=True)
+    at = times(driver.run(9))
+    assert at["turn.2:start"] == pytest.approx(3.0)
+    assert at["turn:end"] == pytest.approx(3.5, abs=2e-3)
+
+
+def test_behaviours_and_syncs_in_the_text_come_at_their_place() -> None:
+    driver = Talker()
+    driver.append('One. Yes <sync id="m"/>two <head lexeme="NOD"/>three. ')
+    driver.append('Four <head id="n" lexeme="NOD" stroke="turn:m + 1"/>five.', close=True)
+    at = times(driver.run(9))
+    assert 0.5 < at["turn.2:turn:m"] < at["turn.2:b1:start"] < 1.0
+    assert at["turn.3:n:stroke"] == pytest.approx(at["turn.2:turn:m"] + 1)
+
+
+def test_a_document_names_a_sync_of_the_speech_before_and_after_it_has_come() -> None:
+    driver = Talker()
+    driver.append("One. ")
+    for n in (1, 2):
+        driver.send(f'<bml id="b{n}"><head id="n" lexeme="NOD" stroke="turn:turn:m"/></bml>')
+        assert [b["status"] for b in driver.send({"type": "state"}).of("state")[-1]["blocks"]][-1] == (
+            "IN_PREP" if n == 1 else "IN_EXEC"
+        )
+        if n == 1:
+            driver.append('Two words more <sync id="m"/>here.', close=True)
+    at = times(driver.run(9))
+    assert at["b1:n:stroke"] == at["b2:n:stroke"] == pytest.approx(at["turn.2:turn:m"])
+
+
+def test_a_sync_that_never_comes_costs_what_names_it_and_nothing_else() -> None:
+    driver = Talker()
+    driver.append("One. ")
+    driver.send(
+        '<bml id="b"><head id="n" lexeme="NOD" stroke="turn:turn:m"/><wait id="w" duration="1"/></bml>'
+    )
+    driver.append("Two.", close=True)
+    client = driver.run(9)
+    at = times(client)
+    assert "b:w:end" in at
+    assert "b:n:stroke" not in at
+    assert "turn:end" in at
+
+
+def test_a_speech_that_ends_without_a_word_is_no_fault() -> None:
+    driver = Talker()
+    told = [*driver.send({"type": "speech", "id": "turn", "close": True}).feedback, *driver.run(1).feedback]
+    assert [f.status for f in told if isinstance(f, BlockProgress) and f.id == "turn:end"] == ["DONE"]
+    assert not [f for f in told if isinstance(f, WarningFeedback)]
+
+
+def test_others_follow_the_speech_as_one_block() -> None:
+    driver = Talker()
+    driver.append("One. ")
+    driver.send('<bml id="after" composition="APPEND"><wait id="w" duration="1"/></bml>')
+    driver.send('<bml id="with"><wait id="w" start="turn:turn:end" duration="1"/></bml>')
+    driver.append("Two.", close=True)
+    at = times(driver.run(9))
+    assert at["after:start"] == pytest.approx(at["turn:end"])
+    assert at["with:w:start"] == pytest.approx(at["turn:end"])
+
+
+def test_a_speech_follows_what_plays_and_its_pieces_too() -> None:
+    driver = Talker()
+    driver.send('<bml id="first"><wait id="w" duration="2"/></bml>')
+    driver.append("One. Two.", close=True)
+    at = times(driver.run(9))
+    assert at["turn:start"] == at["turn.1:start"] == pytest.approx(2.0)
+    driver.append("Three.", close=True, composition="MERGE")
+    assert driver.run(12).feedback[-1].id == "turn:end"
+
+
+def test_a_long_text_is_made_a_few_pieces_ahead_and_all_of_it_is_said() -> None:
+    driver = Talker(max_blocks=12)
+    driver.append("".join(f"This is {n}. " for n in range(40)), close=True)
+    assert len(driver.spoken) == speech_streams.AHEAD
+    at = times(driver.run(30))
+    assert texts(driver) == [f"This is {n}." for n in range(40)]
+    ends = [at[f"turn.{n}:end"] for n in range(1, 41)]
+    assert np.allclose(np.diff(ends), EACH, atol=1e-3), "no gaps"
+    assert at["turn:end"] == pytest.approx(20.0, abs=2e-3)
+
+
+def test_between_the_pieces_of_a_sentence_is_the_pause_of_a_comma() -> None:
+    class Slow(Talker):
+        """A voice that ends whatever it says as it ends a sentence."""
+
+        def do(self, effect: Effect) -> None:
+            if isinstance(effect, Speak):
+                self.spoken.append(effect)
+                pause = (Phoneme(0.0, EACH - 0.4, "a"), Phoneme(EACH - 0.4, EACH, ""))
+                answer = replace(said(effect), phonemes=pause)
+                self.session.spoken(effect.id, answer, self.opened + self.now)
+                self.collect()
+            else:
+                super().do(effect)
+
+    driver = Slow()
+    driver.append("When all of them had come to the old house, they sat down. Then, ", close=True)
+    at = times(driver.run(9))
+    assert [t[-3:] for t in texts(driver)] == ["se,", "wn.", "en,"]
+    assert at["turn.1:end"] - at["turn.1:start"] == pytest.approx(EACH - 0.4 + 0.15, abs=1e-3)
+    assert at["turn.2:end"] - at["turn.2:start"] == pytest.approx(EACH)
+    assert at["turn.3:end"] - at["turn.3:start"] == pytest.approx(EACH), "nothing follows the last one"
+
+
+def test_the_end_is_told_as_soon_as_it_is_known() -> None:
+    driver = Talker()
+    driver.append("One. Two.")
+    driver.append(close=True)
+    told = [
+        b.global_end
+        for f in driver.clients[1].feedback
+        if isinstance(f, PredictionFeedback)
+        for b in f.blocks
+        if b.id == "turn" and b.global_end is not None
+    ]
+    assert told[-1] == pytest.approx(1.001, abs=1e-3)
+
+
+CUTS = [
+    {"type": "stop", "blocks": ["turn"]},
+    {"type": "stop"},
+    '<bml id="i"><bmla:interrupt xmlns:bmla="http://www.asap-project.org/bmla" id="x" target="turn"/></bml>',
+    '<bml id="i" composition="REPLACE"><head id="n" lexeme="NOD"/></bml>',
+]
+
+
+@pytest.mark.parametrize("how", CUTS)
+def test_an_interruption_stops_the_sound_in_50_ms_says_what_was_said_and_lets_nothing_follow(how) -> None:
+    driver = Talker()
+    driver.send({"type": "subscribe", "stream": "audio", "rate": RATE})
+    driver.append("One two three. Four five six. Seven eight. ")
+    driver.run(0.85)
+    driver.send(how)
+    driver.append("And more of it. ")
+    driver.append("And more. ", close=True)
+    client = driver.run(6.0)
+    heard = np.zeros(RATE * 6)
+    for frame in (f for f in client.frames if f.kind is FrameKind.SOUND):
+        first = round(frame.time * RATE)
+        heard[first : None if frame.forget else first + len(frame.values)] = (
+            0 if frame.forget else frame.values
+        )
+    assert heard[round(0.8 * RATE) : round(0.84 * RATE)].all()
+    assert not heard[round(0.9 * RATE) :].any()
+    end = next(f for f in client.feedback if getattr(f, "id", "") == "turn:end")
+    assert (end.status, end.global_time) == ("INTERRUPTED", pytest.approx(0.85))
+    assert end.said == "One two three Four five"
+    assert end.last_word == "five"
+    assert len(driver.spoken) == 3, "what came later was not spoken"
+    assert not [b for b in driver.send({"type": "state"}).of("state")[-1]["blocks"] if b["id"] != "i"]
+    driver.append("Again.", close=True)
+    assert "turn:end" in [getattr(f, "id", "") for f in driver.run(9.0).feedback[-1:]]
+
+
+def test_the_face_of_an_interrupted_speech_relaxes() -> None:
+    driver = Talker(idle=False)
+    driver.append('<faceLexeme lexeme="SMILE" end="turn:end"/>One two three. Four five six. ')
+    driver.run(0.3)
+    assert driver.session.player.frames(np.array([0.3])).aus.any()
+    driver.send({"type": "stop"})
+    driver.run(2.0)
+    shown = driver.session.player.frames(np.arange(1.5, 2.0, 0.04))
+    assert not shown.aus.any()
+    assert not shown.faps.any()
+
+
+def test_a_piece_that_was_cut_off_alone_lets_the_others_follow() -> None:
+    driver = Talker()
+    driver.append("One two. Three four. ", close=True)
+    driver.run(0.2)
+    driver.send({"type": "stop", "blocks": ["turn.1"]})
+    at = times(driver.run(5))
+    assert at["turn.2:start"] == pytest.approx(0.2)
+    assert at["turn:end"] == pytest.approx(0.7, abs=2e-3)
+
+
+def test_clips_are_said_between_texts() -> None:
+    driver = Talker()
+    sound = (np.arange(8000) % 9000).astype("<i2").tobytes()
+    driver.session.receive(1, pack_clip(ClipPiece("c", 0, 8000, sound)), driver.opened)
+    driver.collect()
+    driver.append("Listen", clip="c")
+    driver.append("Well?", close=True)
+    at = times(driver.run(5))
+    starts = [at[f"turn.{n}:start"] for n in (1, 2, 3)]
+    assert starts == pytest.approx([0, EACH, EACH + 1.0])
+
+
+def test_whoever_leaves_is_heard_to_the_end_of_what_came() -> None:
+    driver = Talker(named=True)
+    driver.join(2)
+    driver.send({"type": "speech", "id": "turn", "append": "One. Two and"})
+    driver.leave(1)
+    at = times(driver.run(5) and driver.clients[2])
+    assert texts(driver) == ["One.", "Two and"]
+    assert at["turn:end"] == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("messages", "where"),
+    [
+        ([{"append": "One. "}, {"close": True}, {"append": "Two."}], "speech.id"),
+        ([{"clip": "none"}], "speech.clip"),
+        ([{"append": "x" * 30}], "speech.append"),
+    ],
+)
+def test_what_cannot_be_followed_is_an_error_that_says_where(monkeypatch, messages, where) -> None:
+    monkeypatch.setattr(speech_streams, "MOST", 20)
+    driver = Talker()
+    for message in messages:
+        client = driver.send({"type": "speech", "id": "turn", **message})
+    assert [e["where"] for e in client.of("error")] == [where]
+
+
+def test_a_speech_whose_id_is_a_block_that_plays_is_refused_and_says_nothing() -> None:
+    driver = Talker()
+    driver.send('<bml id="turn"><wait id="w" duration="3"/></bml>')
+    driver.append("One. ")
+    driver.append("Two. ", close=True)
+    assert driver.spoken == []
+    driver.append("Three.", close=True)
+    assert driver.run(9).feedback[-1].id == "turn:end"
+
+
+ACTS = st.lists(
+    st.one_of(
+        st.tuples(
+            st.just("append"), st.sampled_from(["One. ", "Two", " three? ", '<sync id="m"/>', "", "..."])
+        ),
+        st.tuples(st.just("close"), st.just("")),
+        st.tuples(st.just("stop"), st.sampled_from(["turn", "turn.1", "turn.2", "b"])),
+        st.tuples(st.just("bml"), st.sampled_from(["turn:turn:m", "turn:turn:end", "turn.1:turn:end"])),
+        st.tuples(st.just("run"), st.sampled_from([0.1, 0.4, 1.0])),
+    ),
+    max_size=20,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(ACTS)
+def test_in_any_order_every_block_that_starts_ends_and_nothing_is_left(acts) -> None:
+    driver = Talker()
+    for act, what in acts:
+        match act:
+            case "append":
+                driver.append(what)
+            case "close":
+                driver.append(close=True)
+            case "stop":
+                driver.send({"type": "stop", "blocks": [what]})
+            case "bml":
+                driver.send(f'<bml id="b"><head id="n" lexeme="NOD" start="{what}"/></bml>')
+            case "run":
+                driver.run(driver.now + float(what))
+    driver.append(close=True)
+    client = driver.run(driver.now + 60)
+    ids = [f.id for f in client.feedback if isinstance(f, BlockProgress)]
+    assert sorted(i[:-6] for i in ids if i.endswith(":start")) == sorted(
+        f.id[:-4]
+        for f in client.feedback
+        if isinstance(f, BlockProgress) and f.id.endswith(":end") and f.status != "REVOKED"
+    )
+    assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []
+    assert not driver.session.player.cast.anticipators  # a session that speaks for days keeps nothing of it
+
+
+async def spoken_over(socket, last: str) -> list[str | bytes]:
+    """Messages up to the block progress `last`."""
+    got: list[str | bytes] = []
+    async for message in socket:
+        got.append(message)
+        if isinstance(message, str) and f'id="{last}"' in message:
+            break
+    return got
+
+
+def streamed(test) -> list[str | bytes]:
+    """What a client got of a service that speaks."""
+
+    async def run() -> list[str | bytes]:
+        async with (
+            asyncio.timeout(60),
+            Server(Settings(port=0, voice="espeak")) as server,
+            connect(server.url) as socket,
+        ):
+            await socket.send(json.dumps({"type": "subscribe", "stream": "audio"}))
+            return await test(socket)
+
+    return asyncio.run(run())
+
+
+def told_at(messages: list[str | bytes]) -> dict[str, float]:
+    told = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
+    return {f.id: f.global_time for f in told if isinstance(f, BlockProgress | SyncPointProgress)}
+
+
+def packets(messages: list[str | bytes]):
+    return [f for f in (unpack(m) for m in messages if isinstance(m, bytes)) if f.kind is FrameKind.SOUND]
+
+
+@pytest.mark.espeak
+def test_a_speech_streams_over_a_websocket() -> None:
+    async def talk(socket) -> list[str | bytes]:
+        for token in ("One ", 'and <sync id="m"/>', "two. ", "And ", "three."):
+            await socket.send(json.dumps({"type": "speech", "id": "turn", "append": token}))
+        await socket.send('<bml id="b"><head id="n" lexeme="NOD" start="turn:turn:m"/></bml>')
+        await socket.send(json.dumps({"type": "speech", "id": "turn", "close": True}))
+        return await spoken_over(socket, "turn:end")
+
+    messages = streamed(talk)
+    at = told_at(messages)
+    assert at["b:n:start"] == pytest.approx(at["turn.1:turn:m"])
+    assert at["turn.2:start"] == pytest.approx(at["turn.1:end"])
+    loud = [f.time for f in packets(messages) if len(f.values) and np.abs(f.values).max() > 1000]
+    assert at["turn.1:start"] - 0.02 < loud[0] < at["turn.1:start"] + 0.15
+    assert loud[-1] < at["turn.2:end"]
+
+
+@pytest.mark.espeak
+def test_a_barge_in_over_a_websocket_leaves_no_sound_50_ms_later() -> None:
+    async def barge_in(socket) -> list[str | bytes]:
+        text = 'Well, <sync id="m"/>this is a rather long sentence, which nobody wants to hear to its end. '
+        await socket.send(json.dumps({"type": "speech", "id": "turn", "append": text * 3}))
+        before = await spoken_over(socket, "turn.1:turn:m")
+        await socket.send(json.dumps({"type": "stop", "blocks": ["turn"]}))
+        before += await spoken_over(socket, "turn:end")
+        await socket.send('<bml id="later"><wait id="w" duration="0.5"/></bml>')
+        return before + await spoken_over(socket, "later:end")
+
+    messages = streamed(barge_in)
+    end = told_at(messages)["turn:end"]
+    played: dict[int, float] = {}  # packet -> when its sound ends, as a client keeps it
+    for packet in packets(messages):
+        if packet.forget:
+            played = {frame: until for frame, until in played.items() if frame < packet.frame}
+        if len(packet.values):
+            last = np.flatnonzero(np.append(1, packet.values))[-1]
+            played[packet.frame] = packet.time + last / RATE
+    assert played, "it was heard"
+    assert max(played.values()) < end + 0.05
+    feedback = [parse_feedback(m) for m in messages if isinstance(m, str) and m.startswith("<")]
+    (told,) = (f for f in feedback if getattr(f, "id", "") == "turn:end")
+    assert (told.status, (told.said or "").split()[:1]) == ("INTERRUPTED", ["Well"])

@@ -1,0 +1,140 @@
+"""Bytes of a stream become documents, however they are cut into reads and whatever else comes with them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.server.transports.document_framing import Assembler, Fault
+
+LIMIT = 300
+NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
+
+
+def assemble(data: bytes | str, *, limit: int = LIMIT, step: int | None = None) -> list[str | Fault]:
+    data = data.encode() if isinstance(data, str) else data
+    assembler = Assembler(limit)
+    reads = [data] if step is None else [data[n : n + step] for n in range(0, len(data), step)]
+    return [found for read in reads for found in assembler.feed(read)]
+
+
+WHOLE = {
+    "plain": NOD,
+    "empty": '<bml id="b"/>',
+    "prefix": '<b:bml xmlns:b="urn:x" id="b"><b:wait id="w"/></b:bml>',
+    "lines": '<bml\n  id="b"\n>\n<wait\r\nid="w"/>\n</bml\n>',
+    "end tag in CDATA": '<bml id="b"><text><![CDATA[</bml> <bml id="x">]]></text></bml>',
+    "end tag in a comment": '<bml id="b"><!-- </bml> <bml> --><wait id="w"/></bml>',
+    "end tag in an instruction": '<bml id="b"><?x </bml>?></bml>',
+    "greater than in a value": """<bml id="a>b/>" x='"/>'><wait id="w"/></bml>""",
+    "other elements whose names begin alike": '<bml id="b"><bmlx></bmlx><x:bml-y/></bml>',
+    "letters of two bytes": '<bml id="é"><speech id="s"><text>Größe 😀</text></speech></bml>',
+}
+BETWEEN = {
+    "nothing": "",
+    "blanks": " \t\r\n\r\n",
+    "mark of order": "\ufeff",
+    "declaration": '<?xml version="1.0" encoding="UTF-8"?>\n',
+    "comment": "<!-- <bml> -- > -->",
+    "doctype": '<!DOCTYPE bml SYSTEM "bml.dtd">',
+    "doctype with subset": '<!DOCTYPE bml [<!ELEMENT bml ANY> <!ATTLIST bml id CDATA "x">\n ] >',
+}
+
+
+@pytest.mark.parametrize("document", WHOLE.values(), ids=WHOLE)
+@pytest.mark.parametrize("between", BETWEEN.values(), ids=BETWEEN)
+@pytest.mark.parametrize("step", [None, 1, 7])
+def test_documents_come_out_as_they_were_sent(document: str, between: str, step: int | None) -> None:
+    stream = between + document + between + document + "\n"
+    assert assemble(stream, step=step) == [document, document]
+
+
+BROKEN = {
+    "stray text": ("hello\n", "got 'hello'"),
+    "another element": ("<act>\n<fml/>\n</act>", "got '<act>'"),
+    "an end tag": ("</bml>", "got </bml> without <bml"),
+    "a document without its end": ('<bml id="x"><head', "before the next <bml"),
+    "a start tag without its end": ('<bml id="x" ', "before the next <bml"),
+    "a value without its end": ('<bml id="x', "before the next <bml"),
+    "many of them": ("<bml>" * 100, "before the next <bml"),
+    "a large document": (f'<bml id="x">{"y" * LIMIT}</bml>', f"at most {LIMIT} bytes"),
+    "a large document without its end": (f'<bml id="x">{"y" * LIMIT}', f"at most {LIMIT} bytes"),
+    "a comment without its end": (f"<!-- {'y' * LIMIT}", "wanted an end of <!--"),
+    "a comment without its end in a document": (f'<bml id="x"><!-- {"y" * LIMIT}', f"at most {LIMIT} bytes"),
+    "a doctype without its end": ("<!DOCTYPE bml", "wanted an end of <!DOCTYPE"),
+    "a subset without its end": (f"<!DOCTYPE bml [{'y' * LIMIT}", "wanted an end of <!DOCTYPE"),
+    "bytes that are no UTF-8": (b'<bml id="x">\xff</bml>', "got the byte 0xFF"),
+    "bytes that are nothing": (b"\x00\x01\xfe<\xff<<\n", "wanted <bml>"),
+    "CDATA outside": ("<![CDATA[ <bml> ]]>", "outside a document"),
+}
+
+
+@pytest.mark.parametrize("step", [None, 1, 5])
+@pytest.mark.parametrize(("stretch", "says"), BROKEN.values(), ids=BROKEN)
+def test_a_broken_stretch_is_told_of_once_and_reading_goes_on(
+    stretch: str | bytes, says: str, step: int | None
+) -> None:
+    raw = stretch.encode() if isinstance(stretch, str) else stretch
+    fault, *documents = assemble(raw + NOD.encode() + b"\n" + NOD.encode(), step=step)
+    assert isinstance(fault, Fault)
+    assert says in fault.text
+    assert fault.block == ("x" if b'id="x"' in raw else None)
+    assert documents == [NOD, NOD]
+
+
+def test_the_end_tag_of_a_document_that_was_given_up_is_no_second_fault() -> None:
+    found = assemble(f'<bml id="x"> {NOD} </bml> {NOD}')
+    assert [type(f) for f in found] == [Fault, str, str]
+
+
+def test_half_a_document_gives_nothing_yet() -> None:
+    assembler = Assembler(LIMIT)
+    assert assembler.feed(NOD[:-1].encode()) == []
+    assert assembler.feed(b">") == [NOD]
+
+
+PIECES = [
+    *WHOLE.values(),
+    *BETWEEN.values(),
+    *(s if isinstance(s, str) else s.decode("latin-1") for s, _ in BROKEN.values()),
+    *("<", ">", '"', "'", "/", "-->", "]]>", "?>", "]", "<bml", "</bml", "bml", ":", "\n", "x" * 61),
+]
+
+
+@given(st.lists(st.sampled_from(PIECES), max_size=8), st.lists(st.integers(0, 400), max_size=30))
+def test_how_a_stream_is_cut_changes_nothing(pieces: list[str], cuts: list[int]) -> None:
+    data = "".join(pieces).encode("latin-1", "replace")
+    assembler = Assembler(LIMIT)
+    found: list[str | Fault] = []
+    at = 0
+    for cut in cuts:
+        found += assembler.feed(data[at : at + cut])
+        at += cut
+    found += assembler.feed(data[at:])
+    assert found == assemble(data) == assemble(data, step=1)
+
+
+@given(st.binary(max_size=600))
+def test_bytes_of_any_kind_do_not_keep_the_next_document_away(garbage: bytes) -> None:
+    stream = garbage + b"\n" + NOD.encode() * 20  # one of them ends whatever the garbage began
+    assert assemble(stream)[-1] == NOD
+
+
+def test_what_is_kept_is_bounded_by_the_limit() -> None:
+    assembler = Assembler(1000)
+    for junk in (b"x" * 999, b"<bml>" * 200, b"<!--" + b"y" * 900, b'<bml id="b">' + b"z" * 900, b"<" * 999):
+        for _ in range(50):
+            assembler.feed(junk)
+            assert len(assembler._data) <= 3000
+
+
+@pytest.mark.parametrize("inside", ["{}", "<!--{}-->", "<![CDATA[{}]]>", "<?x {}?>", '<wait id="{}"/>'])
+def test_a_document_that_drips_in_is_not_read_again_from_its_start(inside: str) -> None:
+    data = f'<bml id="{"v" * 2000}">{inside.format("ab < ]] -- ? " * 200)}</bml>'.encode()
+    assembler = Assembler(2**20)
+    for n in range(len(data) - 1):
+        assert assembler.feed(data[n : n + 1]) == []
+        # What the next byte makes it look at again: never more than the longest mark.
+        assert len(assembler._data) - assembler._here <= 80
+    assert assembler.feed(data[-1:]) == [data.decode()]

@@ -1,0 +1,75 @@
+"""A client is in a session from its greeting to its end, or is told why it is not."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+from pathlib import Path
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from realizer.core.settings import Settings
+from realizer.server.journal import JournalError
+from realizer.server.serve import Server
+
+LIMIT = 30  # s
+TOKEN = "a-token-of-many-letters-and-0123456789"
+
+
+def closed(url: str, *messages: str, **settings: object) -> tuple[list[str], int, str]:
+    """What a client that says this is told before it is let go of, and the code and the reason of that."""
+
+    async def run() -> tuple[list[str], int, str]:
+        told: list[str] = []
+        here = Settings(port=0, voice="silent", **settings)  # type: ignore[arg-type]
+        async with asyncio.timeout(LIMIT), Server(here) as server, connect(server.url + url) as client:
+            for message in messages:
+                await client.send(message)
+            with contextlib.suppress(ConnectionClosed):
+                while True:
+                    told.append(str(await client.recv()))
+        return told, client.close_code or 0, client.close_reason or ""
+
+    return asyncio.run(run())
+
+
+def test_who_says_something_else_before_its_token_is_told_what_was_wanted() -> None:
+    (error,), code, reason = closed("?session=s", '{"type": "ping"}', token=TOKEN)
+    assert (json.loads(error)["code"], json.loads(error)["where"]) == ("token", "hello.token")
+    assert code == 1008
+    assert reason.startswith("token: wanted")
+
+
+def test_who_comes_to_a_session_that_cannot_be_read_is_told_to_come_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(self: object, session: str) -> None:
+        raise JournalError("the disk does not answer")
+
+    monkeypatch.setattr("realizer.server.journal.sqlite_journal.LocalJournal.take", broken)
+    told, code, reason = closed("?session=s", journal=str(tmp_path / "journal.db"))
+    assert (told, code, reason) == ([], 1013, "the disk does not answer")
+
+
+def test_a_visit_is_logged_from_its_beginning_to_its_end(caplog: pytest.LogCaptureFixture) -> None:
+    async def run() -> None:
+        here = Settings(port=0, voice="silent")
+        async with (
+            asyncio.timeout(LIMIT),
+            Server(here) as server,
+            connect(f"{server.url}?session=show") as client,
+        ):
+            await client.send('{"type": "ping"}')
+            await client.recv()
+            await client.close()
+
+    with caplog.at_level(logging.INFO, "realizer.server.transports.websocket.connection"):
+        asyncio.run(run())
+    joined, left = (r for r in caplog.records if r.name == "realizer.server.transports.websocket.connection")
+    assert (joined.message, left.message) == ("joined", "left")
+    assert (joined.session, joined.address) == ("show", "127.0.0.1")  # type: ignore[attr-defined]
+    assert (left.session, left.code) == ("show", 1000)  # type: ignore[attr-defined]

@@ -1,0 +1,52 @@
+"""What an HTTP request says is read once, and answers say what browsers must know."""
+
+from __future__ import annotations
+
+import pytest
+from websockets.datastructures import Headers
+from websockets.http11 import Request
+
+from realizer.server.http.http_site import Answer
+from realizer.server.runtime.session_registry import HubError
+from realizer.server.transports.websocket.request import headers_of, query_of, response_to, session_of
+
+
+def request(path: str, **headers: str) -> Request:
+    return Request(path, Headers(headers))
+
+
+@pytest.mark.parametrize(
+    ("query", "session", "seen"),
+    [
+        ("", None, None),
+        ("?session=show", "show", None),
+        ("?session=show&seen=0", "show", 0),
+        ("?session=a&session=b&seen=1&seen=12", "b", 12),
+        ("?session=", None, None),
+        ("?token=x&session=a%20b", "a b", None),
+    ],
+)
+def test_a_session_is_named_in_the_address(query: str, session: str | None, seen: int | None) -> None:
+    assert session_of(request(f"/ws{query}")) == (session, seen)
+
+
+@pytest.mark.parametrize("seen", ["", "abc", "-1", "1.5", "9" * 16])
+def test_a_seen_that_is_no_number_is_refused(seen: str) -> None:
+    with pytest.raises(HubError, match="seen: wanted the number of the last feedback that came") as refused:
+        session_of(request(f"/ws?session=show&seen={seen}"))
+    assert refused.value.status == 400
+
+
+def test_of_several_of_one_name_the_last_counts_and_of_none_there_is_nothing() -> None:
+    assert query_of(request("/metrics?worker=1&worker=&x")) == {"worker": "", "x": ""}
+    several = Headers([("X-One", "1"), ("x-one", "2"), ("Host", "here")])
+    assert headers_of(Request("/", several)) == {"x-one": "2", "host": "here"}
+
+
+def test_an_answer_says_what_it_is_and_closes() -> None:
+    response = response_to(Answer(404, "text/plain", b"no\n", (("Cache-Control", "no-cache"),)))
+    assert (response.status_code, response.reason_phrase, response.body) == (404, "Not Found", b"no\n")
+    assert response.headers["Content-Length"] == "3"
+    assert response.headers["Cache-Control"] == "no-cache"
+    assert response.headers["X-Content-Type-Options"] == "nosniff"
+    assert response.headers["Connection"] == "close"

@@ -1,0 +1,99 @@
+"""What a task brings: a clip, documents, or why neither."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
+from realizer.server.transports.xface.attachments import Empty, Script, prepare
+from realizer.server.transports.xface.wire import Task
+
+MASK = " ".join("1" if fap == 3 else "0" for fap in range(1, 69))
+FAP = f"2.1 x 25 1\n{MASK}\n0 5\n"
+BML = '<bml id="a"><wait id="w" duration="1"/></bml>'
+
+
+def test_an_upload_is_a_clip() -> None:
+    clip = prepare(Task("UPLOAD_FAP", params=(FAP,)), Settings())
+    assert isinstance(clip, FAPClip)
+    assert clip.values[0, 2] == 5
+
+
+def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None:
+    (tmp_path / "x.fap").write_text(FAP)
+    assert isinstance(prepare(Task("LOAD_FAP", params=("x.fap",)), Settings(media=tmp_path)), FAPClip)
+
+
+@pytest.mark.parametrize(
+    ("text", "blocks"),
+    [
+        (BML, ("a",)),
+        (BML + BML.replace('"a"', '"b"'), ("a", "b")),
+        (BML.replace("<", "&lt;").replace(">", "&gt;"), ("a",)),
+        ("<bml" + BML, ("a",)),
+    ],
+)
+@pytest.mark.parametrize("processor", ["BML", " bml\n"])
+def test_a_script_is_documents_and_the_ids_of_their_blocks(
+    text: str, blocks: tuple[str, ...], processor: str
+) -> None:
+    script = prepare(Task("UPLOAD_SCRIPT", params=(text, processor)), Settings())
+    assert isinstance(script, Script)
+    assert script.blocks == blocks
+
+
+@pytest.mark.parametrize("name", ["STOP_PLAYBACK", "RESUME_PLAYBACK", "DANCE"])
+def test_other_tasks_bring_nothing(name: str) -> None:
+    assert prepare(Task(name, params=("x",)), Settings()) is None
+
+
+@pytest.mark.parametrize(
+    ("task", "says"),
+    [
+        (Task("UPLOAD_FAP", params=("hello world",)), "line 1: wanted a header"),
+        (Task("UPLOAD_FAP", params=("2.1 x 25 0\n",)), "wanted frames, got none"),
+        (Task("LOAD_FAP", params=("x.fap",)), "media"),
+        (Task("UPLOAD_SCRIPT", params=(BML, "SMIL-Agent")), "wanted the processor BML, got 'SMIL-Agent'"),
+        (Task("UPLOAD_SCRIPT", params=("<bml/>", "BML")), "wanted BML, got"),
+        (Task("UPLOAD_SCRIPT", params=("x", "BML")), "wanted BML, got"),
+    ],
+)
+def test_what_cannot_be_understood_is_said(task: Task, says: str) -> None:
+    with pytest.raises(RealizerError, match=re.escape(says)) as raised:
+        prepare(task, Settings())
+    assert not isinstance(raised.value, Empty)
+
+
+def test_a_file_that_is_too_long_to_play_is_refused_when_it_comes() -> None:
+    text = "\n".join(["2.1 x 25 500", *(f"{MASK}\n{k} {k}" for k in range(500))])
+    with pytest.raises(
+        RealizerError,
+        match=r"at most 1000 bytes of BML, got 500 frames of 1 FAPs: send parts .REALIZER_MAX_DOCUMENT",
+    ):
+        prepare(Task("UPLOAD_FAP", params=(text,)), Settings(max_document=2024))
+    assert prepare(Task("UPLOAD_FAP", params=(text,)), Settings())
+
+
+def test_a_script_that_is_too_large_is_refused_before_it_is_read() -> None:
+    task = Task("UPLOAD_SCRIPT", params=(BML + BML, "BML"))
+    with pytest.raises(RealizerError, match=r"at most 50 bytes of BML .* .REALIZER_MAX_DOCUMENT"):
+        prepare(task, Settings(max_document=50))
+    with pytest.raises(RealizerError, match=r"at most 3 elements .*, got 4 .REALIZER_MAX_ELEMENTS"):
+        prepare(task, Settings(max_elements=3))
+
+
+def test_a_script_may_be_as_large_as_the_settings_let_it() -> None:
+    large = BML.replace("><wait", f"><!--{'x' * 2**20}--><wait")
+    assert prepare(Task("UPLOAD_SCRIPT", params=(large, "BML")), Settings(max_document=2**21))
+
+
+@pytest.mark.parametrize("name", ["UPLOAD_FAP", "LOAD_FAP", "UPLOAD_SCRIPT"])
+@pytest.mark.parametrize("params", [(), ("",), (" \n",)])
+def test_a_task_without_what_it_should_bring_is_told_apart(name: str, params: tuple[str, ...]) -> None:
+    with pytest.raises(Empty, match="wanted params, got none, or empty ones"):
+        prepare(Task(name, params=params), Settings())

@@ -1,0 +1,258 @@
+"""The Xface player door against a player of the test's own, which reads, answers and shows as that does."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Awaitable, Callable
+
+import pytest
+from websockets.asyncio.client import connect
+
+from realizer.animation.fap.fap_reader import read_fap
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
+from realizer.server.serve import Server
+from realizer.server.transports.xface import player as xface_player
+from realizer.server.transports.xface.player import XfacePlayerDoor
+from realizer.server.transports.xface.server import XfaceDoor
+
+LIMIT = 30  # s; a hung test ends
+CHUNK = 40_000  # bytes that the player reads at once
+TASK = re.compile(
+    r'<task name="(\w+)" ownerId="(\d+)" taskId="(\d+)">(?:<param>(.*)</param>)?</task>\0', re.S
+)
+ERROR = '<notify name="ERROR" ownerId="0" taskId="0" status="7"/>'
+
+
+class Player:
+    """A real socket server. It takes a read for a task, and shows what it loaded only when it is stopped.
+
+    Attributes:
+        shown: the frames that were on its screen, {FAP: value that is not 0}.
+        strays: reads that were no task, or two.
+    """
+
+    def __init__(self) -> None:
+        self.shown: list[dict[int, int]] = []
+        self.strays: list[str] = []
+        self.clients = 0
+        self.greets = True
+        self.answers = True
+        self.news = asyncio.Event()
+        self._loaded: dict[int, int] | None = None
+        self._writers: list[asyncio.StreamWriter] = []
+
+    async def __aenter__(self) -> Player:
+        await self.open(0)
+        return self
+
+    async def open(self, port: int) -> None:
+        self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """As when its window is closed."""
+        self._server.close()
+        for writer in self._writers:
+            writer.transport.abort()
+        self._writers.clear()
+
+    async def until(self, there: Callable[[], bool]) -> None:
+        while not there():
+            self.news.clear()
+            await self.news.wait()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._writers.append(writer)
+        self.clients += 1
+        if self.greets:
+            note = f'<notify name="CONNECTION_OK" ownerId="{self.clients}" taskId="0" status="0"/>\0\0'
+            writer.write(note.encode())
+        self.news.set()
+        while data := await reader.read(CHUNK):
+            found = TASK.fullmatch(data.decode())
+            if found is None:
+                self.strays.append(data.decode())
+                writer.write(ERROR.encode() + b"\0\0")
+            elif self.answers:
+                for status in self._do(found[1], found[4]):
+                    head = f'<notify name="{found[1]}" ownerId="{found[2]}" taskId="{found[3]}"'
+                    writer.write(f'{head} status="{status}"/>\0\0'.encode())
+                    await writer.drain()
+            self.news.set()
+        writer.close()
+
+    def _do(self, name: str, param: str | None) -> tuple[int, ...]:
+        if name == "STOP_PLAYBACK":
+            if self._loaded is not None:
+                self.shown.append(self._loaded)
+            return (1, 3)
+        if name != "UPLOAD_FAP" or param is None:
+            return (1,)
+        try:
+            clip = read_fap(param)
+        except RealizerError:
+            return (1, 7, 3)
+        assert clip.notes == (), clip.notes
+        self._loaded = {fap + 1: int(value) for fap, value in enumerate(clip.values[0]) if value}
+        return (1, 2, 3)
+
+
+def playing(test: Callable[[Server, Player], Awaitable[None]], **settings: object) -> None:
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Player() as player:
+            chosen = Settings(
+                port=0,
+                xface_player=f"127.0.0.1:{player.port}",
+                voice="silent",
+                **({"idle": False, "xface_player_interval": 0.0} | settings),  # type: ignore[arg-type]
+            )
+            async with Server(chosen) as server:
+                await test(server, player)
+
+    asyncio.run(run())
+
+
+async def hold(server: Server, text: str, session: str = "xface-player") -> None:
+    """Let the face of a session hold something."""
+    async with connect(f"{server.url}?session={session}") as client:
+        await client.send(text)
+        await client.send('{"type":"ping"}')
+        while '"pong"' not in str(await client.recv()):
+            pass
+
+
+def test_the_player_shows_what_the_session_s_face_does() -> None:
+    async def test(server: Server, player: Player) -> None:
+        await hold(server, '{"type":"set","faps":{"open_jaw":500,"head_yaw":-9000}}')
+        await player.until(lambda: {3: 500, 49: -9000} in player.shown)
+        await hold(server, '{"type":"set","faps":{"open_jaw":null,"head_yaw":0}}')
+        await player.until(lambda: player.shown[-1] == {})
+        assert player.strays == []
+        assert len(player.shown) > 3, "on the way there it was seen to move"
+
+    playing(test)
+
+
+def test_blocks_play_on_the_player() -> None:
+    async def test(server: Server, player: Player) -> None:
+        nod = '<bml id="b"><head id="n" lexeme="NOD" start="0" end="1"/></bml>'
+        await hold(server, nod)
+        await player.until(lambda: any(frame.get(48, 0) > 3000 for frame in player.shown))
+        assert player.strays == []
+
+    playing(test)
+
+
+def test_it_may_show_another_session() -> None:
+    async def test(server: Server, player: Player) -> None:
+        await hold(server, '{"type":"set","faps":{"open_jaw":500}}', "asap-127.0.0.1")
+        await player.until(lambda: {3: 500} in player.shown)
+
+    playing(test, xface_player_session="asap-127.0.0.1")
+
+
+def test_with_paul_s_interval_the_newest_frame_is_shown() -> None:
+    async def test(server: Server, player: Player) -> None:
+        for value in range(100, 600, 100):
+            await hold(server, f'{{"type":"set","faps":{{"open_jaw":{value}}}}}')
+        await player.until(lambda: {3: 500} in player.shown)
+        assert player.strays == []
+
+    playing(test, xface_player_interval=0.25)
+
+
+def test_the_player_may_be_another_service_of_ours() -> None:
+    async def run() -> None:
+        common = {"port": 0, "voice": "silent", "idle": False}
+        async with asyncio.timeout(LIMIT), Server(Settings(**common, xface_port=0)) as showing:  # type: ignore[arg-type]
+            port = next(door for door in showing.doors if isinstance(door, XfaceDoor)).port
+            pushing = Settings(**common, xface_player=f"127.0.0.1:{port}", xface_player_interval=0.0)  # type: ignore[arg-type]
+            async with Server(pushing) as server, connect(f"{showing.url}?session=xface-127.0.0.1") as viewer:
+                await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
+                await viewer.send('{"type":"subscribe","stream":"fap","encoding":"json"}')
+                async for message in viewer:
+                    if '"values"' in str(message) and json.loads(message)["values"][2] == 500:
+                        return
+
+    asyncio.run(run())
+
+
+def test_the_door_says_what_it_shows_once_the_player_has_greeted() -> None:
+    async def test(server: Server, player: Player) -> None:
+        door = next(door for door in server.doors if isinstance(door, XfacePlayerDoor))
+        await door.ready()
+        assert door.lines == (f"xface player: 127.0.0.1:{player.port} shows session xface-player",)
+
+    playing(test)
+
+
+def test_a_player_that_comes_back_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
+    monkeypatch.setattr(xface_player, "LAST_RETRY", 0.02)
+
+    async def test(server: Server, player: Player) -> None:
+        await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
+        await player.until(lambda: {3: 500} in player.shown)
+        player.close()
+        player.shown.clear()
+        await player.open(player.port)
+        await player.until(lambda: {3: 500} in player.shown)
+        assert player.clients == 2
+
+    playing(test)
+
+
+@pytest.mark.parametrize("lost", ["a session that fails", "a player that reads nothing"])
+def test_the_connection_is_made_anew_after(lost: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
+
+    async def test(server: Server, player: Player) -> None:
+        await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
+        await player.until(lambda: {3: 500} in player.shown)
+        if lost == "a session that fails":
+            next(d for d in server.doors if isinstance(d, XfacePlayerDoor)).end(1011, "internal error")
+        else:
+            monkeypatch.setattr(xface_player, "STUCK", -1)  # so much always waits
+            await hold(server, '{"type":"set","faps":{"open_jaw":600}}')
+        await player.until(lambda: player.clients > 1)
+
+    playing(test)
+
+
+def test_who_does_not_greet_is_no_player(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(xface_player, "ATTEMPT", 0.05)
+    monkeypatch.setattr(xface_player, "FIRST_RETRY", 0.01)
+
+    async def test(server: Server, player: Player) -> None:
+        player.greets = False
+        await player.until(lambda: player.clients > 2)
+        assert not player.strays
+        assert not player.shown
+
+    playing(test)
+    told = [record.getMessage() for record in caplog.records if "no player" in record.getMessage()]
+    assert len(told) == 1
+    assert re.fullmatch(
+        r"xface player: no player at 127\.0\.0\.1:\d+ \(nobody answers\); looking for it", told[0]
+    )
+
+
+def test_a_player_that_never_answers_holds_nobody_up() -> None:
+    async def test(server: Server, player: Player) -> None:
+        player.answers = False
+        await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
+        async with connect(server.url) as other:
+            await other.send('<bml id="b"><wait id="w" duration="0.05"/></bml>')
+            while 'id="b:end"' not in str(await other.recv()):
+                pass
+        assert player.shown == []
+
+    playing(test)

@@ -1,0 +1,174 @@
+"""What a player is sent and when, told the time: one task after the other, no frame sooner than it may."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.animation.fap.fap_reader import read_fap
+from realizer.server.transports.xface.player_link import NUMBERS, PATIENCE, PlayerLink, State
+from realizer.server.transports.xface.reader import TaskReader
+from realizer.server.transports.xface.wire import Task, pack_note
+
+
+def frame(**faps: int) -> list[int]:
+    values = [0] * 68
+    for name, value in faps.items():
+        values[int(name[3:]) - 1] = value
+    return values
+
+
+def note(task: Task, *statuses: int) -> bytes:
+    return b"".join(pack_note(task.name, task.owner, task.id, status) for status in statuses)
+
+
+def due(link: PlayerLink, now: float) -> Task | None:
+    """The one task that is due."""
+    data = link.due(now)
+    if data is None:
+        return None
+    (task,) = TaskReader(10_000).feed(data)
+    assert isinstance(task, Task)
+    assert data.endswith(b"</task>\0")
+    return task
+
+
+@pytest.fixture
+def link() -> PlayerLink:
+    """Connected, greeted as client 3, with Paul's interval."""
+    link = PlayerLink(0.25)
+    link.opened()
+    link.heard(pack_note("CONNECTION_OK", 3, 0, 0))
+    return link
+
+
+def shown(link: PlayerLink, now: float) -> dict[int, int]:
+    """Play the player: take the upload and the stop, and say that they are done."""
+    upload = due(link, now)
+    assert upload is not None
+    assert upload.name == "UPLOAD_FAP"
+    link.heard(note(upload, 1, 2, 3))
+    stop = due(link, now)
+    assert stop is not None
+    assert (stop.name, stop.params) == ("STOP_PLAYBACK", ())
+    link.heard(note(stop, 1, 3))
+    clip = read_fap(upload.params[0])
+    assert clip.notes == ()
+    assert len(clip.values) == 1
+    return {fap: int(clip.values[0, fap - 1]) for fap in range(1, 69) if clip.mask[fap - 1]}
+
+
+def test_nothing_is_sent_before_the_player_has_greeted() -> None:
+    link = PlayerLink(0.25)
+    link.show(frame(fap3=100))
+    assert link.due(0.0) is None
+    link.opened()
+    assert (link.state, link.due(0.0), link.next_deadline()) == (State.GREETING, None, None)
+    link.heard(pack_note("CONNECTION_OK", 3, 0, 0)[:30])
+    assert link.due(0.0) is None
+    link.heard(pack_note("CONNECTION_OK", 3, 0, 0)[30:])
+    assert due(link, 0.0) is not None
+
+
+def test_a_frame_is_an_upload_of_one_and_the_stop_that_shows_it(link: PlayerLink) -> None:
+    link.show(frame(fap3=500, fap48=-4000))
+    upload = due(link, 0.0)
+    assert upload is not None
+    assert (upload.name, upload.owner, upload.id) == ("UPLOAD_FAP", 3, 3 * NUMBERS + 1)
+    assert upload.params[0].startswith("2.1 realizer 25 1\n")
+    assert due(link, 0.0) is None, "the player takes two tasks in one read for one"
+    link.heard(note(upload, 1, 2))
+    assert (due(link, 0.0), link.state) == (None, State.UPLOADING)
+    link.heard(note(upload, 3))
+    stop = due(link, 0.0)
+    assert stop == Task("STOP_PLAYBACK", 3, 3 * NUMBERS + 2)
+    link.heard(note(stop, 1))
+    assert link.state is State.STOPPING
+    link.heard(note(stop, 3))
+    assert link.state.name == "READY"
+
+
+def test_only_what_is_not_0_is_given_and_never_a_compound_fap(link: PlayerLink) -> None:
+    link.show(frame(fap1=3, fap2=1, fap3=500, fap48=-4000))
+    assert shown(link, 0.0) == {3: 500, 48: -4000}
+    link.show(frame())
+    assert shown(link, 1.0) == {}
+
+
+def test_the_next_frame_waits_for_its_time_and_is_the_newest(link: PlayerLink) -> None:
+    link.show(frame(fap3=1))
+    assert shown(link, 10.0) == {3: 1}
+    link.show(frame(fap3=2))
+    link.show(frame(fap3=3))
+    assert due(link, 10.2) is None
+    assert link.next_deadline() == 10.25
+    assert shown(link, 10.25) == {3: 3}
+
+
+def test_without_an_interval_only_the_player_is_waited_for() -> None:
+    link = PlayerLink(0.0)
+    link.opened()
+    link.heard(pack_note("CONNECTION_OK", 1, 0, 0))
+    for value in (1, 2, 3):
+        link.show(frame(fap3=value))
+        assert shown(link, 5.0) == {3: value}
+
+
+def test_a_face_that_does_not_move_is_not_sent_again(link: PlayerLink) -> None:
+    link.show(frame(fap3=1))
+    shown(link, 0.0)
+    link.show(frame(fap3=1))
+    assert (link.due(9.0), link.next_deadline()) == (None, None)
+
+
+def test_a_player_that_says_nothing_of_a_task_is_sent_the_next(link: PlayerLink) -> None:
+    link.show(frame(fap3=1))
+    assert due(link, 0.0) is not None
+    link.show(frame(fap3=2))
+    assert link.next_deadline() == PATIENCE
+    assert due(link, PATIENCE - 0.1) is None
+    stop = due(link, PATIENCE)
+    assert stop is not None
+    assert stop.name == "STOP_PLAYBACK"
+    assert link.next_deadline() == 2 * PATIENCE
+    upload = due(link, 2 * PATIENCE)
+    assert upload is not None
+    assert upload.name == "UPLOAD_FAP"
+
+
+def test_a_task_that_fails_ends_too_and_is_said_once(
+    link: PlayerLink, caplog: pytest.LogCaptureFixture
+) -> None:
+    for time, value in ((0.0, 1), (1.0, 2)):
+        link.show(frame(fap3=value))
+        upload = due(link, time)
+        assert upload is not None
+        link.heard(note(upload, 1, 7, 3))
+        stop = due(link, time)
+        assert stop is not None
+        link.heard(note(stop, 1, 3))
+    assert [record.getMessage() for record in caplog.records] == ["xface player: it cannot do UPLOAD_FAP"]
+
+
+def test_notes_about_tasks_of_the_past_change_nothing(link: PlayerLink) -> None:
+    link.show(frame(fap3=1))
+    upload = due(link, 0.0)
+    assert upload is not None
+    link.heard(note(Task("UPLOAD_FAP", 3, 77), 3) + note(Task("STOP_PLAYBACK", 3, upload.id - 1), 3))
+    assert link.state is State.UPLOADING
+
+
+def test_another_connection_begins_anew(link: PlayerLink) -> None:
+    link.show(frame(fap3=1))
+    shown(link, 0.0)
+    link.closed()
+    assert (link.due(9.0), link.next_deadline()) == (None, None)
+    link.opened()
+    link.heard(pack_note("CONNECTION_OK", 8, 0, 0))
+    upload = due(link, 0.1)
+    assert upload is not None
+    assert (upload.owner, upload.id) == (8, 8 * NUMBERS + 1)
+
+
+def test_nobody_connects_while_a_connection_stands(link: PlayerLink) -> None:
+    with pytest.raises(AssertionError, match="connected already"):
+        link.opened()

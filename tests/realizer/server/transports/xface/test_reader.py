@@ -1,0 +1,138 @@
+"""Tasks out of a stream, however it is cut and whatever else is in it."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.server.transports.xface.reader import Content, Fault, TaskReader
+from realizer.server.transports.xface.wire import Task
+
+LIMIT = 2000
+STOP = Task("STOP_PLAYBACK", 1, 9)
+NEXT = b'<task name="STOP_PLAYBACK" ownerId="1" taskId="9"></task>'
+
+
+def found(data: bytes, cut: int = 10_000) -> list[Task | Content | Fault]:
+    reader = TaskReader(LIMIT)
+    out: list[Task | Content | Fault] = []
+    for begin in range(0, len(data), cut):
+        out += reader.feed(data[begin : begin + cut])
+    return out
+
+
+@pytest.mark.parametrize("end", [b"", b"\0", b"\0\0", b"\r\n\0"])
+def test_a_task_may_end_with_nothing_or_with_nuls(end: bytes) -> None:
+    assert found(2 * (NEXT + end)) == [STOP, STOP]
+
+
+@pytest.mark.parametrize(
+    ("text", "task"),
+    [
+        (b'<task name="STOP_PLAYBACK" ownerId="1" taskId="9"/>', STOP),
+        (b'<task name="STOP_PLAYBACK" ownerId="1" taskId="9" />', STOP),
+        (b"<task taskId='9' name='STOP_PLAYBACK' status='0' ownerId='1' ></task >", STOP),
+        (b'\xef\xbb\xbf<?xml version="1.0"?>\n' + NEXT, STOP),
+        (b'<task name="A" ownerId="x" taskId="-1"></task>', Task("A")),
+        (b'<task name="A"><param/><param>1 &amp; 2</param></task>', Task("A", params=("", "1 &amp; 2"))),
+        (
+            b'<task name="A"><param><![CDATA[<bml id="b"/>]]></param></task>',
+            Task("A", params=('<bml id="b"/>',)),
+        ),
+        (
+            b'<task name="A"><param><s><param>1</param></s></param></task>',
+            Task("A", params=("<s><param>1</param></s>",)),
+        ),
+        (b'<task name="A"><param><taskless/></param></task>', Task("A", params=("<taskless/>",))),
+        (b'<task name="A"><param>\xff</param></task>', Task("A", params=("\ufffd",))),
+    ],
+)
+def test_tasks_are_written_in_many_ways(text: bytes, task: Task) -> None:
+    assert found(text) == [task]
+    assert found(text, 1) == [task]
+
+
+BAD = {
+    "rubbish": (b"hello", "wanted <task name=...>, got 'hello'"),
+    "binary": (bytes(range(1, 256)), "wanted <task name=...>"),
+    "another element": (b"<notify/>", "wanted <task name=...>, got '<notify/>'"),
+    "half a task": (b'<task name="A"><param>1', "wanted </task>, got a NUL: half a task"),
+    "half a tag": (b'<task name="A" owner', "wanted > at the end of <task, got another beginning"),
+    "no name": (b'<task ownerId="1"></task>', "wanted <task> with the name of a task, got ''"),
+    "no name of one": (b'<task name="a b"></task>', "wanted <task> with the name of a task, got 'a b'"),
+    "too long a tag": (b"<task " + b"x" * 5000, "wanted <task ...> of at most 4096 bytes, got more"),
+    "too long": (
+        b'<task name="A"><param>' + b"x" * 3000 + b"</param></task>",
+        "wanted a task of at most 2000 bytes",
+    ),
+}
+
+
+@pytest.mark.parametrize(("data", "says"), BAD.values(), ids=BAD)
+@pytest.mark.parametrize("cut", [1, 7, 10_000])
+def test_what_is_no_task_is_one_fault_and_the_next_task_is_read(data: bytes, says: str, cut: int) -> None:
+    fault, *rest = found(data + b"\0" + NEXT, cut)
+    assert isinstance(fault, Fault)
+    assert (says if cut > len(data) else says.partition(", got")[0]) in fault.text
+    assert rest == [STOP]
+
+
+def test_a_task_that_is_too_large_is_known_by_its_head() -> None:
+    head = b'<task name="A" ownerId="1" taskId="7">'
+    for cut in (50, 10_000):
+        fault, *rest = found(head + b"x" * 3000 + b"</task>\0" + NEXT, cut)
+        assert fault == Fault("wanted a task of at most 2000 bytes, got more", Task("A", 1, 7))
+        assert rest == [STOP]
+
+
+def test_a_task_without_a_name_has_the_ids_it_has() -> None:
+    (fault,) = found(b'<task name="a b" ownerId="2" taskId="7"/>')
+    assert fault == Fault("wanted <task> with the name of a task, got 'a b'", Task("", 2, 7))
+
+
+def test_another_beginning_ends_half_a_task_where_there_is_no_nul() -> None:
+    fault, *rest = found(b'<task name="A" taskId="3"><param>1' + NEXT)
+    assert fault == Fault("wanted </task>, got another <task: half a task", Task("A", 0, 3))
+    assert rest == [STOP]
+
+
+@pytest.mark.parametrize("nul", [b"", b"\0"])
+@pytest.mark.parametrize("cut", [1, 5, 10_000])
+def test_the_bytes_after_an_announced_file_are_its_content_whatever_they_are(nul: bytes, cut: int) -> None:
+    head = b'<task name="UPLOAD_WAV" ownerId="1" taskId="3"><param>a.wav</param><param>12</param></task>'
+    task, content, after = found(head + nul + b"RIFF<task \0\0" + NEXT, cut)
+    assert task == Task("UPLOAD_WAV", 1, 3, ("a.wav", "12"))
+    assert content == Content(task, b"RIFF<task \0\0")
+    assert after == STOP
+
+
+@pytest.mark.parametrize("size", ["0", "-1", "many", "3000", "9" * 50])
+def test_an_absurd_size_of_a_file_is_a_fault_and_nothing_is_waited_for(size: str) -> None:
+    head = f'<task name="UPLOAD_WAV"><param>a.wav</param><param>{size}</param></task>'
+    _, fault, after = found(head.encode() + NEXT)
+    assert isinstance(fault, Fault)
+    assert "wanted 1..2000 bytes to follow" in fault.text
+    assert after == STOP
+
+
+def test_a_tag_of_one_word_that_never_ends_costs_no_more_than_its_length() -> None:
+    # Where each letter began a search of its own this took a minute of processor time.
+    everything = found(b"<task " + b"x" * 100_000 + b">" + b"y" * 3000 + b"\0" + NEXT)
+    assert everything[-1] == STOP
+
+
+@given(st.binary(max_size=300), st.integers(1, 100))
+def test_any_bytes_are_tasks_or_faults_and_a_nul_sets_it_right(data: bytes, cut: int) -> None:
+    everything = found(data.replace(b"UPLOAD_WAV", b"") + b"\0" + NEXT, cut)
+    assert everything[-1] == STOP
+
+
+@given(st.lists(st.sampled_from([NEXT, b"x\0", b"\0", b"<task name='B'/>"]), max_size=8), st.integers(1, 60))
+def test_how_a_stream_is_cut_changes_nothing(parts: list[bytes], cut: int) -> None:
+    data = b"".join(parts)
+
+    def kinds(items: list[Task | Content | Fault]) -> list[object]:
+        return [item if isinstance(item, Task) else type(item) for item in items]
+
+    assert kinds(found(data, cut)) == kinds(found(data))

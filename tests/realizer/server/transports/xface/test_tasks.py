@@ -1,0 +1,244 @@
+"""The player as one client sees it: tasks and feedback in, notes and messages to the session out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from bml_schema import BlockProgress, WarningFeedback
+from realizer.animation.fap.fap_clip import FAPClip
+from realizer.core.errors import RealizerError
+from realizer.server.transports.message_format import Leave, ToSession
+from realizer.server.transports.xface.attachments import Brought, Empty, Script
+from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, Desk
+from realizer.server.transports.xface.wire import Task, read_notes
+
+
+def clip(*jaw: int, fps: float = 25) -> FAPClip:
+    values = np.zeros((len(jaw), 68), np.int32)
+    values[:, 2] = jaw
+    count = len(jaw)
+    return FAPClip(
+        "x", fps, values, np.arange(68) == 2, np.zeros((count, 4), np.int32), np.zeros((count, 6), np.int32)
+    )
+
+
+class Talk:
+    """A desk, and what it answers in short: ("NAME", id, status) for notes, text for the session."""
+
+    def __init__(self) -> None:
+        self.desk = Desk(1)
+        self.count = 0
+        self.now = 0.0
+
+    def ask(self, name: str, brought: Brought = None) -> list[object]:
+        self.count += 1
+        task = Task(name, 1, self.count)
+        return self._short([*self.desk.accept(task), *self.desk.run(task, brought, self.now)])
+
+    def tell(self, id: str, *, warning: bool = False) -> list[object]:
+        feedback = (
+            WarningFeedback(id=id, type="IMPOSSIBLE_TO_SCHEDULE", text="no")
+            if warning
+            else BlockProgress(id=id, global_time=self.now)
+        )
+        return self._short(self.desk.told(feedback.to_xml(), self.now))
+
+    def _short(self, answers: Iterable[Answer]) -> list[object]:
+        out: list[object] = []
+        for answer in answers:
+            match answer:
+                case bytes():
+                    out += [(note.name, note.id, note.status) for note in read_notes(bytearray(answer))]
+                case ToSession(text):
+                    out.append(_short(text))
+                case Leave():
+                    out.append("leave")
+        return out
+
+
+def _short(text: str) -> object:
+    if text.startswith("<"):
+        return "document"
+    message = json.loads(text)
+    if message["type"] == "set":
+        assert len(message["faps"]) == 66, "every FAP is held or let go of"
+        return {name: value for name, value in message["faps"].items() if value is not None}
+    return {"stop": message["blocks"]}
+
+
+def notes(name: str, id: int, *statuses: int) -> list[object]:
+    return [(name, id, status) for status in statuses]
+
+
+def test_a_file_is_queued_started_and_finished() -> None:
+    assert Talk().ask("UPLOAD_FAP", clip(1, 2)) == notes("UPLOAD_FAP", 1, 1, 2, 3)
+
+
+def test_a_file_of_one_frame_is_shown_at_once() -> None:
+    answers = Talk().ask("UPLOAD_FAP", clip(7))
+    assert answers == [*notes("UPLOAD_FAP", 1, 1, 2), {"open_jaw": 7}, ("UPLOAD_FAP", 1, 3)]
+
+
+def test_a_fap_that_the_next_frame_does_not_have_goes_to_0_and_is_let_go_of_then() -> None:
+    talk = Talk()
+    poses = [talk.ask("UPLOAD_FAP", clip(value))[2] for value in (7, 0, 0, 9)]
+    assert poses == [{"open_jaw": 7}, {"open_jaw": 0}, {}, {"open_jaw": 9}]
+
+
+def test_a_value_beyond_the_range_is_limited_to_it() -> None:
+    assert {"open_jaw": 4320} in Talk().ask("UPLOAD_FAP", clip(9999))
+
+
+def test_playing_begins_and_ends_with_its_block() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(1, 2))
+    assert talk.ask("RESUME_PLAYBACK") == [("RESUME_PLAYBACK", 2, 1), {}, "document"]
+    assert talk.tell("xface-1-1:start") == notes("RESUME_PLAYBACK", 2, 2)
+    assert talk.tell("xface-1-1:end") == notes("RESUME_PLAYBACK", 2, 3)
+    assert talk.tell("xface-1-1:end") == []
+
+
+def test_what_plays_is_finished_by_a_stop_which_shows_the_first_frame() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(1, 2))
+    talk.ask("RESUME_PLAYBACK")
+    talk.tell("xface-1-1:start")
+    assert talk.ask("STOP_PLAYBACK") == [
+        ("STOP_PLAYBACK", 3, 1),
+        {"stop": ["xface-1-1"]},
+        ("RESUME_PLAYBACK", 2, 3),
+        {"open_jaw": 1},
+        ("STOP_PLAYBACK", 3, 3),
+    ]
+
+
+def test_who_resumes_while_something_plays_waits_for_its_end() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(1, 2))
+    talk.ask("RESUME_PLAYBACK")
+    assert talk.ask("RESUME_PLAYBACK") == notes("RESUME_PLAYBACK", 3, 1)
+    talk.tell("xface-1-1:start")
+    assert talk.tell("xface-1-1:end") == [("RESUME_PLAYBACK", 2, 3), {}, "document"]
+    assert talk.tell("xface-1-2:start") == notes("RESUME_PLAYBACK", 3, 2)
+
+
+def test_who_waits_is_finished_by_a_stop_too() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(1, 2))
+    talk.ask("RESUME_PLAYBACK")
+    talk.ask("RESUME_PLAYBACK")
+    answers = talk.ask("STOP_PLAYBACK")
+    assert [a for a in answers if isinstance(a, tuple) and a[2] == 3] == [
+        ("RESUME_PLAYBACK", 2, 3),
+        ("RESUME_PLAYBACK", 3, 3),
+        ("STOP_PLAYBACK", 4, 3),
+    ]
+
+
+def test_a_pause_keeps_the_frame_that_was_reached() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(*range(1, 101)))
+    talk.ask("RESUME_PLAYBACK")
+    talk.tell("xface-1-1:start")
+    talk.now = 1.0
+    assert {"open_jaw": 26} in talk.ask("PAUSE_PLAYBACK")
+    assert {"open_jaw": 27} in talk.ask("ADVANCE_FRAME")
+    assert {"open_jaw": 1} in talk.ask("REWIND_PLAYBACK")
+
+
+def test_a_pause_after_another_file_came_begins_that_one_at_its_first_frame() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(*range(1, 101)))
+    talk.ask("RESUME_PLAYBACK")
+    talk.tell("xface-1-1:start")
+    talk.ask("UPLOAD_FAP", clip(*range(500, 600)))
+    talk.now = 1.0
+    assert {"open_jaw": 500} in talk.ask("PAUSE_PLAYBACK")
+
+
+def test_the_last_frame_is_not_gone_beyond() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_FAP", clip(1, 2))
+    answers = [talk.ask("ADVANCE_FRAME")[-1] for _ in range(3)]
+    assert answers == [{"open_jaw": 2}] * 3
+
+
+def test_nothing_loaded_is_an_error_to_play_and_not_to_stop() -> None:
+    talk = Talk()
+    assert talk.ask("RESUME_PLAYBACK") == notes("RESUME_PLAYBACK", 1, 1, 7)
+    assert talk.ask("STOP_PLAYBACK") == notes("STOP_PLAYBACK", 2, 1, 3)
+    assert talk.ask("ADVANCE_FRAME") == notes("ADVANCE_FRAME", 3, 1)
+
+
+def test_a_script_is_started_with_its_first_block_and_finished_with_its_last() -> None:
+    talk = Talk()
+    assert talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b"))) == [("UPLOAD_SCRIPT", 1, 1), "document"]
+    assert talk.tell("a:start") == notes("UPLOAD_SCRIPT", 1, 2)
+    assert talk.tell("b:start") == []
+    assert talk.tell("b:end") == []
+    assert talk.tell("a:end") == notes("UPLOAD_SCRIPT", 1, 3)
+
+
+def test_a_stop_ends_scripts_too_and_a_pause_does_not() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b")))
+    talk.tell("a:start")
+    talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("c",)))
+    assert talk.ask("PAUSE_PLAYBACK") == notes("PAUSE_PLAYBACK", 3, 1, 3)
+    assert talk.ask("STOP_PLAYBACK") == [
+        ("STOP_PLAYBACK", 4, 1),
+        {"stop": ["a", "b", "c"]},
+        ("UPLOAD_SCRIPT", 1, 3),
+        ("UPLOAD_SCRIPT", 2, 2),
+        ("UPLOAD_SCRIPT", 2, 3),
+        ("STOP_PLAYBACK", 4, 3),
+    ]
+    assert talk.tell("b:end") == []
+
+
+def test_a_script_whose_blocks_are_all_refused_is_an_error() -> None:
+    talk = Talk()
+    talk.ask("UPLOAD_SCRIPT", Script("<bml/>", ("a", "b")))
+    assert talk.tell("a", warning=True) == []
+    assert talk.tell("b", warning=True) == notes("UPLOAD_SCRIPT", 1, 7)
+
+
+@pytest.mark.parametrize(
+    ("name", "brought", "statuses"),
+    [
+        ("UPLOAD_FAP", RealizerError("no"), (1, 7, 3)),
+        ("LOAD_FAP", RealizerError("no"), (1, 7, 3)),
+        ("UPLOAD_FAP", Empty("none"), (1, 7)),
+        ("UPLOAD_SCRIPT", RealizerError("no"), (1, 7)),
+    ],
+)
+def test_what_cannot_be_understood_is_answered_as_clients_expect(
+    name: str, brought: RealizerError, statuses: tuple[int, ...]
+) -> None:
+    assert Talk().ask(name, brought) == notes(name, 1, *statuses)
+
+
+@pytest.mark.parametrize("name", sorted(UNABLE))
+def test_what_only_the_player_itself_can_do_is_an_error(name: str) -> None:
+    assert Talk().ask(name) == notes(name, 1, 1, 7)
+
+
+def test_an_unknown_task_is_an_error_with_its_ids() -> None:
+    talk = Talk()
+    assert talk._short(talk.desk.accept(Task("DANCE", 1, 5))) == [("ERROR", 5, 7)]
+    assert talk._short(talk.desk.refuse(Task("", 1, 5))) == [("ERROR", 5, 7)]
+    assert talk._short(talk.desk.refuse(Task("UPLOAD_FAP", 1, 5))) == [("UPLOAD_FAP", 5, 7)]
+
+
+@pytest.mark.parametrize("name", sorted(ABLE | UNABLE))
+def test_owner_0_gets_no_notes(name: str) -> None:
+    desk, task = Desk(1), Task(name, 0, 5)
+    assert not [a for a in (*desk.accept(task), *desk.run(task, None, 0.0)) if isinstance(a, bytes)]
+
+
+def test_kill_app_is_finished_and_the_client_goes() -> None:
+    assert Talk().ask("KILL_APP") == [("KILL_APP", 1, 3), "leave"]

@@ -1,0 +1,48 @@
+"""Notes and tasks of the Xface protocol as bytes."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from realizer.server.transports.xface.reader import TaskReader
+from realizer.server.transports.xface.wire import Note, Status, Task, pack_note, pack_task, read_notes
+
+NAMES = st.from_regex(r"[A-Z][A-Z_]{0,20}", fullmatch=True)
+NUMBERS = st.integers(0, 999_999_999)
+NOTES = st.lists(st.builds(Note, NAMES, NUMBERS, NUMBERS, st.integers(0, 7)), max_size=5)
+PARAMS = st.lists(st.text(st.characters(codec="utf-8", exclude_characters="<\0"), max_size=50), max_size=3)
+
+
+def test_a_note_is_the_literal_that_clients_compare() -> None:
+    note = pack_note("CONNECTION_OK", 1, 0, Status.UNKNOWN)
+    assert note == b'<notify name="CONNECTION_OK" ownerId="1" taskId="0" status="0"/>\0\0'
+
+
+def test_a_task_is_as_the_player_s_own_client_ends_it() -> None:
+    task = pack_task(Task("UPLOAD_FAP", 1, 7, ("2.1 x 25 0\n",)))
+    assert task == b'<task name="UPLOAD_FAP" ownerId="1" taskId="7"><param>2.1 x 25 0\n</param></task>\0'
+
+
+@given(NOTES, st.sampled_from([b"", b"\0", b"\0\0", b"\n"]), st.integers(1, 50))
+def test_notes_are_read_however_they_end_and_are_cut(notes: list[Note], end: bytes, cut: int) -> None:
+    sent = b"".join(pack_note(n.name, n.owner, n.id, n.status).rstrip(b"\0") + end for n in notes)
+    data, got = bytearray(), []
+    for begin in range(0, len(sent), cut):
+        data += sent[begin : begin + cut]
+        got += read_notes(data)
+    assert got == notes
+
+
+def test_what_is_no_note_is_not_kept_for_ever() -> None:
+    data = bytearray(b"x" * 10_000)
+    assert read_notes(data) == []
+    assert len(data) < 1000
+    data += pack_note("STOP_PLAYBACK", 1, 2, 3)
+    assert read_notes(data) == [Note("STOP_PLAYBACK", 1, 2, 3)]
+
+
+@given(NAMES.filter(lambda name: name != "UPLOAD_WAV"), NUMBERS, NUMBERS, PARAMS)
+def test_a_task_that_is_packed_is_read_back(name: str, owner: int, id: int, params: list[str]) -> None:
+    task = Task(name, owner, id, tuple(params))
+    assert TaskReader(10_000).feed(pack_task(task)) == [task]

@@ -1,0 +1,68 @@
+"""The cheapest way through states with pauses between."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.speech.align.dtw import Heard, States, matched, quiet, unlike, usual
+
+LETTERS = np.eye(5) * 2
+
+
+def states(word: str) -> States:
+    """One state a letter, "_" where a pause may be."""
+    pause = np.array([letter == "_" for letter in word])
+    rows = np.array([LETTERS[0] if letter == "_" else LETTERS["abcde".index(letter)] for letter in word])
+    return States(rows, pause, np.arange(len(word), dtype=float))
+
+
+def heard(word: str) -> Heard:
+    """One frame a letter, "_" where it is silent."""
+    rows = np.array([np.zeros(5) if letter == "_" else LETTERS["abcde".index(letter)] for letter in word])
+    loud = np.array([0.0 if letter == "_" else 1.0 for letter in word])
+    return Heard(rows, quiet(loud, 0.1), 1.0)
+
+
+def way(frames: str, said: str, **band) -> str:
+    found, _ = matched(heard(frames), states(said), **band)
+    return "".join(said[k] for k in found)
+
+
+def test_sounds_that_last_longer_or_shorter_are_found() -> None:
+    assert way("__aaabbcddd__", "_abccd_") == "__aaabbcddd__"
+
+
+def test_a_pause_between_words_is_left_out_or_stayed_in() -> None:
+    assert way("_aabb_", "_ab_") == "_aabb_"
+    assert way("_aabb_", "_a_b_") == "_aabb_"
+    assert way("_aaaaaa____________bbbbbb_", "_a_b_") == "_aaaaaa____________bbbbbb_"
+
+
+def test_inside_a_word_there_is_no_pause() -> None:
+    assert set(way("_aaaaaa____________bbbbbb_", "_ab_")[7:19]) <= {"a", "b"}
+
+
+def test_in_a_band_the_same_way_is_found() -> None:
+    frames, said = "__" + "aabbbcdde" * 20 + "__", "_" + "abcde_" * 20
+    whole, cost = matched(heard(frames), states(said))
+    banded, cost_banded = matched(heard(frames), states(said), whole, 6)
+    assert (whole == banded).all()
+    assert cost_banded == pytest.approx(cost)
+    diagonal = np.rint(np.linspace(0, len(said) - 1, len(frames))).astype(np.intp)
+    assert (matched(heard(frames), states(said), diagonal, 40)[0] == whole).all()
+
+
+def test_the_way_only_goes_on_and_reaches_the_end() -> None:
+    rng = np.random.default_rng(0)
+    noise = Heard(rng.normal(size=(80, 5)), quiet(rng.random(80), 0.1), 1.0)
+    found, cost = matched(noise, states("_" + "abcde_" * 9))
+    assert (np.diff(found) >= 0).all()
+    assert (np.diff(found) <= 3).all()
+    assert found[-1] >= 53
+    assert np.isfinite(cost).all()
+
+
+def test_differences_are_root_mean_squares() -> None:
+    assert unlike(np.zeros((1, 4)), np.array([[2.0, 0, 0, 0], [1, 1, 1, 1]])).tolist() == [[1.0, 1.0]]
+    assert usual(np.zeros((3, 4)), np.ones((5, 4))) == 1.0

@@ -1,0 +1,46 @@
+"""Recordings as utterances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.speech import Say, SilentVoice
+from realizer.speech.align.recording_marks import played, recorded
+from realizer.speech.duration_fit import fitted
+from realizer.speech.utterance import Recording
+
+MARKED = (
+    '<mark name="a"/>The tall woman <mark name="b"/>carried a basket of apples '
+    '<break time="300ms"/><mark name="c"/>down the hill.<mark name="d"/>'
+)
+
+
+@pytest.mark.espeak
+def test_marks_come_with_the_words_they_stand_before(sentence) -> None:
+    said = recorded(sentence.pcm, sentence.rate, Say(MARKED, ("a", "b", "c", "d")))
+    starts = {word.text: word.start for word in said.words}
+    assert said.marks["a"] == starts["The"]
+    assert said.marks["b"] == starts["carried"]
+    assert said.marks["c"] == pytest.approx(starts["down"], abs=0.1)
+    assert said.marks["d"] == pytest.approx(said.words[-1].end, abs=0.01)
+    assert said.duration == len(sentence.pcm) / sentence.rate
+    assert np.abs(said.pcm.astype(int) - sentence.pcm).max() <= 1
+    assert said.stretch == (1, 1)
+
+
+@pytest.mark.espeak
+def test_a_request_with_a_recording_asks_no_voice_and_stays_as_long_as_it_is(sentence) -> None:
+    request = Say(MARKED, ("a",), seconds=1.0, recording=Recording(sentence.rate, sentence.pcm))
+    said = fitted(SilentVoice(), request)
+    assert said.duration == len(sentence.pcm) / sentence.rate
+    assert [word.text for word in said.words] == [word.text for word in sentence.said.words]
+    assert fitted(SilentVoice(), request) is said, "it is aligned once"
+
+
+def test_a_recording_that_cannot_be_aligned_sounds_all_the_same() -> None:
+    silence = Recording(8000, np.zeros(8000, np.int16))
+    said = played(Say("Hello", recording=silence), silence)
+    assert said.pcm is silence.pcm
+    assert (said.duration, said.words, said.phonemes) == (1.0, (), ())
+    assert "lips do not move with the recording" in said.warnings[0]

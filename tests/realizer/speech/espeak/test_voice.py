@@ -1,0 +1,537 @@
+"""espeak-ng: every known trap of the engine is a test here."""
+
+from __future__ import annotations
+
+import gc
+import importlib.util
+import os
+import signal
+import subprocess
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from realizer.core.errors import VoiceError
+from realizer.speech import engine_process
+from realizer.speech.cache import MOST
+from realizer.speech.engine_process import RUN
+from realizer.speech.espeak.voice import ENGINE, EspeakVoice, choose_voice
+from realizer.speech.utterance import Say, Utterance
+
+pytestmark = pytest.mark.espeak
+
+HELLO = Say('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))
+
+
+def times(utterance: Utterance) -> tuple[object, ...]:
+    return utterance.words, utterance.phonemes, dict(utterance.marks), utterance.duration
+
+
+def starts(utterance: Utterance) -> dict[str, float]:
+    return {word.text: word.start for word in utterance.words}
+
+
+def same(a: Utterance, b: Utterance) -> bool:
+    return times(a) == times(b) and np.array_equal(a.pcm, b.pcm)
+
+
+def test_sound_is_exactly_as_long_as_it_says(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.pcm is not None
+    assert said.duration == len(said.pcm) / said.sample_rate
+    assert said.sample_rate == 22050
+    assert np.abs(said.pcm.astype(int)).max() > 3000
+
+
+def test_marks_are_where_their_word_is_heard(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.marks == {"s1": starts(said)["very"], "s2": starts(said)["meet"]}
+    assert said.pcm is not None
+    # Against the sound itself: "meet" starts with a hum that "to" before it does not have.
+    at = round(said.marks["s2"] * said.sample_rate)
+    spectrum = np.abs(np.fft.rfft(said.pcm[at : at + 1024]))
+    assert 2 < int(spectrum.argmax()) < 12  # 40-260 Hz: voiced from the mark on
+
+
+def test_phonemes_tile_the_sound(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.phonemes[0].start == 0
+    assert said.phonemes[-1].end == said.duration
+    assert [p.end for p in said.phonemes[:-1]] == [p.start for p in said.phonemes[1:]]
+    assert all(p.end > p.start for p in said.phonemes)
+    assert [p.ipa for p in said.phonemes if p.stress == 1] == ["oʊ", "ɛ", "iː", "iː"]
+
+
+def test_pauses_are_silent_and_everything_else_is_not(voice: EspeakVoice) -> None:
+    said = voice.say(HELLO)
+    assert said.pcm is not None
+    for phoneme in said.phonemes:
+        part = said.pcm[round(phoneme.start * said.sample_rate) : round(phoneme.end * said.sample_rate)]
+        loud = np.abs(part.astype(int)).max()
+        if phoneme.ipa:
+            assert loud > 100, phoneme
+        elif phoneme.end - phoneme.start > 0.1:
+            assert np.sqrt(np.mean(part.astype(float) ** 2)) < 100, phoneme
+
+
+def test_a_closure_belongs_to_the_stop_that_it_closes(voice: EspeakVoice) -> None:
+    said = voice.say(Say("My happy puppy."))
+    stops = [p for p in said.phonemes if p.ipa == "p"]
+    assert said.pcm is not None
+    assert len(stops) == 3
+    for stop in stops:
+        first = round(stop.start * said.sample_rate)
+        assert np.abs(said.pcm[first + 20 : first + 400].astype(int)).max() < 100
+        assert stop.end - stop.start > 0.06
+
+
+@pytest.mark.parametrize(
+    ("language", "text"),
+    [
+        ("en-US", "One two. {}Three four. {}Five it is. {}End of it. {}Last one."),
+        ("nl-NL", "Een twee. {}Drie vier. {}Vijf zes. {}Zeven. {}Acht."),
+        ("fr-FR", "Un deux. {}Trois quatre. {}Cinq six. {}Sept. {}Huit."),
+        ("pl-PL", "Raz dwa. {}Trzy cztery. {}Pięć sześć. {}Siedem. {}Osiem."),
+    ],
+)
+def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, text: str) -> None:
+    marked = text.format(*(f'<mark name="{name}"/>' for name in "abcd"))
+    said = voice.say(Say(marked, tuple("abcd"), language))
+    assert list(said.marks) == list("abcd")
+    words = {word.start for word in said.words}
+    assert set(said.marks.values()) <= words
+    firsts = [s.split()[0].strip(".") for s in text.split("{}")[1:]]
+    assert [w.text for w in said.words if w.start in set(said.marks.values())] == firsts
+
+
+def test_words_that_the_dictionary_merges_come_apart(voice: EspeakVoice) -> None:
+    said = voice.say(Say("I am in the house, and it would have been the one of the best."))
+    assert [w.text for w in said.words] == [
+        *("I", "am", "in", "the", "house", "and", "it", "would"),
+        *("have", "been", "the", "one", "of", "the", "best"),
+    ]
+    assert all(word.end - word.start > 0.04 for word in said.words)
+    spans = {w.text: (w.start, w.end) for w in said.words[:2]}
+    within = lambda word: [p.ipa for p in said.phonemes if spans[word][0] <= p.start < spans[word][1]]  # noqa: E731
+    assert within("I") == ["aɪ"]
+    assert within("am") in (["ɐ", "m"], ["æ", "m"])
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "word"),
+    [
+        ("en-US", 'I <mark name="m"/>am here.', "am"),
+        ("pl-PL", 'nie <mark name="m"/>wiem tego', "wiem"),
+        ("fr-FR", 'Je ne sais <mark name="m"/>pas.', "pas"),
+    ],
+)
+def test_marks_inside_merged_words_stay_there(
+    voice: EspeakVoice, language: str, text: str, word: str
+) -> None:
+    said = voice.say(Say(text, ("m",), language))
+    assert said.marks["m"] == starts(said)[word] > 0.05
+    assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes} | {w.end for w in said.words}
+
+
+@pytest.mark.parametrize(
+    "mark", ["<mark name='x'/>", '<bookmark mark="x"/>', '<s:mark name="x"/>', "<mark name='x'></mark>"]
+)
+def test_every_spelling_of_a_mark_is_a_mark(voice: EspeakVoice, mark: str) -> None:
+    said = voice.say(Say(f"one two {mark}three", ("x",)))
+    assert said.marks == {"x": starts(said)["three"]}
+    assert not said.warnings
+
+
+def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
+    name = "a&quot;b'ü"
+    said = voice.say(Say(f'one <mark name="{name}"/>two', (name,)))
+    assert list(said.marks) == ["a\"b'ü"]
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "word"),
+    [
+        ("de-DE", 'Das sind 42 Äpfel <mark name="m"/>und Birnen.', "und"),
+        ("nl-NL", 'Dat zijn 42 appels <mark name="m"/>en peren.', "en"),
+        ("pl-PL", 'To są 42 jabłka <mark name="m"/>i gruszki.', "i"),
+    ],
+)
+def test_a_mark_is_at_its_word_and_not_before_the_little_pause_that_the_engine_makes(
+    voice: EspeakVoice, language: str, text: str, word: str
+) -> None:
+    said = voice.say(Say(text, ("m",), language))
+    assert said.marks["m"] == starts(said)[word]
+    assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes if phoneme.ipa}
+
+
+def test_marks_of_five_languages_are_within_five_milliseconds_of_the_engines_own_words(
+    voice: EspeakVoice,
+) -> None:
+    path = Path(__file__).parents[3] / "benchmarks" / "marks.py"
+    spec = importlib.util.spec_from_file_location("marks", path)
+    assert spec is not None
+    assert spec.loader is not None
+    marks = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(marks)
+    found = list(marks.errors(voice, 60))
+    assert len(found) == 60
+    assert {language for language, _, _ in found} == set(marks.TEXTS)
+    assert max(ms for _, ms, _ in found) < 5
+
+
+def test_a_mark_before_a_break_is_before_the_silence(voice: EspeakVoice) -> None:
+    said = voice.say(Say('one <mark name="a"/><break time="800ms"/><mark name="b"/>two', ("a", "b")))
+    assert said.marks["a"] == pytest.approx(said.words[0].end, abs=0.05)
+    assert said.marks["b"] == said.words[1].start > said.marks["a"] + 0.7
+
+
+def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
+    first, second = EspeakVoice(), EspeakVoice()
+    try:
+        second.say(Say("Something quite different comes first.", language="nl"))
+        for k in range(5):
+            second.say(Say(f"Number {k}."))
+        assert same(first.say(HELLO), second.say(HELLO))
+    finally:
+        first.close()
+        second.close()
+
+
+def test_every_fork_says_the_same(voice: EspeakVoice) -> None:
+    process = voice._process
+    name, _ = choose_voice(process.hello(), None, "en-US")
+    request = {"op": "say", "text": "<speak>Hello, I am here.</speak>", "voice": name, "wpm": 175}
+    other = {**request, "text": "<speak>Something else in between.</speak>"}
+    first = process.ask(request)
+    for _ in range(12):
+        process.ask(other)
+        assert process.ask(request) == first
+
+
+def test_without_fork_the_samples_are_the_same(voice: EspeakVoice) -> None:
+    alone = EspeakVoice(options=("--no-fork",))
+    try:
+        assert same(alone.say(HELLO), voice.say(HELLO))
+        assert alone.say(Say("Again, I am."))  # each request its own process
+        assert alone.pid is None
+    finally:
+        alone.close()
+
+
+def test_a_known_request_does_not_reach_the_engine(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    said = lone.say(HELLO)
+    lone.close()
+    assert lone.say(replace(HELLO)) is said
+    assert lone.pid is None
+
+
+def test_only_so_many_utterances_are_kept() -> None:
+    lone = EspeakVoice()
+    try:
+        first = lone.say(Say("0"))
+        for k in range(1, MOST + 1):
+            lone.say(Say(str(k)))
+        assert lone.say(Say("0")) is not first
+        assert same(lone.say(Say("0")), first)
+    finally:
+        lone.close()
+
+
+def test_many_threads_may_speak_at_once(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    said: dict[tuple[int, int], Utterance] = {}
+    texts = [Say(f"It is line {k}, I am sure.") for k in range(8)]
+
+    def speak(thread: int) -> None:
+        for k in range(8):
+            said[thread, k] = lone.say(texts[(k + thread) % 8])
+
+    threads = [threading.Thread(target=speak, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    lone.close()
+    assert len(said) == 32
+    assert all(same(said[n, k], voice.say(texts[(k + n) % 8])) for n, k in said)
+
+
+def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
+    voice: EspeakVoice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lone = EspeakVoice()
+    exchange = engine_process._exchange
+
+    def killed(process: subprocess.Popen[bytes], request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
+        monkeypatch.undo()
+        process.kill()
+        return exchange(process, request)
+
+    try:
+        lone.say(Say("first"))
+        monkeypatch.setattr(engine_process, "_exchange", killed)
+        with pytest.raises(VoiceError, match="starts it again"):
+            lone.say(HELLO)
+        assert same(lone.say(HELLO), voice.say(HELLO))
+    finally:
+        lone.close()
+
+
+def test_a_hung_engine_is_replaced(voice: EspeakVoice) -> None:
+    lone = EspeakVoice(limit=5.0)
+    try:
+        lone.say(Say("first"))
+        lone._process._limit = 0.2
+        assert lone.pid is not None
+        os.kill(lone.pid, signal.SIGSTOP)
+        with pytest.raises(VoiceError, match="did not answer"):
+            lone.say(HELLO)
+        lone._process._limit = 5.0
+        assert same(lone.say(HELLO), voice.say(HELLO))
+    finally:
+        lone.close()
+
+
+def test_a_closed_or_forgotten_voice_leaves_no_process() -> None:
+    for close in (True, False):
+        lone = EspeakVoice()
+        lone.say(Say("first"))
+        pid = lone.pid
+        assert pid is not None
+        if close:
+            lone.close()
+            lone.close()
+        del lone
+        gc.collect()
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_the_engine_ends_with_its_parent() -> None:
+    import subprocess
+    import sys
+
+    worker = subprocess.Popen(
+        [sys.executable, "-P", str(RUN), str(ENGINE.worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    assert worker.stdout.readline().startswith(b'{"rate"')
+    worker.stdin.close()  # what the system does for a parent that dies
+    assert worker.wait(10) == 0
+    worker.stdout.close()
+
+
+def test_data_behind_a_long_path_are_found(tmp_path: Path, voice: EspeakVoice) -> None:
+    import espeakng_loader  # the folder's name only; the engine stays in the worker
+
+    folder = tmp_path.joinpath(*["a" * 60] * 4)
+    folder.mkdir(parents=True)
+    data = folder / "espeak-ng-data"
+    data.symlink_to(espeakng_loader.get_data_path())
+    assert len(str(data)) > 200
+    lone = EspeakVoice(options=("--data", str(data)))
+    try:
+        assert same(lone.say(HELLO), voice.say(HELLO))
+        assert same(lone.say(Say("hallo", language="nl")), voice.say(Say("hallo", language="nl")))
+    finally:
+        lone.close()
+
+
+def test_data_that_are_not_there_are_an_error_with_words(tmp_path: Path) -> None:
+    lone = EspeakVoice(options=("--data", str(tmp_path)))
+    with pytest.raises(VoiceError, match="does not start"):
+        lone.say(HELLO)
+
+
+@pytest.mark.parametrize(
+    ("tag", "engine"),
+    [
+        ("fr-FR", "roa/fr"),
+        ("fr-fr", "roa/fr"),
+        ("nl-NL", "gmw/nl"),
+        ("nl_BE", "gmw/nl"),
+        ("en-GB", "gmw/en"),
+        ("en-US", "gmw/en-US"),
+        ("EN-us", "gmw/en-US"),
+        ("en-AU", "gmw/en"),
+        ("pt-BR", "roa/pt-BR"),
+        ("zh-CN", "sit/cmn"),
+        ("zh", "sit/cmn"),
+        ("zh-yue", "sit/yue"),
+        ("nl", "gmw/nl"),
+        ("en-gb", "gmw/en"),
+        ("no", "gmq/nb"),
+        ("es-MX", "roa/es-419"),
+    ],
+)
+def test_language_tags_find_their_voice(voice: EspeakVoice, tag: str, engine: str) -> None:
+    assert choose_voice(voice._process.hello(), None, tag) == (engine, ())
+    assert voice.say(Say("a", language=tag)).duration > 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "engine"),
+    [
+        ("nl", "gmw/nl"),
+        ("en-gb+f3", "gmw/en+f3"),
+        ("+m3", "gmw/de+m3"),
+        ("f2", "gmw/de+f2"),
+        ("Polish", "zlw/pl"),
+    ],
+)
+def test_voices_are_chosen_by_name_and_variant(voice: EspeakVoice, wanted: str, engine: str) -> None:
+    assert choose_voice(voice._process.hello(), wanted, "de-DE") == (engine, ())
+    assert voice.say(Say("a", voice=wanted, language="de-DE")).duration > 0
+
+
+def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) -> None:
+    said = voice.say(Say("hello", language="xx-YY", voice="nobody+nothing"))
+    assert said.duration > 0.3
+    assert [w.split(":")[0] for w in said.warnings] == [
+        "espeak-ng has no voice 'nobody'",
+        "espeak-ng has no variant 'nothing'",
+        "espeak-ng does not speak 'xx-YY'",
+    ]
+
+
+def test_language_flags_are_no_phonemes(voice: EspeakVoice) -> None:
+    said = voice.say(Say("c'est un weekend", language="fr"))
+    assert not any("(" in phoneme.ipa for phoneme in said.phonemes)
+
+
+@pytest.mark.parametrize(
+    ("language", "text"),
+    [
+        ("en-GB", "The flower's power: an hour of fire, our tired choir, a player and a lower tower."),
+        ("fr", "Le week-end, c'est le jazz et le marketing."),
+        ("de", "Das Meeting über Computer und Chips."),
+        ("pl", "Dżem, czekolada i dźwięk."),
+        ("zh-CN", "你好，我很高兴见到你。"),
+    ],
+)
+def test_phonemes_are_ipa_and_nothing_but_ipa(voice: EspeakVoice, language: str, text: str) -> None:
+    said = voice.say(Say(text, language=language))
+    heard = "".join(phoneme.ipa for phoneme in said.phonemes)
+    assert len(heard) > 10
+    assert not set(heard) & set("()�\x00_ˈˌ͡"), heard
+    assert all(len(phoneme.ipa.encode()) <= 8 for phoneme in said.phonemes)
+
+
+def test_rate_makes_speech_faster_within_what_the_engine_can(voice: EspeakVoice) -> None:
+    lengths = [voice.say(replace(HELLO, rate=rate)).duration for rate in (0.1, 0.5, 1.0, 2.0, 100.0)]
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[1] > 1.5 * lengths[2] > 2 * lengths[3]
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        ("one <b>two", "not well-formed"),
+        ("one < two & three", "not well-formed"),
+        ("one <!DOCTYPE a> two", "not well-formed"),
+        ("one &nothing; two", "not well-formed"),
+        ("one \x00\x07 two", "control characters"),
+        ("one \ud800 two", "control characters"),
+        ("one 😀 two", "emoji"),
+    ],
+)
+def test_bad_text_is_spoken_with_a_warning(voice: EspeakVoice, text: str, warning: str) -> None:
+    said = voice.say(Say(text))
+    assert {"one", "two"} <= set(starts(said))
+    assert any(warning in sentence for sentence in said.warnings)
+
+
+def test_marks_survive_wrong_ssml(voice: EspeakVoice) -> None:
+    said = voice.say(Say("one <mark name='a'/>two <b>three <mark name=\"c\">four", ("a", "c")))
+    assert said.marks == {"a": starts(said)["two"], "c": starts(said)["four"]}
+
+
+@pytest.mark.parametrize("text", ["", "   ", "😀", '<mark name="m"/>', "...", "\x00"])
+def test_an_empty_text_takes_no_time_and_is_said(voice: EspeakVoice, text: str) -> None:
+    said = voice.say(Say(text, ("m",)))
+    assert said.duration == 0
+    assert said.words == said.phonemes == ()
+    assert all(time == 0 for time in said.marks.values())
+    assert any("empty" in sentence for sentence in said.warnings)
+
+
+def test_a_text_of_200_kilobytes_is_refused_with_words(voice: EspeakVoice) -> None:
+    with pytest.raises(VoiceError, match="at most 20000 characters, got 200000"):
+        voice.say(Say("word " * 40_000))
+    assert voice.say(HELLO).duration > 2
+
+
+def test_a_long_text_is_spoken(voice: EspeakVoice) -> None:
+    lone = EspeakVoice()
+    said = lone.say(Say("I am here, and it is late. " * 100 + '<mark name="end"/>', ("end",)))
+    lone.close()
+    assert len(said.words) == 700
+    assert said.words[-1].end <= said.marks["end"] <= said.duration
+    assert all(a.end <= b.start for a, b in zip(said.words, said.words[1:], strict=False))
+
+
+def test_files_are_not_opened(voice: EspeakVoice, tmp_path: Path) -> None:
+    said = voice.say(Say(f'one <audio src="{tmp_path}/sound.wav">two</audio> three'))
+    assert [w.text for w in said.words] == ["one", "two", "three"]
+
+
+@pytest.mark.parametrize("language", ["ar", "hi", "zh", "ja", "ru", "el", "th", "ko", "de", "tr", "vi"])
+def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
+    texts = {
+        "ar": "مرحبا بالعالم", "hi": "नमस्ते दुनिया", "zh": "你好世界", "ja": "こんにちは", "ru": "Привет, мир",
+        "el": "καλημέρα κόσμε", "th": "สวัสดี", "ko": "안녕하세요", "de": "Grüß Gott",
+        "tr": "günaydın", "vi": "xin chào",
+    }  # fmt: skip
+    said = voice.say(Say(texts[language], language=language))
+    assert said.words
+    assert said.words[0].end > said.words[0].start
+    assert sum(bool(p.ipa) for p in said.phonemes) > 3
+    assert not said.warnings
+
+
+@pytest.mark.parametrize(
+    ("volume", "part"),
+    [("+6dB", 2.0), ("-6dB", 0.5), ("soft", 0.5), ("50", 0.5), ("150%", 1.5), ("silent", 0.0)],
+)
+def test_the_sound_is_as_loud_as_the_lips_are_told(voice: EspeakVoice, volume: str, part: float) -> None:
+    text = "Hello there my friend."
+    plain = voice.say(Say(text)).pcm
+    said = voice.say(Say(f'<prosody volume="{volume}">{text}</prosody>')).pcm
+    assert plain is not None
+    assert said is not None
+    assert np.std(said) / np.std(plain) == pytest.approx(part, rel=0.05, abs=0.01)
+
+
+@pytest.mark.parametrize("semitones", [-4, -2, 2, 4])
+def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
+    text = "Hello there my friend, how are you doing."
+
+    def pitch(ssml: str) -> float:
+        """Hz: the median over voiced stretches of 50 ms, by autocorrelation."""
+        pcm, heard = voice.say(Say(ssml)).pcm, []
+        assert pcm is not None
+        for at in range(0, len(pcm) - 1102, 551):
+            window = pcm[at : at + 1102].astype(float)
+            if np.std(window) > 800:
+                echo = np.correlate(window, window, "full")[1101:]
+                heard.append(22050 / (55 + int(np.argmax(echo[55:441]))))
+        return float(np.median(heard))
+
+    asked = pitch(f'<prosody pitch="{semitones:+d}st">{text}</prosody>')
+    assert 12 * np.log2(asked / pitch(text)) == pytest.approx(semitones, abs=1.0)
+
+
+@pytest.mark.parametrize("end", ['there<mark name="m"/>.', 'there<mark name="k"/><mark name="m"/>.'])
+def test_a_mark_before_a_full_stop_is_the_end_of_its_word_and_no_dot_is_said(
+    voice: EspeakVoice, end: str
+) -> None:
+    plain, said = voice.say(Say("Hello there.")), voice.say(Say(f"Hello {end}"))
+    assert [p.ipa for p in said.phonemes] == [p.ipa for p in plain.phonemes]
+    assert said.marks["m"] == pytest.approx(plain.words[-1].end, abs=0.01)
+    assert voice.say(Say('It is 3<mark name="m"/>.5.')).words[-1].text != "3."

@@ -1,0 +1,67 @@
+"""A recording with its times: they are taken as they are, words become phonemes, marks find their word."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
+from realizer.speech.utterance import Phoneme, Recording, Say, Word
+
+RATE = 16000
+SOUND = np.rint(8000 * np.sin(np.arange(2 * RATE) * 0.1)).astype(np.int16)
+TEXT = Say('One <mark name="m"/>two, three', ("m",))
+WORDS = (Word(0.2, 0.5, "One"), Word(1.0, 1.3, "two,"), Word(1.3, 1.8, "three"))
+
+
+def said(request: Say = TEXT, **told):
+    recording = Recording(RATE, SOUND, **told)
+    return fitted(SilentVoice(), Say(request.ssml, request.marks, recording=recording))
+
+
+def test_a_mark_stands_where_its_word_was_told_to_begin() -> None:
+    utterance = said(words=WORDS)
+    assert utterance.words == WORDS
+    assert utterance.marks == {"m": pytest.approx(1.0, abs=1e-3)}
+    assert utterance.duration == 2.0
+    assert utterance.pcm is SOUND
+
+
+def test_words_alone_have_phonemes_that_lie_in_them() -> None:
+    phonemes = said(words=WORDS).phonemes
+    assert (phonemes[0].start, phonemes[-1].end) == (0.0, 2.0)
+    assert all(a.end == b.start for a, b in pairwise(phonemes))
+    for p in (p for p in phonemes if p.ipa):
+        middle = (p.start + p.end) / 2
+        assert any(w.start <= middle <= w.end for w in WORDS)
+
+
+def test_words_that_are_divided_otherwise_are_found_by_their_letters() -> None:
+    parts = (Word(0.2, 0.3, "O"), Word(0.3, 0.5, "ne"), Word(0.5, 0.6, ","), *WORDS[1:])
+    assert said(words=parts).marks["m"] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_phonemes_are_taken_as_they_are_and_the_rest_is_silence() -> None:
+    utterance = said(phonemes=(Phoneme(0.5, 0.6, "p"), Phoneme(0.6, 1.8, "a"), Phoneme(1.8, 9.0, "")))
+    assert [(p.start, p.end, p.ipa) for p in utterance.phonemes] == [
+        (0.0, 0.5, ""),
+        (0.5, 0.6, "p"),
+        (0.6, 1.8, "a"),
+        (1.8, 2.0, ""),
+    ]
+    assert [w.text for w in utterance.words] == ["One", "two", "three"]
+    assert 0.5 < utterance.marks["m"] < 1.8
+
+
+def test_without_text_and_times_the_mouth_opens_by_loudness() -> None:
+    utterance = said(Say(""))
+    assert {p.ipa for p in utterance.phonemes} == {"a"}
+    assert utterance.words == ()
+
+
+def test_without_times_the_text_is_looked_for_in_the_sound() -> None:
+    utterance = said(Say("One two three"))
+    assert [w.text for w in utterance.words] == ["One", "two", "three"]

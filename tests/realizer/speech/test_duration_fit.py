@@ -1,0 +1,121 @@
+"""Speech that has to last so long is spoken faster or slower."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realizer.speech import SilentVoice
+from realizer.speech.duration_fit import fitted, stretched
+from realizer.speech.utterance import WARP, Say, Utterance
+
+SAY = Say('one two <mark name="m"/>three four five', ("m",))
+
+
+@pytest.mark.parametrize("ratio", [0.7, 0.95, 1.0, 1.3, 1.6])
+def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
+    voice = SilentVoice()
+    natural = voice.say(SAY)
+    made = fitted(voice, Say(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
+    assert made.duration == pytest.approx(natural.duration * ratio)
+    assert made.phonemes[-1].end == pytest.approx(made.duration)
+    assert made.marks["m"] / made.duration == pytest.approx(natural.marks["m"] / natural.duration, abs=0.05)
+    assert made.stretch == WARP, "what is left can be warped"
+
+
+def test_without_a_length_it_is_the_voices_own() -> None:
+    voice = SilentVoice()
+    assert fitted(voice, SAY).duration == voice.say(SAY).duration
+    assert voice.say(SAY).stretch[0] < 1 < voice.say(SAY).stretch[1]
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize("ratio", [0.75, 1.4])
+def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
+    from realizer.speech import find_voice
+
+    voice = find_voice("espeak")
+    try:
+        natural = voice.say(SAY)
+        made = fitted(voice, Say(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
+        assert made.pcm is not None
+        assert len(made.pcm) == round(made.duration * made.sample_rate)
+        assert made.words[-1].end == pytest.approx(natural.words[-1].end * ratio, rel=0.1)
+        loud = np.abs(made.pcm.astype(float))
+        assert loud[: int(made.words[0].end * made.sample_rate)].max() > 1000
+    finally:
+        voice.close()
+
+
+def test_a_stretched_sound_keeps_its_loudness() -> None:
+    wave = (8000 * np.sin(np.arange(22050) * 0.1)).astype(np.int16)
+    made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, wave), {"end": 1.005})
+    assert made.pcm is not None
+    assert np.abs(made.pcm).max() == pytest.approx(8000, rel=0.01)
+    assert made.marks["m"] == pytest.approx(0.5025)
+
+
+def test_a_sound_is_warped_so_that_its_marks_come_where_they_are_wanted() -> None:
+    loud = np.zeros(22050, np.int16)
+    loud[11025:11035] = 9000  # a click at the mark
+    made = stretched(Utterance(1.0, (), (), {"m": 0.5}, 22050, loud), {"m": 0.53, "end": 1.02})
+    assert (made.duration, made.marks["m"]) == (1.02, 0.53)
+    assert made.pcm is not None
+    assert int(np.argmax(made.pcm)) / 22050 == pytest.approx(0.53, abs=0.001)
+
+
+@pytest.mark.espeak
+@pytest.mark.parametrize("seconds", [1.3, 1.8, 2.3, 3.1])
+def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) -> None:
+    from realizer.speech import find_voice
+
+    class Heard:
+        """A voice that remembers how long what it said was."""
+
+        name = "heard"
+
+        def __init__(self) -> None:
+            self.voice = find_voice("espeak")
+            self.lengths: list[float] = []
+
+        def say(self, request: Say) -> Utterance:
+            said = self.voice.say(request)
+            self.lengths.append(said.duration)
+            return said
+
+        def close(self) -> None:
+            self.voice.close()
+
+    voice = Heard()
+    try:
+        text = "Hello, I am very pleased to meet you."
+        made = fitted(voice, Say(text, seconds=seconds))
+    finally:
+        voice.close()
+    assert made.duration == pytest.approx(seconds)
+    assert min(abs(length / seconds - 1) for length in voice.lengths) < 0.012
+
+
+def test_a_voice_at_its_limit_is_not_asked_for_ever() -> None:
+    asked = []
+
+    class Rigid:
+        name = "rigid"
+
+        def say(self, request: Say) -> Utterance:
+            asked.append(request.rate)
+            return Utterance(1.0, (), (), {})
+
+        def close(self) -> None:
+            pass
+
+    assert fitted(Rigid(), Say("x", seconds=3.0)).duration == 3.0
+    assert len(asked) == 2
+
+
+def test_what_was_joined_of_parts_is_one_when_it_is_stretched() -> None:
+    made = SilentVoice().say(SAY)
+    whole = replace(made, parts=((0.0, made),))
+    assert stretched(whole, {"end": 1.1 * made.duration}).parts == ()
