@@ -7,6 +7,9 @@ import os
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
+# Tests run beside each other: one thread of linear algebra each. numpy reads it once, when it is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # The same examples each run, so that a failure is a change; `HYPOTHESIS_PROFILE=thorough` looks for new ones.
 # A failure is told as it was found: making it smaller can take minutes, `HYPOTHESIS_PROFILE=small` does it.
 settings.register_profile(
@@ -23,6 +26,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden anew, then review the diff"
     )
-    parser.addoption("--documents", type=int, help="how many random documents test_grammar plays")
-    parser.addoption("--mutants", type=int, default=10_000, help="how many broken documents test_fuzz reads")
+    parser.addoption("--documents", type=int, help="how many random documents test_grammar plays (300)")
+    parser.addoption("--mutants", type=int, default=1500, help="how many broken documents test_fuzz reads")
     parser.addoption("--seed", type=int, default=0, help="of the mutants of test_fuzz")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Allow slow tests 300 s; `timeout` in pyproject.toml is for the others."""
+    for item in items:
+        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(300))
