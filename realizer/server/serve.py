@@ -44,9 +44,10 @@ async def serve(settings: Settings | None = None) -> None:
     if settings.workers > 1:
         with _told(settings):
             workers = await Workers(settings).start()
+        asked = _asked(signal.SIGINT, signal.SIGTERM)
         print(*lines(settings, workers.port), sep="\n", flush=True)
         try:
-            await _asked(signal.SIGINT, signal.SIGTERM)
+            await asked
         finally:
             await workers.close()
         return
@@ -75,7 +76,8 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
     except (RealizerError, OSError, ValueError) as error:  # the parent says it, once
         await loop.sock_sendall(control, FAULT + str(error).encode())
         return
-    gone = asyncio.Event()
+    # Before READY: the parent may ask a worker that is ready to end.
+    ending = _asked(signal.SIGTERM)
 
     def take() -> None:
         try:
@@ -85,18 +87,13 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
             pass
         except (EOFError, OSError):
             loop.remove_reader(control)
-            gone.set()
+            if not ending.done():
+                ending.set_result(None)
 
-    async def asked() -> None:
-        done = [asyncio.ensure_future(one) for one in (gone.wait(), _asked(signal.SIGTERM))]
-        await asyncio.wait(done, return_when=asyncio.FIRST_COMPLETED)
-        loop.remove_reader(control)
-        for one in done:
-            one.cancel()
-
+    ending.add_done_callback(lambda _: loop.remove_reader(control))
     loop.add_reader(control, take)
     await loop.sock_sendall(control, READY)
-    await _serve(server, asked())
+    await _serve(server, ending)
 
 
 async def _serve(server: Server, asked: Awaitable[None]) -> None:
@@ -111,15 +108,20 @@ async def _serve(server: Server, asked: Awaitable[None]) -> None:
         await server.close()
 
 
-async def _asked(*signals: signal.Signals) -> None:
-    """Return when one of these has come; a second one ends at once."""
+def _asked(*signals: signal.Signals) -> asyncio.Future[None]:
+    """Return a future that is done once one of these signals has come; another one ends the process."""
     loop = asyncio.get_running_loop()
-    come = asyncio.Event()
+    come: asyncio.Future[None] = loop.create_future()
+
+    def take() -> None:
+        for number in signals:
+            loop.remove_signal_handler(number)
+        if not come.done():
+            come.set_result(None)
+
     for number in signals:
-        loop.add_signal_handler(number, come.set)
-    await come.wait()
-    for number in signals:
-        loop.remove_signal_handler(number)
+        loop.add_signal_handler(number, take)
+    return come
 
 
 async def _tell(door: Door) -> None:

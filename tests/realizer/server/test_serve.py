@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.wire import FrameKind, unpack
-from realizer.server.serve import Server, serve
+from realizer.server.serve import Server, serve, work
 from realizer.server.session.session import Session
 
 DOCUMENT = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
@@ -322,3 +322,29 @@ def test_messages_in_quick_succession_all_play(loop) -> None:
             assert sum(":end" in m for m in messages) == 20
 
     serving(test, factory)
+
+
+def test_a_worker_can_be_ended_before_it_says_that_it_is_ready() -> None:
+    handlers: list[object] = []
+
+    class Control(socket.socket):
+        """Notes how SIGTERM is handled when something is sent."""
+
+        def send(self, data: bytes, flags: int = 0) -> int:  # type: ignore[override]
+            handlers.append(signal.getsignal(signal.SIGTERM))
+            return super().send(data, flags)
+
+    async def run() -> None:
+        ours, theirs = socket.socketpair()
+        with ours, Control(fileno=theirs.detach()) as control:
+            for end in (ours, control):
+                end.setblocking(False)
+            async with asyncio.timeout(LIMIT):
+                working = asyncio.create_task(work(Settings(port=0, voice="silent"), 0, control))
+                await asyncio.get_running_loop().sock_recv(ours, 1)
+                signal.raise_signal(signal.SIGTERM)
+                await working
+
+    asyncio.run(run())
+    assert len(handlers) == 1
+    assert handlers[0] != signal.SIG_DFL
