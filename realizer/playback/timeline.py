@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from graphlib import TopologicalSorter
 
 from bml_schema import Block
 from realizer.behaviours.kind import Kind, World
@@ -107,11 +108,22 @@ class Course:
             self.changed()
 
     def line_up(self, playing: Playing) -> None:
-        """Let a waiting block, and those that follow it, report after all others at one instant."""
-        line = deque([playing])
-        while line:
-            first = line.popleft()
-            line += [other for other in first.followers if other.waiting]
+        """Let a waiting block, and those that follow it, report after all others at one instant.
+
+        Raises:
+            graphlib.CycleError: blocks wait for each other.
+        """
+        graph: TopologicalSorter[Playing] = TopologicalSorter({playing: ()})
+        todo, visited = deque([playing]), {playing}  # paths to a block may be too many to follow each
+        while todo:
+            first = todo.popleft()
+            for other in first.followers:
+                if other.waiting:
+                    graph.add(other, first)
+                    if other not in visited:
+                        visited.add(other)
+                        todo.append(other)
+        for first in graph.static_order():
             first.order = self._order
             self._order += 1
             if first.start < FOREVER:

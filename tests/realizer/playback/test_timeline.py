@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from graphlib import CycleError
+
+import pytest
+
 from bml_schema import BlockProgress, parse
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
@@ -64,6 +68,29 @@ def test_blocks_line_up_behind_all_others_and_in_their_own_order() -> None:
     third = taken_in(blocks, "c")
     blocks.line_up(first)
     assert third.order < first.order < second.order
+
+
+def test_blocks_line_up_once_however_many_paths_lead_to_them() -> None:
+    blocks = course()
+    first = taken_in(blocks, "a")
+    layers = [[first]]
+    for number in range(40):  # 2 ** 40 paths
+        layer = [taken_in(blocks, f"{side}{number}", after=layers[-1][0]) for side in "lr"]
+        for block in layer:
+            for other in layers[-1][1:]:
+                block.await_too(Wait(other))
+        layers.append(layer)
+    blocks.line_up(first)
+    orders = [block.order for layer in layers for block in layer]
+    assert orders == list(range(orders[0], orders[0] + len(orders)))
+
+
+def test_blocks_that_wait_for_each_other_cannot_line_up() -> None:
+    blocks = course()
+    first = taken_in(blocks, "a")
+    first.await_too(Wait(taken_in(blocks, "b", after=first)))
+    with pytest.raises(CycleError):
+        blocks.line_up(first)
 
 
 def test_whatever_changes_what_is_shown_is_a_new_revision() -> None:
