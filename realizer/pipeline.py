@@ -189,7 +189,7 @@ class _Speaker:
 
     @staticmethod
     def _find(name: str | None) -> Voice:
-        from realizer.speech import find_voice
+        from realizer.speech.registry import find_voice
 
         return find_voice(name)
 

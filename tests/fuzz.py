@@ -35,7 +35,8 @@ from realizer.core.settings import Settings
 from realizer.outputs.fap_text import encode
 from realizer.pipeline import submitted
 from realizer.playback.player import Player
-from realizer.protocol.messages import ErrorMessage, parse_control
+from realizer.protocol.messages.parse import parse_control
+from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
 from realizer.server.transports.message_format import Leave, ToSession
@@ -43,7 +44,7 @@ from realizer.server.transports.xface.attachments import prepare
 from realizer.server.transports.xface.reader import Content, Fault, TaskReader
 from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, Desk
 from realizer.server.transports.xface.wire import Task, pack_task, read_notes
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 from tests.interleavings import CONTROLS, FILTERS, Interleaving, no_error
 from tests.mutants import mutants
 

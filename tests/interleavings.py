@@ -26,8 +26,8 @@ from realizer.server.journal.replay import restored
 from realizer.server.runtime.session_registry import Hub
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 from tests.mutants import mutants
 from tests.waking import wakes

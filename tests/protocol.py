@@ -17,12 +17,10 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 import realizer
-from realizer.protocol.messages import (
-    PROTOCOL,
-    STREAMS,
-    SUPPORTED,
+from realizer.protocol.messages.common import PROTOCOL, STREAMS
+from realizer.protocol.messages.parse import SUPPORTED, Control
+from realizer.protocol.messages.replies import (
     Changed,
-    Control,
     ErrorCode,
     ErrorMessage,
     FrameMessage,
@@ -30,10 +28,10 @@ from realizer.protocol.messages import (
     Pong,
     ScheduleMessage,
     StateMessage,
-    Subscribe,
     Subscribed,
     Welcome,
 )
+from realizer.protocol.messages.requests import Subscribe
 from realizer.protocol.wire import FINAL, FORGET, PAYLOADS, VERSION
 
 __all__ = ["BEGIN", "END", "FILE", "README", "asyncapi", "render", "tables", "within"]

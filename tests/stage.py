@@ -18,7 +18,7 @@ from realizer.behaviours import VOCABULARY
 from realizer.pipeline import speak, warning_of
 from realizer.playback.player import Player, Speaking
 from realizer.scheduling.timing import Schedule
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 from realizer.tables import faps
 from tests.cases import CORPUS, Case, Instant, Told, told
 

@@ -26,7 +26,7 @@ from realizer.animation.fap.conversion import to_fap
 from realizer.pipeline import submitted
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import STRETCH
 from tests.grammar import KINDS, texts
 

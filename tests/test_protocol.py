@@ -11,7 +11,9 @@ import pytest
 from websockets.asyncio.client import connect
 
 from realizer.core.settings import Settings
-from realizer.protocol.messages import STREAMS, SUPPORTED, ErrorMessage, parse_control
+from realizer.protocol.messages.common import STREAMS
+from realizer.protocol.messages.parse import SUPPORTED, parse_control
+from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.wire import PAYLOADS
 from realizer.server.serve import Server
 from tests.protocol import (

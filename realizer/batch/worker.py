@@ -53,7 +53,7 @@ class _Speaker:
 
     def say(self, request: Say) -> Utterance:
         if self._voice is None:
-            from realizer.speech import find_voice
+            from realizer.speech.registry import find_voice
 
             self._voice = find_voice(self.name)
         try:

@@ -9,7 +9,7 @@ from typing import Any
 
 from realizer.animation.channel import Channel
 from realizer.core.array_types import Float64
-from realizer.expressions import Library, shipped
+from realizer.expressions.library import Library, shipped
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, Say, Utterance
 

@@ -12,7 +12,9 @@ from realizer.animation.channel import Channel
 from realizer.behaviours import media, pose_channels
 from realizer.behaviours.kind import Fault, Kind, World
 from realizer.core.array_types import Float64
-from realizer.expressions import Timeline, Track, faults_of, lasts, read_timeline, remarks, spans
+from realizer.expressions.spans import lasts, spans
+from realizer.expressions.timeline import Timeline, Track, faults_of, remarks
+from realizer.expressions.timeline_reader import read_timeline
 from realizer.scheduling.timing import Timing
 
 __all__ = ["KINDS"]

@@ -15,7 +15,7 @@ from realizer.checking.masked_faults import hidden, told_of, without_faults
 from realizer.pipeline import speak, submitted, warning_of
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 
 __all__ = ["Checked", "checked"]

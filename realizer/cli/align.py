@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from realizer.speech.align import Alignment
+    from realizer.speech.align.alignment import Alignment
 
 __all__: list[str] = []
 
@@ -23,7 +23,7 @@ __all__: list[str] = []
 def align(audio: Path, text: str, language: str, aligner: str | None, output: Path | None) -> None:
     """Find when AUDIO says each word of TEXT (or of a file, as @FILE)."""
     from realizer.behaviours.sound_file import read_sound
-    from realizer.speech.align import align as aligned
+    from realizer.speech.align.aligner import align as aligned
 
     if output is not None and output.suffix not in (".json", ".vtt"):
         raise click.UsageError(f"-o: wanted a .json or a .vtt file, got {output}")

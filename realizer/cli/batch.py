@@ -121,7 +121,7 @@ def _options(
 ) -> Options:
     """How documents are played: flags, variables and defaults, and the voice that speaks by name."""
     from realizer.batch.task import Options
-    from realizer.speech import find_voice
+    from realizer.speech.registry import find_voice
 
     chosen: Settings = options.settings(idle=False if no_idle else None, **asked)
     if any(suffix in PICTURES for suffix in formats):

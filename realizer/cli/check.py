@@ -60,7 +60,9 @@ def check(
     A .toml or .json file is a timeline (`realizer timeline`).
     """
     from bml_schema.source import Source
-    from realizer.checking import Finding, advice, checked
+    from realizer.checking.advice import advice
+    from realizer.checking.document import checked
+    from realizer.checking.finding import Finding
     from realizer.cli.behaviour_advice import habits
     from realizer.cli.diagnostics import one_line, render
     from realizer.playback.player import Player
@@ -116,7 +118,7 @@ def _check_timeline(
     name: str, text: bytes, folder: Path | None, role: Role, mood: Mood | None, quiet: bool
 ) -> int:
     """How many faults a timeline has; each is told, and advice on a sound one."""
-    from realizer.expressions import library_of
+    from realizer.expressions.library import library_of
 
     library = library_of(folder)
     faults = faults_in(text, library)

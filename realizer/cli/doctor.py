@@ -34,7 +34,7 @@ def _pictures() -> Iterator[Finding]:
 
 
 def _voices() -> Iterator[Finding]:
-    from realizer.speech import voices
+    from realizer.speech.registry import voices
 
     for voice in voices():
         yield voice.available, voice.name, voice.says

@@ -259,7 +259,7 @@ def _heard(block: Block, language: str) -> list[Heard]:
     from realizer.knowledge.word_languages import language_of
     from realizer.pipeline import submitted
     from realizer.playback.player import Player
-    from realizer.speech import SilentVoice
+    from realizer.speech.silent import SilentVoice
 
     times = submitted(Player(language=language), block, SilentVoice()).times
     said = [

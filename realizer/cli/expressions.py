@@ -14,7 +14,7 @@ from realizer.cli import options
 
 if TYPE_CHECKING:
     from realizer.analysis.picture_search import Likeness
-    from realizer.expressions import Expression
+    from realizer.expressions.expression import Expression
 
 __all__: list[str] = []
 
@@ -60,7 +60,7 @@ def expressions() -> None:
 @options.expressions
 def list_(as_json: bool, output: Path | None, face: str, expressions: Path | None) -> None:
     """A line for each: name, action units, seconds of onset, apex and offset, and what is seen."""
-    from realizer.expressions import library_of
+    from realizer.expressions.library import library_of
 
     _check_picture(output, face)
     known = list(library_of(options.settings(expressions=expressions).expressions).values())
@@ -100,7 +100,8 @@ def find(
     realizer expressions find --au 1,2,12L -o found.png
     realizer expressions find --like face.png
     """
-    from realizer.expressions import by_action_units, by_meaning, library_of
+    from realizer.expressions.library import library_of
+    from realizer.expressions.search import by_action_units, by_meaning
 
     if sum(way is not None for way in (text, units, like)) != 1:
         raise click.UsageError("wanted one of TEXT, --au and --like")

@@ -15,7 +15,7 @@ MODULES = {"film": "av"}  # an extra, and what it installs
 @click.command()
 def voices() -> None:
     """List the voices, and say how to get the missing ones."""
-    from realizer.speech import voices as known
+    from realizer.speech.registry import voices as known
 
     for voice in known():
         click.echo(f"{voice.name:<16} {voice.says}")

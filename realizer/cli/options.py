@@ -137,7 +137,7 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
 
 def tell_silence(voice: str | None) -> None:
     """A word on standard error where nobody asked for silence and there is no voice."""
-    from realizer.speech import find_voice, voices
+    from realizer.speech.registry import find_voice, voices
 
     if voice is None and find_voice(None).name == "silent":
         missing = next((v.says for v in voices() if not v.available), "")

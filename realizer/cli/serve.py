@@ -125,7 +125,7 @@ def serve(config: Path | None, **flags: Any) -> None:
     from realizer.core.settings import SettingsError
     from realizer.server.serve import run
     from realizer.server.serve import serve as start
-    from realizer.speech import find_voice
+    from realizer.speech.registry import find_voice
 
     try:
         settings = Settings.read(flags, file=config)

@@ -12,7 +12,7 @@ from realizer.animation.axis import au, axis, fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32
 from realizer.emotions.wheel import wheel
-from realizer.expressions import Expression
+from realizer.expressions.expression import Expression
 from realizer.tables import by_number, faps
 from realizer.tables.control_groups import au_regions, fap_regions
 from realizer.tables.emotions import archetypes

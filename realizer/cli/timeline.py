@@ -14,7 +14,8 @@ from realizer.cli import options
 from realizer.cli.realize import perform, performing
 
 if TYPE_CHECKING:
-    from realizer.expressions import Library, Timeline
+    from realizer.expressions.library import Library
+    from realizer.expressions.timeline import Timeline
     from realizer.tables.knowledge import Mood, Role
 
 __all__: list[str] = []
@@ -54,7 +55,7 @@ def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
     realizer timeline brows.toml -o brows.mp4
     realizer check brows.toml
     """
-    from realizer.expressions import library_of
+    from realizer.expressions.library import library_of
 
     if asked["media"] is not None:
         raise click.BadParameter("a timeline names no files", param_hint="--media")
@@ -78,7 +79,8 @@ def is_timeline(name: str) -> bool:
 def faults_in(content: bytes, library: Library) -> list[str]:
     """All that is wrong with a timeline: channel, entry, what was wanted, what came."""
     from realizer.core.errors import TableError
-    from realizer.expressions import faults_of, read_timeline
+    from realizer.expressions.timeline import faults_of
+    from realizer.expressions.timeline_reader import read_timeline
 
     try:
         return faults_of(read_timeline(content), library)
@@ -88,7 +90,8 @@ def faults_in(content: bytes, library: Library) -> list[str]:
 
 def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -> list[str]:
     """What people's faces do otherwise than those of a sound timeline, and what would be usual."""
-    from realizer.expressions import read_timeline, remarks
+    from realizer.expressions.timeline import remarks
+    from realizer.expressions.timeline_reader import read_timeline
 
     timeline = read_timeline(content)
     found = chain(remarks(timeline), _advice(timeline, library, role, mood))
@@ -97,7 +100,7 @@ def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -
 
 def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[str]:
     from bml_schema import Block
-    from realizer.expressions import evident
+    from realizer.expressions.spans import evident
     from realizer.knowledge.advice import Seen, advise, lasting
 
     seen = []

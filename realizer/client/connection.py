@@ -8,7 +8,7 @@ from typing import Any
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError
 from realizer.client.sync_client import SyncClient
-from realizer.protocol.messages import PROTOCOL
+from realizer.protocol.messages.common import PROTOCOL
 
 __all__ = ["Connecting", "connect"]
 

@@ -23,7 +23,7 @@ from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends,
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
 from realizer.core.array_types import Float64
-from realizer.expressions import library_of
+from realizer.expressions.library import library_of
 from realizer.playback.active_block import Speaking
 from realizer.playback.block_manager import Ensemble
 from realizer.playback.block_store import Cast

@@ -13,8 +13,9 @@ import numpy as np
 from align import SENTENCES
 
 from realizer.core.errors import RealizerError
-from realizer.speech import Say, find_voice
-from realizer.speech.align import align
+from realizer.speech.align.aligner import align
+from realizer.speech.registry import find_voice
+from realizer.speech.utterance import Say
 
 
 def main() -> None:

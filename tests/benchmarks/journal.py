@@ -32,8 +32,8 @@ from realizer.server.journal.recordings import FolderJournal
 from realizer.server.journal.replay import restored
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 
 SETTINGS = Settings(voice="silent")

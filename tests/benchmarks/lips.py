@@ -18,7 +18,8 @@ from realizer.animation.lips.visemes import coarticulation
 from realizer.animation.pose import poses
 from realizer.face.load import load_face
 from realizer.pipeline import realize
-from realizer.speech import Say, Utterance, Voice, find_voice
+from realizer.speech.registry import find_voice
+from realizer.speech.utterance import Say, Utterance, Voice
 from tests.mouths import Mouth
 
 SENTENCES = {

@@ -15,11 +15,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.speech import EspeakVoice, Say
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.protocol import PHONEME, WORD, read_answer
-from realizer.speech.espeak.voice import choose_voice
+from realizer.speech.espeak.voice import EspeakVoice, choose_voice
 from realizer.speech.ssml import read_script
+from realizer.speech.utterance import Say
 
 __all__ = ["TEXTS", "Errors", "errors"]
 

@@ -29,10 +29,10 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import FrameKind, unpack
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech import Say, find_voice, voices
 from realizer.speech.cache import Kept
 from realizer.speech.duration_fit import fitted
-from realizer.speech.utterance import MOST_TEXT, Utterance, Voice
+from realizer.speech.registry import find_voice, voices
+from realizer.speech.utterance import MOST_TEXT, Say, Utterance, Voice
 
 SENTENCE = "Hello, I am very pleased to meet you, number {}."
 PARAGRAPH = "I am number {0}, and it would have been the one of the best that you have seen. " * 8

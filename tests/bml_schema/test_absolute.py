@@ -26,7 +26,7 @@ from bml_schema import (
     write,
 )
 from realizer import schedule
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 from tests.strategies import blocks, numbers
 
 CORPUS = Path(__file__).parents[1] / "corpus"

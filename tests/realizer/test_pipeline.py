@@ -15,7 +15,7 @@ from realizer.examples import examples
 from realizer.playback.player import Speaking
 from realizer.playback.scene_file import parse_scene
 from realizer.realization import Realization
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance
 from realizer.tables import faps
 

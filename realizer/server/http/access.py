@@ -12,7 +12,7 @@ from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
 from realizer.core.settings import Settings, SettingsError, raises
-from realizer.protocol.messages import MAX_CONTROL
+from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.documents.limits import used_up
 from realizer.server.http.jwt_tokens import Pass, PassError, Passes
 from realizer.server.runtime.session_registry import HubError

@@ -11,7 +11,7 @@ from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 
 if TYPE_CHECKING:
-    from realizer.checking import Finding
+    from realizer.checking.finding import Finding
 
 __all__ = ["DeskError", "faults", "feeling", "pose"]
 
@@ -34,7 +34,8 @@ def faults(text: str, settings: Settings) -> str:
     fault is. Faults are what `realizer check` tells, advice has the type "ADVICE".
     """
     from bml_schema.source import Source
-    from realizer.checking import advice, checked
+    from realizer.checking.advice import advice
+    from realizer.checking.document import checked
     from realizer.playback.player import Player
 
     if len(text) > MOST_TEXT:

@@ -184,6 +184,6 @@ def _profiles() -> dict[str, list[str]]:
 
 
 def _voices() -> list[dict[str, Any]]:
-    from realizer.speech import voices
+    from realizer.speech.registry import voices
 
     return [{"name": v.name, "engine": v.engine, "available": v.available} for v in voices()]

@@ -96,7 +96,7 @@ class Studio:
             place.renderer.close()
 
     def _voice(self, name: str | None) -> Voice:
-        from realizer.speech import find_voice
+        from realizer.speech.registry import find_voice
 
         with self._lock:
             if name not in self._voices:

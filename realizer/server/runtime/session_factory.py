@@ -11,7 +11,7 @@ from typing import Any
 from realizer.behaviours.kind import Position
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
-from realizer.expressions import library_of
+from realizer.expressions.library import library_of
 from realizer.face.fap_mapping import mapping_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Journal, JournalError, Kept, Recorder, journal_at

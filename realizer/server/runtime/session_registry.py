@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, raises
-from realizer.protocol.messages import ErrorMessage
+from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.documents.limits import used_up
 from realizer.server.session.effects import Close, Effect, Move, Send
 from realizer.server.session.session import Session

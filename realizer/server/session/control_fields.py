@@ -9,7 +9,7 @@ from bml_schema import Emotion
 from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import World
-from realizer.protocol.messages import Feeling, SetMessage
+from realizer.protocol.messages.requests import Feeling, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.tables import faps
 

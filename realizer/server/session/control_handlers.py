@@ -5,27 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from realizer.core.errors import FaceError, VoiceError
-from realizer.protocol.messages import (
-    PROTOCOL,
-    Anticipate,
+from realizer.protocol.messages.common import PROTOCOL
+from realizer.protocol.messages.parse import Control
+from realizer.protocol.messages.replies import (
     BlockState,
-    CharacterMessage,
     CharacterState,
-    Control,
     ErrorMessage,
+    Pong,
+    StateMessage,
+    VoiceState,
+)
+from realizer.protocol.messages.requests import (
+    Anticipate,
+    CharacterMessage,
     Hello,
     Ping,
-    Pong,
     SceneMessage,
     SetMessage,
-    SpeechMessage,
-    StateMessage,
     StateQuery,
     Stop,
     Subscribe,
     Unsubscribe,
-    VoiceState,
 )
+from realizer.protocol.messages.speech import SpeechMessage
 from realizer.server.session.control_fields import Wrong, feeling_of, held, index_of
 from realizer.server.session.subscriptions import subscribe, tell_face, unsubscribe
 from realizer.server.speech.audio_clips import ClipError
@@ -136,7 +138,7 @@ def _character(session: Session, message: CharacterMessage) -> None:
     if message.face is not None:
         session.faces.check(message.face)
     if message.voice is not None:
-        from realizer.speech import find_voice
+        from realizer.speech.registry import find_voice
 
         find_voice(message.voice).close()  # one that is not there is said before anything is spoken
     index = index_of(session, message.id)

@@ -7,16 +7,9 @@ import logging
 from typing import TYPE_CHECKING
 
 from bml_schema import WarningFeedback
-from realizer.protocol.messages import (
-    Control,
-    ErrorMessage,
-    Hello,
-    Ping,
-    StateQuery,
-    Subscribe,
-    Unsubscribe,
-    parse_control,
-)
+from realizer.protocol.messages.parse import Control, parse_control
+from realizer.protocol.messages.replies import ErrorMessage
+from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
 from realizer.protocol.wire import WireError, unpack_clip
 from realizer.server.documents.document_queue import name_of
 from realizer.server.journal import JournalError, Lost

@@ -11,7 +11,7 @@ from realizer.behaviours.kind import Position
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
-from realizer.protocol.messages import ErrorMessage, Gap
+from realizer.protocol.messages.replies import ErrorMessage, Gap
 from realizer.server.documents.limits import too_long
 from realizer.server.documents.submission import Intake
 from realizer.server.journal import Lost

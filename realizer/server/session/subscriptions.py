@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.animation.axis import AU_NAMES
 from realizer.core.settings import raises
-from realizer.protocol.messages import PICTURES, STREAMS, Changed, Subscribe, Subscribed, Unsubscribe
+from realizer.protocol.messages.common import PICTURES, STREAMS
+from realizer.protocol.messages.replies import Changed, Subscribed
+from realizer.protocol.messages.requests import Subscribe, Unsubscribe
 from realizer.server.documents.limits import MAX_CHARACTERS, too_many_pixels
 from realizer.server.session.control_fields import Wrong, index_of
 from realizer.server.session.effects import Look

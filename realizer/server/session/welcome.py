@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.settings import Settings
-from realizer.expressions import library_of
-from realizer.protocol.messages import MAX_CONTROL, MAX_FPS, PICTURES, STREAMS, Capabilities, Limits, Welcome
+from realizer.expressions.library import library_of
+from realizer.protocol.messages.common import MAX_CONTROL, MAX_FPS, PICTURES, STREAMS
+from realizer.protocol.messages.replies import Capabilities, Limits, Welcome
 from realizer.server.documents.limits import MAX_CHARACTERS
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def capabilities(settings: Settings) -> dict[str, Any]:
     from realizer.face.load import list_faces, load_face
     from realizer.render.cameras import camera_names
     from realizer.render.light import presets
-    from realizer.speech import voices
+    from realizer.speech.registry import voices
     from realizer.tables.lexemes import face_lexemes, head_lexemes
 
     return {

@@ -14,7 +14,7 @@ import numpy as np
 from realizer.behaviours.sound_file import RATES, read_sound
 from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
-from realizer.protocol.messages import SpeechMessage, Timed
+from realizer.protocol.messages.speech import SpeechMessage, Timed
 from realizer.protocol.wire import ClipPiece
 from realizer.speech.recorded.viseme_names import sound_of
 from realizer.speech.utterance import Phoneme, Recording, Word

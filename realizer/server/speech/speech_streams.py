@@ -8,7 +8,7 @@ from dataclasses import replace
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
 from realizer.playback.references import redirected, references
-from realizer.protocol.messages import SpeechMessage
+from realizer.protocol.messages.speech import SpeechMessage
 from realizer.server.speech.speech_chunks import Piece
 from realizer.server.speech.speech_stream import Turn
 

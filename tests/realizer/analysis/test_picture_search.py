@@ -9,7 +9,7 @@ from realizer.analysis.picture_search import UnknownPictureError, by_picture, re
 from realizer.animation.axis import au, axis
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
-from realizer.expressions import shipped
+from realizer.expressions.library import shipped
 from realizer.face.load import takes
 from realizer.render import Renderer
 

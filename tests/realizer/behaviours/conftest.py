@@ -12,7 +12,7 @@ import pytest
 
 from realizer.pipeline import realize
 from realizer.realization import Realization
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 
 NAMESPACES = " ".join(
     (

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.speech import Say
 from realizer.speech.espeak.voice import EspeakVoice, missing
+from realizer.speech.utterance import Say
 from tests.realizer.behaviours.conftest import wav
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from bml_schema.source import Source
-from realizer.checking import Finding, advice, checked
+from realizer.checking.advice import advice
+from realizer.checking.document import checked
+from realizer.checking.finding import Finding
 from realizer.playback.player import Player
 
 GOOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bml_schema.source import Source
-from realizer.checking import checked
+from realizer.checking.document import checked
 from realizer.playback.player import Player
 
 

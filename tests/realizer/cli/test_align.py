@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.cli import cli
-from realizer.speech import Say
 from realizer.speech.espeak.voice import EspeakVoice, missing
+from realizer.speech.utterance import Say
 from tests.realizer.behaviours.conftest import wav
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=str(missing()))

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
-from realizer.expressions import shipped
+from realizer.expressions.library import shipped
 
 
 def run(*words: str) -> Result:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.expressions import key, shipped
+from realizer.expressions.expression import key
+from realizer.expressions.library import shipped
 
 
 def test_it_is_seen_for_its_apex_and_half_of_coming_and_going() -> None:

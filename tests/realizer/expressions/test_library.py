@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realizer.core.errors import TableError
-from realizer.expressions import key, library_of, shipped
+from realizer.expressions.expression import key
+from realizer.expressions.library import library_of, shipped
 from realizer.tables.emotions import archetypes
 from realizer.tables.expression_words import expression_words
 from realizer.tables.templates import templates

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.expressions import by_action_units, by_meaning, shipped
-from realizer.expressions.search import stem
+from realizer.expressions.library import shipped
+from realizer.expressions.search import by_action_units, by_meaning, stem
 
 
 def names(found) -> list[str]:

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.expressions import Entry, Timeline, Track, evident, lasts, shipped, spans
+from realizer.expressions.library import shipped
+from realizer.expressions.spans import evident, lasts, spans
+from realizer.expressions.timeline import Entry, Timeline, Track
 
 
 def test_an_entry_without_a_duration_lasts_as_its_expression_does() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from realizer.expressions import Entry, Timeline, Track, faults_of, remarks, shipped
+from realizer.expressions.library import shipped
+from realizer.expressions.timeline import Entry, Timeline, Track, faults_of, remarks
 from realizer.face.load import takes
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realizer.core.errors import TableError
-from realizer.expressions import Entry, Timeline, Track, read_timeline
+from realizer.expressions.timeline import Entry, Timeline, Track
+from realizer.expressions.timeline_reader import read_timeline
 
 FILE = b"""
 [[channel]]

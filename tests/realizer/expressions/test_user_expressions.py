@@ -7,7 +7,7 @@ import math
 import pytest
 
 from realizer.core.errors import TableError
-from realizer.expressions import read_folder
+from realizer.expressions.user_expressions import read_folder
 
 
 def test_a_whole_file_is_read(folder) -> None:

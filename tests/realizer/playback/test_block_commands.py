@@ -10,7 +10,7 @@ from realizer.pipeline import realize
 from realizer.playback.audio_mix import heard
 from realizer.playback.player import Player
 from realizer.realization import Realization
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
 SMILE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.4" relax="4" end="5"/>'
@@ -141,7 +141,7 @@ def test_a_parameter_that_is_not_there_is_a_warning(parameter: str, target: str)
 
 @pytest.mark.espeak
 def test_the_volume_of_a_speech_falls() -> None:
-    from realizer.speech import find_voice
+    from realizer.speech.registry import find_voice
 
     voice = find_voice("espeak")
     try:

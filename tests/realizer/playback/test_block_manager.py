@@ -10,7 +10,7 @@ import pytest
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
 

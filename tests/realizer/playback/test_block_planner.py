@@ -9,7 +9,7 @@ from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import World
 from realizer.pipeline import realize
 from realizer.playback.block_planner import Plan, plan
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 
 
 def planned(content: str, world: World = World()) -> Plan:  # noqa: B008 - a frozen value

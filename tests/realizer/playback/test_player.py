@@ -18,7 +18,7 @@ from bml_schema.feedback import (
 from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import VOCABULARY
 from realizer.playback.player import Player
-from realizer.speech import SilentVoice
+from realizer.speech.silent import SilentVoice
 
 
 def block(content: str, id: str = "b", attributes: str = "") -> Block:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.speech import SilentVoice, find_voice
 from realizer.speech.accents import phrases
+from realizer.speech.registry import find_voice
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 
 TEXT = "Good morning, I am really glad to see you. The door is on the left."

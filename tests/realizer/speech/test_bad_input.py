@@ -18,8 +18,10 @@ from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
 from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Speak
-from realizer.speech import EspeakVoice, Say, Utterance, Voice, engine_process
+from realizer.speech import engine_process
+from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
+from realizer.speech.utterance import Say, Utterance, Voice
 
 SSML = "application/ssml+xml"
 

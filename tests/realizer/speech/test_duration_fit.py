@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted, stretched
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import WARP, Say, Utterance
 
 SAY = Say('one two <mark name="m"/>three four five', ("m",))
@@ -34,7 +34,7 @@ def test_without_a_length_it_is_the_voices_own() -> None:
 @pytest.mark.espeak
 @pytest.mark.parametrize("ratio", [0.75, 1.4])
 def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
-    from realizer.speech import find_voice
+    from realizer.speech.registry import find_voice
 
     voice = find_voice("espeak")
     try:
@@ -69,7 +69,7 @@ def test_a_sound_is_warped_so_that_its_marks_come_where_they_are_wanted() -> Non
 @pytest.mark.espeak
 @pytest.mark.parametrize("seconds", [1.3, 1.8, 2.3, 3.1])
 def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) -> None:
-    from realizer.speech import find_voice
+    from realizer.speech.registry import find_voice
 
     class Heard:
         """A voice that remembers how long what it said was."""

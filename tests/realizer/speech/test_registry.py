@@ -9,7 +9,9 @@ import sys
 import pytest
 
 from realizer.core.errors import VoiceError
-from realizer.speech import EspeakVoice, HibariVoice, find_voice, voices
+from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.hibari.voice import HibariVoice
+from realizer.speech.registry import find_voice, voices
 
 
 def test_voices_are_listed_with_what_they_are() -> None:

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.lips.lip_sync import lip_channels
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 from realizer.speech.volume import with_volumes
 

@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request
 
 from realizer.core.settings import Settings
-from realizer.protocol.messages import ErrorMessage
+from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.http import access
 from realizer.server.http.access import Guard, Pace
 from realizer.server.http.jwt_tokens import Pass

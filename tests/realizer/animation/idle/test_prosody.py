@@ -16,8 +16,8 @@ from realizer.animation.fap.conversion import to_fap
 from realizer.animation.idle.motion import idle_face
 from realizer.animation.idle.prosody import Asked, Talk, phrase_ends, prosody_channels
 from realizer.core.array_types import Float64
-from realizer.speech import SilentVoice
 from realizer.speech.accents import phrases, prosody_facts
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Say, Utterance
 
 SAID = SilentVoice().say(

@@ -10,15 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.protocol.messages import (
-    STREAMS,
-    SUPPORTED,
-    ErrorMessage,
-    Ping,
-    SceneMessage,
-    Subscribe,
-    parse_control,
-)
+from realizer.protocol.messages.common import STREAMS
+from realizer.protocol.messages.parse import SUPPORTED, parse_control
+from realizer.protocol.messages.replies import ErrorMessage
+from realizer.protocol.messages.requests import Ping, SceneMessage, Subscribe
 from tests.protocol import REQUESTS, asyncapi
 
 DOCUMENT = asyncapi()

@@ -6,9 +6,8 @@ import json
 
 import pytest
 
-from realizer.protocol.messages import (
-    PICTURES,
-    STREAMS,
+from realizer.protocol.messages.common import PICTURES, STREAMS
+from realizer.protocol.messages.replies import (
     Capabilities,
     ErrorMessage,
     FrameMessage,

@@ -11,9 +11,9 @@ from bml_schema.feedback import PredictionFeedback, SyncPointProgress, WarningFe
 from realizer.core.errors import VoiceError
 from realizer.protocol.wire import FrameKind
 from realizer.server.documents.tts_requests import PATIENCE
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
 from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Say
 from tests.realizer.server.conftest import RATE, Client, Driver
 

@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.hashes import SHA256
 
 from realizer.core.settings import Settings, SettingsError
-from realizer.protocol.messages import MAX_CONTROL
+from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.http.access import Guard, Pace
 from realizer.server.http.jwt_tokens import Pass
 from realizer.server.runtime.session_registry import HubError

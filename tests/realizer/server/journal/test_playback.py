@@ -18,8 +18,8 @@ from realizer.server.journal.playback import played
 from realizer.server.journal.recordings import FolderJournal, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
 
 SETTINGS = Settings(voice="silent", seed=3)
 SPEECH = """<bml id="a"><speech id="s"><text>Hello, how are <sync id="m"/>you?</text></speech>

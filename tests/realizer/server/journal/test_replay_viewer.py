@@ -21,8 +21,8 @@ from realizer.server.journal.playback import played
 from realizer.server.journal.recordings import FolderJournal, Record, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
 from tests.waking import wakes
 
 SETTINGS = Settings(voice="silent", seed=3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.protocol.messages import Feeling, SetMessage
+from realizer.protocol.messages.requests import Feeling, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.control_fields import Wrong, feeling_of, held, index_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from realizer.face.load import load_face
-from realizer.protocol.messages import STREAMS
+from realizer.protocol.messages.common import STREAMS
 from realizer.protocol.wire import unpack
 from realizer.server.session.subscriptions import NAMES
 

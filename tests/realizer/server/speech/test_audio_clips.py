@@ -13,7 +13,7 @@ from websockets.asyncio.client import connect
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback, parse_feedback
 from realizer.core.settings import Settings
-from realizer.protocol.messages import parse_control
+from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.wire import ClipPiece, FrameKind, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.speech import audio_clips

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.server.speech.long_text import PART, SHORT, Growing
-from realizer.speech import SilentVoice
 from realizer.speech.espeak.voice import EspeakVoice
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Recording, Say, Utterance, Word
 
 SENTENCES = [

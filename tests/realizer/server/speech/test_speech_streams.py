@@ -24,8 +24,8 @@ from realizer.protocol.wire import ClipPiece, FrameKind, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.speech import speech_streams
-from realizer.speech import SilentVoice
 from realizer.speech.duration_fit import fitted
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import RATE, Client, Driver
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from realizer.speech import Say
 from realizer.speech.espeak.voice import EspeakVoice
-from realizer.speech.utterance import Utterance
+from realizer.speech.utterance import Say, Utterance
 
 TEXT = "The tall woman carried a basket of apples down the hill."
 WRONG = "Yesterday it rained all day; today the sun is shining."

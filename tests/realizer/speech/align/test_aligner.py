@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import RealizerError
-from realizer.speech import SilentVoice
-from realizer.speech.align import AlignError, Alignment, align
+from realizer.speech.align.aligner import align
+from realizer.speech.align.alignment import AlignError, Alignment
 from realizer.speech.align.sphinx import missing
+from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import MOST_TEXT
 
 TEXT = "The tall woman carried a basket of apples down the hill."
@@ -116,7 +117,7 @@ def test_channels_rates_and_kinds_of_samples_do_not_matter(sentence, rate) -> No
 
 @pytest.mark.espeak
 def test_words_that_no_dictionary_has_are_said_as_espeak_says_them(voice) -> None:
-    from realizer.speech import Say
+    from realizer.speech.utterance import Say
 
     said = voice.say(Say("Zorblat gave 27 florbs to Quixley.", voice="en-us+f2"))
     found = align(said.pcm, said.sample_rate, "Zorblat gave 27 florbs to Quixley.")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.speech import Say, SilentVoice
 from realizer.speech.align.recording_marks import played, recorded
 from realizer.speech.duration_fit import fitted
-from realizer.speech.utterance import Recording
+from realizer.speech.silent import SilentVoice
+from realizer.speech.utterance import Recording, Say
 
 MARKED = (
     '<mark name="a"/>The tall woman <mark name="b"/>carried a basket of apples '

@@ -14,12 +14,13 @@ import pytest
 
 from realizer.animation.lips.visemes import phoneme_features
 from realizer.core.errors import VoiceError
-from realizer.speech import engine_process, find_voice
+from realizer.speech import engine_process
 from realizer.speech.duration_fit import fitted
 from realizer.speech.hibari.text import Run, runs
 from realizer.speech.hibari.times import Lengths, places, sounds
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.hibari.worker import LONGEST, split
+from realizer.speech.registry import find_voice
 from realizer.speech.ssml import read_script
 from realizer.speech.ssml_prosody import Prosody
 from realizer.speech.utterance import Say, Utterance
