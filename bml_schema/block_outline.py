@@ -12,8 +12,6 @@ from bml_schema.node_schema import local, shape_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
 from bml_schema.sync_refs import Names, Points
 
-__all__: list[str] = []
-
 # A NamedTuple of thousands is made in a third of the time without its own `__new__`, which is Python.
 made = tuple.__new__
 

@@ -9,8 +9,6 @@ from lxml import etree
 from bml_schema.errors import Fault
 from bml_schema.escape import escape, escape_value
 
-__all__: list[str] = []
-
 _XML = "http://www.w3.org/XML/1998/namespace"
 
 

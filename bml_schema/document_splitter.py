@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 from bml_schema.errors import BMLError, shown
 
-__all__: list[str] = []
-
 _MOST_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
 
 # What decides where a document begins and ends, and what may hide such marks.

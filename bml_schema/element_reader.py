@@ -38,8 +38,6 @@ from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
 from bml_schema.unknown_attributes import stray
 from bml_schema.values import unwanted
 
-__all__: list[str] = []
-
 Vocabulary = Mapping[str, type[Behaviour]]
 
 # Documents from before the standard name no namespace, or the draft's.

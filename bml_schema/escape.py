@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__: list[str] = []
-
 # Everything XML 1.0 has no way to write (production 2, Char).
 _ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _DATA = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})

@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 from bml_schema.tolerant_scanner import DOCUMENT, Element, Slip, scan
 
-__all__: list[str] = []
-
 _STEP = re.compile(r"([^/\[\]]+)(?:\[([0-9]{1,9})\])?")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 

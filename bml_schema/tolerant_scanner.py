@@ -6,8 +6,6 @@ import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-__all__: list[str] = []
-
 DOCUMENT = "bml"
 _OPENER = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|</|<(?=[^\s<>/='\"!?])")
 _CLOSER = {"<!--": "-->", "<![CDATA[": "]]>", "<?": "?>", "<!DOCTYPE": ">"}

@@ -13,8 +13,6 @@ from lxml import etree
 from bml_schema.node_schema import Shape, local
 from bml_schema.nodes import CORE, EXTENSIONS, OWN
 
-__all__: list[str] = []
-
 # BMLA and BMLT have more attributes than are known here.
 _OURS = tuple(f"{{{space}}}" for space in (CORE, EXTENSIONS, OWN))
 

@@ -1,3 +1,1 @@
 """Recordings and pictures of faces to FAPs, emotions and expressions."""
-
-__all__: list[str] = []

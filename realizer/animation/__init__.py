@@ -1,3 +1,1 @@
 """Curves to frames: channels of AUs and FAPs are sampled, blended and mapped. Knows no BML."""
-
-__all__: list[str] = []

@@ -17,8 +17,6 @@ from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.kind import Fault, Position, World
 from realizer.core.array_types import Float64
 
-__all__: list[str] = []
-
 FILE = "gaze.toml"
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
 POINT = re.compile(",".join([NUMBER] * 3))

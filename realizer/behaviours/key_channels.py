@@ -8,8 +8,6 @@ from realizer.animation.axis import AU_NAMES, Target
 from realizer.animation.channel import Channel, Layer
 from realizer.core.array_types import Float64
 
-__all__: list[str] = []
-
 # s; a track that does not begin or end at rest gets there and back in this time, or in half of it all.
 EASE = 0.12
 # The part of its furthest value up to which an end counts as at rest, so that recordings play as they are.

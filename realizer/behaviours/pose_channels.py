@@ -12,8 +12,6 @@ from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.kind import Fault
 from realizer.core.array_types import Float64
 
-__all__: list[str] = []
-
 
 def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target, float]:
     """Column -> intensity, of {(AU, side): intensity at amount 1}; an AU that is named twice is the stronger.

@@ -9,8 +9,6 @@ import numpy as np
 from realizer.scheduling.timing import Timing
 from realizer.tables.timing import Gap, gaps
 
-__all__: list[str] = []
-
 
 def preferred(element: str, variant: str = "") -> Timing:
     """What `element` wants of time; `variant` is a lexeme or an influence that may want other times."""

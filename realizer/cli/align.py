@@ -11,8 +11,6 @@ import click
 if TYPE_CHECKING:
     from realizer.speech.align.alignment import Alignment
 
-__all__: list[str] = []
-
 
 @click.command()
 @click.argument("audio", type=click.Path(exists=True, dir_okay=False, path_type=Path))

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from realizer.batch.task import Options
     from realizer.core.settings import Settings
 
-__all__: list[str] = []
-
 STATUS = ("done", "refused", "failed")
 
 

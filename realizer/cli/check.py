@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from realizer.tables.knowledge import Mood, Role
 
-__all__: list[str] = []
-
 MOST_ADVICE = 20  # on one block: one slip is often made all over a document
 
 

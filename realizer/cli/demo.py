@@ -11,8 +11,6 @@ import click
 if TYPE_CHECKING:
     from bml_schema import Feedback
 
-__all__: list[str] = []
-
 FILM, FRAMES = Path("demo.mp4"), Path("demo.fap")
 
 

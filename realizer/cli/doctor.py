@@ -8,8 +8,6 @@ from importlib.util import find_spec
 
 import click
 
-__all__: list[str] = []
-
 Finding = tuple[bool, str, str]  # there, what, the fix or a detail
 
 

@@ -15,8 +15,6 @@ from realizer.cli import options
 if TYPE_CHECKING:
     from realizer.emotions.profile import Profile
 
-__all__: list[str] = []
-
 RINGS = (1.0, 3.0, 5.0, 7.0)  # activations of the picture of the wheel, as in Paul 2010, 6.4
 WRITES = (".png", ".txt")
 

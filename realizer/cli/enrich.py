@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from realizer.knowledge.enrich import Enricher, Heard
     from realizer.knowledge.word_languages import Words
 
-__all__: list[str] = []
-
 FILES = (".bml", ".xml", ".txt")  # a single word that ends so is meant to be a file
 MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # "<3" is none
 # What XML 1.0 has no way to write (production 2, Char).

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from realizer.analysis.picture_search import Likeness
     from realizer.expressions.expression import Expression
 
-__all__: list[str] = []
-
 LEAST_LIKE = 0.4  # the best cosine of a picture that shows anything: a head that idles makes 0.3
 as_json = click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
 picture = click.option(

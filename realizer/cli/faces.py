@@ -11,8 +11,6 @@ from realizer.cli.import_face import check, import_
 from realizer.cli.mapping import mapping
 from realizer.cli.sheet import sheet
 
-__all__: list[str] = []
-
 
 @click.group()
 def faces() -> None:

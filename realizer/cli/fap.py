@@ -15,8 +15,6 @@ from realizer.cli.realize import perform, performing
 if TYPE_CHECKING:
     from realizer.animation.fap.fap_clip import FAPClip
 
-__all__: list[str] = []
-
 HELD = 1.0  # s; how long a file of one frame is played
 FASTEST = 240.0  # frames a second that can be asked of a performance
 

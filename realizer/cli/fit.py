@@ -8,8 +8,6 @@ import click
 
 from realizer.core.errors import FaceError
 
-__all__: list[str] = []
-
 SHAPES = "au_shapes.npz"
 FORMS = ("published", "extended")
 

@@ -7,8 +7,6 @@ from importlib.util import find_spec
 
 import click
 
-__all__: list[str] = []
-
 MODULES = {"film": "av"}  # an extra, and what it installs
 
 

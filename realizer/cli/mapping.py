@@ -8,8 +8,6 @@ import click
 
 from realizer.cli import options
 
-__all__: list[str] = []
-
 
 @click.command()
 @click.argument("name", default="default")

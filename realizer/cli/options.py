@@ -16,8 +16,6 @@ if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from realizer.core.settings import Settings
     from realizer.scheduling.timing import Warning
 
-__all__: list[str] = []
-
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 documents = click.argument(

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from realizer.playback.player import Player
     from realizer.scheduling.timing import Schedule
 
-__all__: list[str] = []
-
 PICTURES = (".png", ".webp", ".mp4", ".webm")
 TRANSPARENT = "transparent"
 # What the machine lacks, whatever was asked for: room.

@@ -9,8 +9,6 @@ import click
 from realizer.cli import options
 from realizer.cli.realize import PICTURES
 
-__all__: list[str] = []
-
 
 @click.command()
 @click.argument("record", type=click.Path(exists=True, path_type=Path))

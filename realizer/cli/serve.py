@@ -12,8 +12,6 @@ import click
 from realizer.cli import options
 from realizer.core.settings import Settings
 
-__all__: list[str] = []
-
 # What a service takes is told as its settings tell it.
 LIMITS = [f for f in fields(Settings) if f.name.startswith("max_") or f.name in ("keep", "drain")]
 

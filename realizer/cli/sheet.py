@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from realizer.cli.sheet_poses import Series
     from realizer.render.contact_sheet import Cell
 
-__all__: list[str] = []
-
 SCALE = (260, 16)  # pixels of the colour scale
 
 

@@ -22,8 +22,6 @@ from realizer.tables.wheel_words import ring
 if TYPE_CHECKING:
     from realizer.tables import Fap
 
-__all__: list[str] = []
-
 HALF, TURN = 512, 34907  # half a face distance (Paul 2010, 4.4.2), and the 20 degrees that go with it
 # Paul 2010, 6.4: the grid of his table of emotions.
 ANGLES, ACTIVATIONS = np.arange(0, 360.1, 22.5), (1, 3, 5, 7)

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from realizer.expressions.timeline import Timeline
     from realizer.tables.knowledge import Mood, Role
 
-__all__: list[str] = []
-
 SUFFIXES = (".toml", ".json")
 MOST_ADVICE = 20
 OWN = "urn:bml-realizer:1"

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from realizer.core.array_types import Float64
     from realizer.face.model import Fapu
 
-__all__: list[str] = []
-
 
 @click.command()
 @click.argument("points", type=click.Path(exists=True, dir_okay=False, allow_dash=True))

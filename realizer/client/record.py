@@ -21,8 +21,6 @@ from realizer.protocol.wire import WireFrame
 if TYPE_CHECKING:
     from realizer.client.async_client import Client
 
-__all__: list[str] = []
-
 RATE = 48_000  # Hz
 # Pictures on their way from service to encoder: good enough that the film's own encoder decides.
 LOOK = {"format": "jpeg", "quality": 95}

@@ -1,3 +1,1 @@
 """Values and settings that every layer shares."""
-
-__all__: list[str] = []

@@ -2,8 +2,6 @@
 
 import math
 
-__all__: list[str] = []
-
 # ISO/IEC 14496-2 counts rotations in units of 1e-5 rad ("AU" there; never called au here).
 ANGLE_UNIT = 1e-5  # rad
 

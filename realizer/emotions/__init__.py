@@ -1,3 +1,1 @@
 """What feelings look like: words and places on the wheel in, ranges of FAPs out, and back."""
-
-__all__: list[str] = []

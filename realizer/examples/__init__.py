@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-__all__: list[str] = []
-
 
 def examples() -> dict[str, str]:
     """Name -> BML text, in order: "greeting", "nod-on-a-word", ..."""

@@ -1,3 +1,1 @@
 """The library of expressions: shipped ones and a user's own, what they mean, and timelines of them."""
-
-__all__: list[str] = []

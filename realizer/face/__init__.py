@@ -1,3 +1,1 @@
 """Heads that FAPs and action units move: a face folder in, vertices out."""
-
-__all__: list[str] = []

@@ -15,8 +15,6 @@ from realizer.face.model import Fapu
 from realizer.face.npz_file import read_arrays
 from realizer.tables import faps
 
-__all__: list[str] = []
-
 FAPS = 68
 # Rows after the FAPs': they are multiplied by 1 - cos and sin of an angle, the last by metres.
 JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)

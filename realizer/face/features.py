@@ -13,8 +13,6 @@ from realizer.core.errors import FaceError, TableError
 from realizer.face.model import Fapu
 from realizer.tables import read_csv
 
-__all__: list[str] = []
-
 HEAD = """\
 # source: measured on this face's mesh; ISO/IEC 14496-2 annex C names the points
 # units: x, y, z in metres, origin between the eyes, +x the character's left, +y up, +z forward

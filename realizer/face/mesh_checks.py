@@ -9,8 +9,6 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 
-__all__: list[str] = []
-
 NEEDED = ("skin", "left_eye", "right_eye")  # parts that every face has
 COLLAR = 1  # the clean cut at the bust's end is the hole that every head may have
 AT_EYE = 0.024  # m from an eyeball's middle; there skin may end at the lids

@@ -11,8 +11,6 @@ import numpy as np
 
 from realizer.core.errors import FaceError
 
-__all__: list[str] = []
-
 
 def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
     """The arrays of an .npz file.

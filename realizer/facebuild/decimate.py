@@ -9,8 +9,6 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 
-__all__: list[str] = []
-
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 TURN = 0.25  # least cosine between a triangle before and after
 FLAT = 0.06  # least area of a triangle, in squares of its longest edge

@@ -15,8 +15,6 @@ from realizer.face.model import Fapu
 from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, borne, company
 from realizer.tables import faps
 
-__all__: list[str] = []
-
 ROUNDS = 60
 PASSES = 2  # neighbours that were mended change what a field has to fit
 STILL = 1e-4

@@ -10,8 +10,6 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.submesh import Patch
 
-__all__: list[str] = []
-
 
 @dataclass(eq=False)
 class Part:

@@ -10,8 +10,6 @@ import scipy.sparse as sp
 
 from realizer.core.array_types import Float64, Int32
 
-__all__: list[str] = []
-
 
 @dataclass(frozen=True, eq=False)
 class Patch:

@@ -1,3 +1,1 @@
 """Blocks that live in time: planned, composed, started, moved, sampled and reported."""
-
-__all__: list[str] = []

@@ -11,8 +11,6 @@ from realizer.animation.axis import axis, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample, weights
 
-__all__: list[str] = []
-
 # A face takes this long back to its base when something is let go: about an expression's own release.
 RELAX = 0.3  # s
 # A directly set AU or FAP is reached this long after it was set.

@@ -1,3 +1,1 @@
 """Messages and frames of the wire, which client and server share."""
-
-__all__: list[str] = []

@@ -18,8 +18,6 @@ from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.process_messages import Draw, Failed, Message, Open, Pixels, connection
 
-__all__: list[str] = []
-
 BATCH = 16  # frames deformed in one call: enough to spread its fixed cost, few enough to stay in the cache
 
 

@@ -1,3 +1,1 @@
 """The service: sessions that know no sockets, and the one place that does."""
-
-__all__: list[str] = []

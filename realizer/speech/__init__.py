@@ -2,5 +2,3 @@
 
 What is here is loaded when it is first used: the values alone start no engine and read no table.
 """
-
-__all__: list[str] = []

@@ -25,8 +25,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__: list[str] = []
-
 PARENT_DEATH_SIGNAL = 1  # prctl
 PATIENCE = 5.0  # s between looks at whether the parent is still there
 

@@ -1,3 +1,1 @@
 """What a face does by itself: blinks, small head motion, saccades, motion that goes with speech."""
-
-__all__: list[str] = []

@@ -1,3 +1,1 @@
 """Phonemes to lip, jaw and tongue channels."""
-
-__all__: list[str] = []

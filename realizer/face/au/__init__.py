@@ -1,3 +1,1 @@
 """The face model by action units: measured displacements in, functions that move any mesh out."""
-
-__all__: list[str] = []

@@ -1,3 +1,1 @@
 """Bring your own head: a GLB with ARKit's morph targets in, a face folder out."""
-
-__all__: list[str] = []

@@ -11,8 +11,6 @@ from realizer.face.model import Face
 from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.au.measure import Measured
 
-__all__: list[str] = []
-
 OPEN = 0.3  # baked light: what gets less lies inside the head, or is a lip's inner side
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 
-__all__: list[str] = []
-
 STRONG = 0.7  # of the largest move: there the skin is the bone's
 FAR = 0.7  # distances between the eyes; a joint farther than that from where joints are is none
 

@@ -13,8 +13,6 @@ from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.person.lips import hats
 
-__all__: list[str] = []
-
 # The contours from the right corner over the middle to the left corner: upper, then lower.
 INNER = (("2.5", "2.7", "2.2", "2.6", "2.4"), ("2.5", "2.9", "2.3", "2.8", "2.4"))
 OUTER = (("8.4", "8.6", "8.1", "8.5", "8.3"), ("8.4", "8.8", "8.2", "8.7", "8.3"))

@@ -1,3 +1,1 @@
 """Fitting the action unit model of a face."""
-
-__all__: list[str] = []

@@ -12,8 +12,6 @@ from realizer.core.array_types import Float64
 from realizer.face.au.functions import ANGLE, GAUSSIAN, angle, density, direction
 from realizer.facebuild.au.fit_limits import overshoot
 
-__all__: list[str] = []
-
 STILL = 0.35  # weight of a point that does not move: leaks count, but less than what is seen to move
 SOFT = 0.004  # of the largest move; a miss below it counts by its square, so that the cost has a slope at 0
 # Pull towards the start: too weak to change a fit to many points, it keeps what they do not decide from

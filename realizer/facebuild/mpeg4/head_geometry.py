@@ -8,8 +8,6 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
 
-__all__: list[str] = []
-
 GRID = 72  # rows and columns that an eye's opening is looked at with
 SLICES = 320  # heights that the profile is looked at with
 ASIDE = 0.002  # eye distances

@@ -14,8 +14,6 @@ from realizer.face.deform import deform
 from realizer.face.model import Face
 from realizer.tables import Fap
 
-__all__: list[str] = []
-
 WAYS: dict[str, tuple[float, float, float]] = {
     "up": (0, 1, 0), "down": (0, -1, 0), "left": (1, 0, 0), "right": (-1, 0, 0), "forward": (0, 0, 1),
 }  # fmt: skip

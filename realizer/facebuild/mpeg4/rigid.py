@@ -13,8 +13,6 @@ from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_S
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth
 
-__all__: list[str] = []
-
 Parts = Mapping[str, tuple[int, int]]
 LIP_POINTS = (
     "2.4", "2.8", "2.3", "2.9", "2.5", "2.7", "2.2", "2.6", "2.4",

@@ -1,3 +1,1 @@
 """Face folders from a recipe and the CC0 MakeHuman data."""
-
-__all__: list[str] = []

@@ -13,8 +13,6 @@ from realizer.face.features import fapu_of
 from realizer.face.model import Fapu
 from realizer.facebuild.person.makehuman import BaseMesh
 
-__all__: list[str] = []
-
 Shape = Callable[[str], Float64]
 UP, LEFT, FORWARD = np.array([0, 1.0, 0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
 

@@ -14,8 +14,6 @@ from realizer.facebuild.person.appearance import Look
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-__all__: list[str] = []
-
 ALONG, ACROSS = 26, 7  # vertices of a brow
 HALF = 0.0047  # m, half its width where it is widest, soft edges included
 GREY = np.array([168, 164, 160.0])

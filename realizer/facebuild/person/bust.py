@@ -18,8 +18,6 @@ from realizer.facebuild.person.recipe import Recipe
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-__all__: list[str] = []
-
 ORDER = (
     "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
     "shirt",

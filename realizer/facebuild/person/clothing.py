@@ -11,8 +11,6 @@ from realizer.facebuild.decimate import thinned
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-__all__: list[str] = []
-
 COLLAR = 0.486  # of the face's height, hairline to chin: how far the collar lies below the chin in front
 TILT = 0.42  # of the plane of the collar, which rises backwards
 

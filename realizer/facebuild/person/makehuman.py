@@ -14,8 +14,6 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 
-__all__: list[str] = []
-
 OBJ = Path("mpfb2/3dobjs/base.obj")
 DECIMETRE = 0.1  # m; the data's unit
 

@@ -16,8 +16,6 @@ from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import close_lips
 from realizer.tables import read_csv
 
-__all__: list[str] = []
-
 MIRROR = np.array([-1.0, 1.0, 1.0])
 EYE_INSET = 0.00015  # m; the ball lies that much inside the socket's fit
 # Lengths of the bust, in faces (from the hairline 11.1 to the chin 2.1: 15 to 18 cm).

@@ -14,8 +14,6 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.hair import style_of
 
-__all__: list[str] = []
-
 COLOURS = (
     "skin", "blush", "lips", "mouth", "brows", "lashes", "hair", "shirt", "tongue", "tooth", "root", "gum",
     "pupil", "iris_inner", "iris_middle", "iris_outer", "ring", "white", "corner",

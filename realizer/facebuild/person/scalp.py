@@ -10,8 +10,6 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-__all__: list[str] = []
-
 CROWN, CHIN, BACK = (
     0.1087,
     -0.1002,

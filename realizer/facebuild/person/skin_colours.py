@@ -13,8 +13,6 @@ from realizer.facebuild.person.appearance import Look
 from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
 
-__all__: list[str] = []
-
 
 def paint_skin(
     ground: Ground, lips: Lips, rings: list[list[list[int]]], colours: Mapping[str, Any], look: Look

@@ -1,3 +1,1 @@
 """The messages of the WebSocket protocol, as models: requests in, replies out, JSON text to either."""
-
-__all__: list[str] = []

@@ -1,3 +1,1 @@
 """Documents between their arrival and their planning."""
-
-__all__: list[str] = []

@@ -15,8 +15,6 @@ from realizer.pipeline import warning_of
 from realizer.scheduling.timing import Warning
 from realizer.server.documents.limits import too_large
 
-__all__: list[str] = []
-
 log = logging.getLogger(__name__)
 
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]{1,256})[\"']")

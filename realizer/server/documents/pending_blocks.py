@@ -10,8 +10,6 @@ from realizer.playback.references import references
 from realizer.speech.duration_fit import near
 from realizer.speech.utterance import Say, Utterance
 
-__all__: list[str] = []
-
 
 @dataclass(eq=False)
 class Waiting:

@@ -19,8 +19,6 @@ from realizer.server.session.effects import Effect
 from realizer.server.speech.speech_streams import Speeches
 from realizer.speech.utterance import Say
 
-__all__: list[str] = []
-
 log = logging.getLogger(__name__)
 
 

@@ -14,8 +14,6 @@ from realizer.server.speech.long_text import Growing, shortened
 from realizer.speech.silent import without_sound
 from realizer.speech.utterance import Say, Utterance
 
-__all__: list[str] = []
-
 # A voice that has not answered by then is taken for silent.
 PATIENCE = 20.0  # s
 # A part that comes too late for what is heard already follows so soon.

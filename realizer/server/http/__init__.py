@@ -1,3 +1,1 @@
 """The service over HTTP: page, tools, access control, metrics."""
-
-__all__: list[str] = []

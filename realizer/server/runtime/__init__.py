@@ -1,3 +1,1 @@
 """Sessions inside event loops and processes."""
-
-__all__: list[str] = []

@@ -18,8 +18,6 @@ from realizer.speech.utterance import Utterance, Voice
 if TYPE_CHECKING:
     from realizer.render import Renderer
 
-__all__: list[str] = []
-
 # Pictures of different faces, sizes, cameras, lights and backgrounds each have a process: so many at a time.
 RENDERERS = 6
 # One that nobody has looked at for so long makes room for another one.

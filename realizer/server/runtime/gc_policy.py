@@ -6,8 +6,6 @@ import gc
 
 from realizer.server.documents.limits import memory
 
-__all__: list[str] = []
-
 # Connections that have ended leave cycles behind, which are looked for when there are so many of them, and as
 # many as have not ended.
 ENDED = 100

@@ -24,8 +24,6 @@ from realizer.server.session.session import Session
 from realizer.server.session.welcome import capabilities
 from realizer.speech.utterance import Utterance
 
-__all__: list[str] = []
-
 log = logging.getLogger(__name__)
 
 

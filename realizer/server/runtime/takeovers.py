@@ -10,8 +10,6 @@ from itertools import islice
 from realizer.server.journal import Journal, JournalError
 from realizer.server.session.session import Session
 
-__all__: list[str] = []
-
 log = logging.getLogger(__name__)
 
 # So many are asked for at a time, in a millisecond or two: whose frames are due is not kept waiting longer.

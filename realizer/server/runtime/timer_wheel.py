@@ -9,8 +9,6 @@ from collections.abc import Callable, Hashable
 from heapq import heappop, heappush
 from typing import Generic, Protocol, TypeVar
 
-__all__: list[str] = []
-
 T = TypeVar("T", bound=Hashable)
 
 # What is due between two whole steps of the clock is woken at the second; so little before one is at it.

@@ -1,3 +1,1 @@
 """One session: messages in, effects to carry out; no sockets and no clock."""
-
-__all__: list[str] = []

@@ -12,8 +12,6 @@ from realizer.face.fap_mapping import mapping_of
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-__all__: list[str] = []
-
 
 class Faces:
     """The faces of characters, which are told by their index.

@@ -16,8 +16,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.server.session.session import Session
 
-__all__: list[str] = []
-
 
 class Wrong(Exception):
     """A control message whose field `where` cannot be followed."""

@@ -37,8 +37,6 @@ from realizer.server.streams.connection import Connection
 if TYPE_CHECKING:
     from realizer.server.session.session import Session
 
-__all__: list[str] = []
-
 
 def follow(session: Session, connection: Connection, message: Control, t: float) -> None:
     """Do what a control message asks; one that cannot be followed is answered by an error alone.

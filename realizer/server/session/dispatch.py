@@ -21,8 +21,6 @@ from realizer.server.streams.connection import Connection
 if TYPE_CHECKING:
     from realizer.server.session.session import Session
 
-__all__: list[str] = []
-
 log = logging.getLogger(__name__)
 
 # Messages that change nothing for others, nor for who comes later.

@@ -8,8 +8,6 @@ from typing import NamedTuple
 from realizer.core.array_types import Float32
 from realizer.speech.utterance import Say
 
-__all__: list[str] = []
-
 
 class Send(NamedTuple):
     """One WebSocket message to one connection."""

@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 from bml_schema import Feedback
 
-__all__: list[str] = []
-
 # What is kept in any case, and how many messages at most; of what is older only so many characters.
 FRESH = 60.0  # s
 MOST = 10_000

@@ -11,8 +11,6 @@ from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.streams.connection import Connection
 from realizer.server.streams.frame_windows import EPSILON
 
-__all__: list[str] = []
-
 
 class Telling:
     """What a session tells of its blocks.

@@ -28,8 +28,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.server.session.session import Session
 
-__all__: list[str] = []
-
 # Stream of numbers -> what they are.
 NAMES = {
     "fap": lambda: [row.name for row in faps()],

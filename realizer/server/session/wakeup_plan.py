@@ -11,8 +11,6 @@ from realizer.server.streams.connection import Connection
 from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import EPSILON
 
-__all__: list[str] = []
-
 
 class Rhythm:
     """Times are seconds on the session clock.

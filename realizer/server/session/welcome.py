@@ -13,8 +13,6 @@ from realizer.server.documents.limits import MAX_CHARACTERS
 if TYPE_CHECKING:
     from realizer.server.session.session import Session
 
-__all__: list[str] = []
-
 
 def greeting(session: Session, t: float) -> Welcome:
     """What `hello` is answered with; `t` is seconds on the session clock."""

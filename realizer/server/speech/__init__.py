@@ -1,3 +1,1 @@
 """Speech that clients send piece by piece, and their sound clips."""
-
-__all__: list[str] = []

@@ -1,3 +1,1 @@
 """Frames, sound, pictures and schedules for subscribers."""
-
-__all__: list[str] = []

@@ -10,8 +10,6 @@ from realizer.server.streams.audio_stream import AHEAD, PACKET
 from realizer.server.streams.connection import Connection, SoundSubscription
 from realizer.server.streams.frame_windows import EPSILON
 
-__all__: list[str] = []
-
 
 def send_packets(connection: Connection, s: SoundSubscription, now: float, effects: list[Effect]) -> None:
     """Every packet whose time has come; those that a change of plans has made untrue are taken back."""

@@ -10,8 +10,6 @@ from realizer.core.array_types import Float32
 from realizer.playback.audio_mix import CUT, heard
 from realizer.playback.player import Player, Speaking
 
-__all__: list[str] = []
-
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s
 AHEAD = 0.1  # s

@@ -23,8 +23,6 @@ from realizer.server.streams.frame_windows import EPSILON, Strip, Timeline, firs
 from realizer.server.streams.schedule_stream import Plans, message
 from realizer.server.streams.video_stream import Pictures
 
-__all__: list[str] = []
-
 # Frames later than this are not sent at all: what a stalled process owes is not worth catching up with.
 LATE = 0.5  # s
 # How long after a client was too slow for what is planned it is tried again.

@@ -10,8 +10,6 @@ from realizer.server.session.effects import Look
 from realizer.server.streams.audio_stream import Sound
 from realizer.server.streams.frame_windows import Timeline
 
-__all__: list[str] = []
-
 # Bytes that wait to be sent above which a connection loses frames: two thirds of a second of a mesh.
 SLOW = 512 * 1024
 # And above which it has stopped reading: it is closed, and can come back with `seen`.

@@ -5,8 +5,6 @@ from __future__ import annotations
 from realizer.server.streams.connection import FrameSubscription
 from realizer.server.streams.frame_windows import EPSILON, Strip
 
-__all__: list[str] = []
-
 
 class Run:
     """Frames that need nothing of their session but to be sent: nearly all there are.

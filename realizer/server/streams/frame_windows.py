@@ -21,8 +21,6 @@ from realizer.protocol.wire import HEADER, PAYLOADS, FrameKind, json_frame, pack
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-__all__: list[str] = []
-
 # Frames computed in one call. 250 cost half as much again as 25; a longer window is thrown away more often,
 # when a plan changes.
 WINDOW = 10.0  # s

@@ -14,8 +14,6 @@ from realizer.playback.feedback_events import State
 from realizer.playback.references import references
 from realizer.scheduling.timing import Schedule
 
-__all__: list[str] = []
-
 
 @dataclass(eq=False)
 class Seen:

@@ -11,8 +11,6 @@ from realizer.server.session.effects import Draw, Effect, Look, Send
 from realizer.server.streams.connection import Connection, PictureSubscription, View
 from realizer.server.streams.frame_windows import EPSILON, Timeline, first_at, last_at
 
-__all__: list[str] = []
-
 # A picture that was not drawn by then never will be.
 DEADLINE = 10.0  # s
 

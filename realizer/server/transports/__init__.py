@@ -1,3 +1,1 @@
 """The doors of the service: one module each, all of them leading into the same sessions."""
-
-__all__: list[str] = []

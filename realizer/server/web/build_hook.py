@@ -12,8 +12,6 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-__all__: list[str] = []
-
 WEB = Path(__file__).resolve().parent
 STATIC = WEB.parent / "static"
 MARK = "sources.sha256"

@@ -1,3 +1,1 @@
 """A recording and what it says in, when it says each word and phoneme out."""
-
-__all__: list[str] = []

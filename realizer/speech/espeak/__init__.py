@@ -1,3 +1,1 @@
 """The espeak-ng voice, whose engine runs in a process of its own."""
-
-__all__: list[str] = []

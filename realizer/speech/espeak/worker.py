@@ -18,8 +18,6 @@ import os
 from pathlib import Path
 from typing import Any, ClassVar
 
-__all__: list[str] = []
-
 LONGEST_PATH = 140  # bytes; espeak-ng keeps its data path in a buffer of 160 with names appended
 PIECE = 500  # ms of sound that we are called with at once
 LONGEST_SOUND = 1800  # s; a text that lasts longer is refused

@@ -1,3 +1,1 @@
 """The hibari voice, whose model runs in a process of its own."""
-
-__all__: list[str] = []

@@ -16,8 +16,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-__all__: list[str] = []
-
 DURATIONS = "/Round_output_0"  # frames of each sign, in the models of hibari 0.2
 SEED = 0
 LONGEST = 400  # phonemes at once; the time and memory of the model grow with the square

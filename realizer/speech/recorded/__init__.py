@@ -1,3 +1,1 @@
 """Speech from recordings and clips."""
-
-__all__: list[str] = []

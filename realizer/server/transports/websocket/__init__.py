@@ -1,3 +1,1 @@
 """The WebSocket transport."""
-
-__all__: list[str] = []

@@ -22,8 +22,6 @@ from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.websocket.request import address_of, headers_of, session_of, visitor_of
 from realizer.server.transports.websocket.writer import WebSocketClient
 
-__all__: list[str] = []
-
 log = logging.getLogger(__name__)
 
 

@@ -13,8 +13,6 @@ from realizer.server.http.http_site import Answer
 from realizer.server.http.jwt_tokens import Pass
 from realizer.server.runtime.session_registry import HubError, Visitor
 
-__all__: list[str] = []
-
 
 def address_of(socket: ServerConnection) -> str:
     """Without the port; "" where the socket has none, or has none any more."""

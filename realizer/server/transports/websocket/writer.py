@@ -9,8 +9,6 @@ from websockets.asyncio.server import ServerConnection
 from websockets.frames import Frame, Opcode
 from websockets.protocol import State
 
-__all__: list[str] = []
-
 # A client that has not answered the close by then is gone.
 GOODBYE = 2.0  # s
 REASON = 123  # bytes that a close frame has room for behind its code

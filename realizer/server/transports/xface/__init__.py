@@ -1,3 +1,1 @@
 """The Xface transports: TCP server and player client."""
-
-__all__: list[str] = []
