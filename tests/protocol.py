@@ -1,4 +1,4 @@
-"""The models of the messages in; realizer/server/asyncapi.json and the README's tables out.
+"""The models of the messages in; realizer/server/asyncapi.json and the tables of docs/protocol.md out.
 
 `python -m tests.protocol` writes both. All of it is read from the models, the streams and the kinds of binary
 messages, so that nothing is described twice.
@@ -34,10 +34,10 @@ from realizer.protocol.messages.replies import (
 from realizer.protocol.messages.requests import Subscribe
 from realizer.protocol.wire import FINAL, FORGET, PAYLOADS, VERSION
 
-__all__ = ["BEGIN", "END", "FILE", "README", "asyncapi", "render", "tables", "within"]
+__all__ = ["BEGIN", "END", "FILE", "PAGE", "asyncapi", "render", "tables", "within"]
 
 FILE = Path(realizer.__path__[0]) / "server" / "asyncapi.json"
-README = Path(__file__).parent.parent / "README.md"
+PAGE = Path(__file__).parent.parent / "docs" / "protocol.md"
 BEGIN = "<!-- protocol: written by python -m tests.protocol -->"
 END = "<!-- end of protocol -->"
 
@@ -187,7 +187,7 @@ def render() -> str:
 
 
 def tables() -> str:
-    """The README's part: messages in, streams, messages out."""
+    """The part of docs/protocol.md: messages in, streams, messages out."""
     lines = ["| in | with | |", "|---|---|---|", f"| text | | {_cell(BML)} |"]
     for name in SUPPORTED:
         model = REQUESTS[name]
@@ -242,7 +242,7 @@ def _cell(text: str) -> str:
 
 
 def within(text: str) -> str:
-    """A README with the tables between its markers.
+    """A page with the tables between its markers.
 
     Raises:
         ValueError: it has no markers.
@@ -258,7 +258,7 @@ if __name__ == "__main__":
     FILE.write_text(render(), "utf-8")
     print(f"{FILE}: written")
     try:
-        README.write_text(within(README.read_text("utf-8")), "utf-8")
-        print(f"{README}: written")
+        PAGE.write_text(within(PAGE.read_text("utf-8")), "utf-8")
+        print(f"{PAGE}: written")
     except ValueError as error:
-        print(f"{README}: {error}")
+        print(f"{PAGE}: {error}")

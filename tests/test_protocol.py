@@ -21,7 +21,7 @@ from tests.protocol import (
     BEGIN,
     END,
     FILE,
-    README,
+    PAGE,
     REPLIES,
     REQUESTS,
     asyncapi,
@@ -62,9 +62,9 @@ def test_the_file_is_current() -> None:
     assert FILE.read_text("utf-8") == render(), "run: python -m tests.protocol"
 
 
-def test_the_readme_is_current() -> None:
-    if not README.is_file() or BEGIN not in (text := README.read_text("utf-8")):
-        pytest.skip("no README with tables of the protocol beside the tests")
+def test_the_tables_are_current() -> None:
+    if not PAGE.is_file() or BEGIN not in (text := PAGE.read_text("utf-8")):
+        pytest.skip("no docs/protocol.md with tables of the protocol beside the tests")
     assert within(text) == text, "run: python -m tests.protocol"
 
 
