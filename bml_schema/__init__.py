@@ -1,4 +1,4 @@
-"""The language BML 1.0: text in, typed nodes out, and back; feedback likewise."""
+"""The BML 1.0 language: parser, typed nodes, writer and feedback."""
 
 from bml_schema.absolute import timed
 from bml_schema.behaviours import (

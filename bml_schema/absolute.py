@@ -1,4 +1,4 @@
-"""A block and when its sync points are in, the block that says these times as numbers out."""
+"""Rewriting of a block so that its sync points are absolute times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A parsed <bml> element in, what stands in it and what references may name out, before any of it is read."""
+"""A first pass over a <bml> element: its children, and the names that references may use."""
 
 from __future__ import annotations
 

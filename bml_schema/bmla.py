@@ -1,4 +1,4 @@
-"""The behaviours of BMLA and BMLT, the extensions of AsapRealizer and Elckerlyc, that a face has use for."""
+"""The behaviours of BMLA and BMLT (AsapRealizer, Elckerlyc) that concern a face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An element of any language in, text out that does not depend on what stands around it."""
+"""Canonical XML text of an element, independent of the prefixes declared around it."""
 
 from __future__ import annotations
 

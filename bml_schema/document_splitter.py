@@ -1,4 +1,4 @@
-"""Text that holds documents in, the stretches of it that are documents, or are not but should be, out."""
+"""A splitter that finds the documents, and the broken stretches, in a text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text that holds documents in, Blocks out: decoding, limits, well-formedness, several documents."""
+"""The reader of documents: decoding, limits, well-formedness, several documents in one text."""
 
 from __future__ import annotations
 

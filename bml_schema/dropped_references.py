@@ -1,4 +1,4 @@
-"""Ids of dropped behaviours and a block in, the block without them and all that named them out."""
+"""Removal of behaviours from a block, with everything that refers to them."""
 
 from __future__ import annotations
 

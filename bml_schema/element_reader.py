@@ -1,4 +1,4 @@
-"""One element inside a block in, its node out: attributes, children, descriptions, constraints.
+"""The reader of one element in a block: attributes, children, descriptions, constraints.
 
 Recursive descent, one function per grammar rule. The first element with a fault raises it; who called
 decides what goes with it.

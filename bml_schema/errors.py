@@ -1,4 +1,4 @@
-"""What can be wrong with a document: an error when no block came of it, a problem when only a part went.
+"""Faults of documents: an error if no block results, a problem if only a part is dropped.
 
 BMLError               no block: too big, no usable id, not a <bml>
 ├── BMLSizeError       more in it than is read

@@ -1,4 +1,4 @@
-"""Text in, XML character data or attribute value out, such that it reads back as the same text."""
+"""Escaping of text as XML character data and attribute values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The behaviours that this project adds to BML, in its own namespace `urn:bml-realizer:1`."""
+"""The behaviours that this project adds to BML, in the namespace `urn:bml-realizer:1`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""BML feedback: what happened in, one XML element out, and back.
+"""BML feedback messages: classes, writer and parser.
 
 `to_xml` takes `seq`, the number of the message in its session, and `epoch`, the POSIX seconds at which the
 session clock was 0: with it every time of the session clock comes in POSIX milliseconds too, as BMLA has it.

@@ -1,4 +1,4 @@
-"""What a node class says about its XML: dataclass fields in, a table of attributes and children out.
+"""The XML schema of a node class: attributes and children, derived from its dataclass fields.
 
 A node class is a few lines::
 

@@ -1,4 +1,4 @@
-"""The nodes every document is made of: block, required, constraint, description, base of behaviours."""
+"""The base nodes of documents: block, required, constraint, description, behaviour."""
 
 from __future__ import annotations
 

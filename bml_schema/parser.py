@@ -1,4 +1,4 @@
-"""One parsed <bml> element in, a Block out.
+"""The recursive-descent parser of one <bml> element.
 
 Faults stay where they are: a behaviour or constraint with a fault is left out and told of in one Problem.
 Attributes that nobody knows are told of too, and cost nothing else.

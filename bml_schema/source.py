@@ -1,4 +1,4 @@
-"""The text of documents and an element path in, line, column and length of what stands there out.
+"""Source positions: line, column and length of an element or attribute in a text.
 
 The parser knows lines only; this reads the text once more, forgivingly, to underline what a fault means.
 """

@@ -1,4 +1,4 @@
-"""Sync references: `b1:head1:stroke + 0.5` in, SyncRef out, and back."""
+"""Sync references such as `b1:head1:stroke + 0.5`: parser, value and writer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A text in; every start tag with the places of its attributes, and what is not well-formed, out."""
+"""A scanner of start tags and attributes that also works on text that is not well-formed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The attributes of an element that its class does not know in, what is to be said of them out.
+"""Problems and hints for attributes that an element's class does not define.
 
 A slip such as `amout="1"` would otherwise show nothing, and nobody would know why. What other languages put
 on our elements is theirs: it is kept, and nothing is said.

@@ -1,4 +1,4 @@
-"""Text of an attribute in, Python value out, and back; with the words for what is wanted."""
+"""Conversion of attribute text to Python values and back, with a description of what is accepted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which class an element becomes: the core, its extensions, and what others and we add to it."""
+"""The table of elements and their node classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A Block in, BML text out, such that parse(write(block)) == block."""
+"""The writer of blocks: parse(write(block)) == block."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Recordings and pictures of faces to FAPs, emotions and expressions."""
+"""Analysis of recordings and pictures of faces."""

@@ -1,4 +1,4 @@
-"""A face's vertices in, the FAPs that made them out: feature points of the mesh, measured."""
+"""FAPs measured on a deformed mesh."""
 
 from __future__ import annotations
 

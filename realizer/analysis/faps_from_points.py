@@ -1,4 +1,4 @@
-"""Feature points as they move in; the FAPs and the features that they tell of out."""
+"""FAPs and facial features from tracked feature points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture of one of our faces in, the expressions that look like it out (Wojdel 2005, 3.2.2)."""
+"""Search for the expressions that look like a picture of a face (Wojdel 2005, 3.2.2)."""
 
 from __future__ import annotations
 

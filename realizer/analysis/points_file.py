@@ -1,4 +1,4 @@
-"""A table of tracked feature points, text in; the points as they move, and at rest, out."""
+"""A reader of files of tracked feature points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FAPs in, beliefs in profiles and emotions out (Raouzaiou et al. 2002, section 5)."""
+"""Fuzzy recognition of emotions from FAPs (Raouzaiou et al. 2002, section 5)."""
 
 from __future__ import annotations
 

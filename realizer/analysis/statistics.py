@@ -1,4 +1,4 @@
-"""Means and deviations of FAPs, or observed faces, in; a profile out (Raouzaiou et al. 2002, 3.3)."""
+"""Emotion profiles from statistics or observations of FAPs (Raouzaiou et al. 2002, 3.3)."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What feelings look like: words and places on the wheel in, ranges of FAPs out, and back."""
+"""Emotions: words and places on the wheel, and the FAP profiles that show them."""

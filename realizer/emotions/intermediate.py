@@ -1,4 +1,4 @@
-"""Archetypes and the numbers of a word in, the profile between them out (Raouzaiou et al. 2002, 4)."""
+"""Profiles between archetypes (Raouzaiou et al. 2002, section 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An expression as ranges of FAPs: its middle, draws from it, its text."""
+"""The profile value: an expression as ranges of FAPs."""
 
 from __future__ import annotations
 

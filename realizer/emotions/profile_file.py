@@ -1,4 +1,4 @@
-"""Paul's file of profiles (2010, 6.3): text in, profiles out, and back."""
+"""Paul's file format for profiles (2010, 6.3): reader and writer."""
 
 from __future__ import annotations
 

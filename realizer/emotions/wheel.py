@@ -1,4 +1,4 @@
-"""A place on the wheel of emotions, or valence and arousal -> a profile, without a jump anywhere."""
+"""Continuous profiles over the emotion wheel, or over valence and arousal."""
 
 from __future__ import annotations
 

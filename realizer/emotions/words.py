@@ -1,4 +1,4 @@
-"""A word for an emotion -> its profile."""
+"""Profiles of words for emotions."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The library of expressions: shipped ones and a user's own, what they mean, and timelines of them."""
+"""The expression library: built-in and user expressions, search, and timelines."""

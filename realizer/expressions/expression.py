@@ -1,4 +1,4 @@
-"""The value of the library: one expression, what it shows, what it means and how long it lasts."""
+"""The expression value: action units, meaning and duration."""
 
 from __future__ import annotations
 

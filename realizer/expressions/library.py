@@ -1,4 +1,4 @@
-"""Templates, lexemes and a folder of a user's own in, every expression by its name out."""
+"""The library of expressions by name: templates, lexemes and a user's folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words or action units in, the expressions that mean or show them out, the best first."""
+"""Search of expressions by words or action units, best match first."""
 
 from __future__ import annotations
 

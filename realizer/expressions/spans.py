@@ -1,4 +1,4 @@
-"""A track of a timeline and a library in, when each of its entries shows out."""
+"""The time spans of the entries of a timeline's track."""
 
 from __future__ import annotations
 

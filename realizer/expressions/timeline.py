@@ -1,4 +1,4 @@
-"""What a designer's timeline holds: tracks of expressions, and a mixer; what a library or a face has not."""
+"""The timeline value: tracks of expressions and a mixer; and checks against a library and a face."""
 
 from __future__ import annotations
 

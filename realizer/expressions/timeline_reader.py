@@ -1,4 +1,4 @@
-"""A designer's timeline file (TOML or JSON) in; the timeline out, or all that is wrong with it."""
+"""A reader of timeline files (TOML or JSON) that reports all faults at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A folder of a user's own expressions in, a TOML file each; expressions out, or every fault at once."""
+"""A reader of a folder of user expressions (TOML) that reports all faults at once."""
 
 from __future__ import annotations
 

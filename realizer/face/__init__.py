@@ -1,1 +1,1 @@
-"""Heads that FAPs and action units move: a face folder in, vertices out."""
+"""Faces: face folders, and the deformers that move their meshes by FAPs or action units."""

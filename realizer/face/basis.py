@@ -1,4 +1,4 @@
-"""What a face's fields.npz says, made into the matrices that `deform` multiplies by."""
+"""The displacement matrices of a face, read from fields.npz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FAP rows in, the same rows out with the two contours of the lips kept together."""
+"""Coupling of the inner and outer lip contour in FAP rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses in, vertices out: one sparse product, then the parts that turn and the lids that slide."""
+"""The deformer: a sparse product for displacements, then rigid parts and eyelids."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face's name and a user's file in, the mapping of AUs to FAPs in force out: the one place that asks."""
+"""The mapping of AUs to FAPs that applies to a face, with a user's file on top."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MPEG-4 feature points of a face: a CSV file in, points and FAPU out."""
+"""The MPEG-4 feature points and FAPU of a face (`features.csv`)."""
 
 from __future__ import annotations
 

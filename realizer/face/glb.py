@@ -1,4 +1,4 @@
-"""A face in, a binary glTF 2.0 file out: rest mesh, normals, colours, parts."""
+"""A face as a binary glTF 2.0 file: rest mesh, normals, colours, parts."""
 
 from __future__ import annotations
 

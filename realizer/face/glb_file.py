@@ -1,4 +1,4 @@
-"""Arrays and a glTF 2.0 document in, the bytes of a GLB file out."""
+"""A writer of GLB files from a glTF 2.0 document and arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face's name in, a checked `Face` out: finds the folder, reads its files, takes the deformer it names."""
+"""The loader of face folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face's mesh in, what is wrong with its surface out: holes, turned triangles, values out of range."""
+"""Checks of a mesh: holes, flipped triangles, values out of range."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The value a face folder becomes."""
+"""The face value: what a face folder is loaded into."""
 
 from __future__ import annotations
 

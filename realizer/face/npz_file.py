@@ -1,4 +1,4 @@
-"""An .npz file of a face folder in, its checked arrays out."""
+"""A checked reader of the .npz files in face folders."""
 
 from __future__ import annotations
 

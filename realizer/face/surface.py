@@ -1,4 +1,4 @@
-"""Vertices in, what clients need beside them out: normals, and 16-bit integers for streams."""
+"""Normals, and 16-bit quantised vertices for streams."""
 
 from __future__ import annotations
 

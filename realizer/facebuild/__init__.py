@@ -1,1 +1,1 @@
-"""Making face folders; nothing that runs imports this package."""
+"""Tools that make face folders; nothing that plays imports this package."""

@@ -1,4 +1,4 @@
-"""A face folder in, its faults out: which file, and what to change. One fault does not hide another."""
+"""The check of a face folder: every fault, with its file and what to change."""
 
 from __future__ import annotations
 

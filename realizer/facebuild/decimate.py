@@ -1,4 +1,4 @@
-"""A surface in, the same with fewer vertices out: those go that nobody would miss, both sides alike."""
+"""A symmetric decimation of meshes."""
 
 from __future__ import annotations
 

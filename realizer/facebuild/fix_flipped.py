@@ -1,4 +1,4 @@
-"""Displacement fields in, the same out without triangles that turn over when they are played."""
+"""Removal of triangle flips from displacement fields."""
 
 from __future__ import annotations
 

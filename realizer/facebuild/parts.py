@@ -1,4 +1,4 @@
-"""The parts that the base mesh lacks: eyeballs and teeth. Numbers in, triangles out."""
+"""Generated parts that the base mesh lacks: eyeballs and teeth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pieces of surface cut from the base mesh: every vertex stays a known mix of base vertices."""
+"""Submeshes of the base mesh, whose vertices stay known mixes of base vertices."""
 
 from __future__ import annotations
 

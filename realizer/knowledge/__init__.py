@@ -1,1 +1,1 @@
-"""What faces do while people talk (Wojdel 2005, chapter 6): advice on documents, faces for a text."""
+"""Wojdel's knowledge of expressions in conversation (2005, chapter 6): advice and enrichment."""

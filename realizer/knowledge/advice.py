@@ -1,4 +1,4 @@
-"""A block and when its expressions show in, what people's faces do differently out (Wojdel 2005, 6.5)."""
+"""Advice on expressions that are unusual for people (Wojdel 2005, 6.5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A text or a block in, a block with expressions where the knowledge base puts them out."""
+"""Enrichment of a text or a block with expressions from the knowledge base."""
 
 from __future__ import annotations
 

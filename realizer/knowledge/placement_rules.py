@@ -1,4 +1,4 @@
-"""Sentences in, the expressions that go with them out, each with the rule behind it (Wojdel 2005, 6.5)."""
+"""The rules that place expressions in sentences (Wojdel 2005, 6.5)."""
 
 from __future__ import annotations
 

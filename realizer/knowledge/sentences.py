@@ -1,4 +1,4 @@
-"""Text in, its sentences with their words, ends and rough times out (Wojdel 2005, 6.4.1)."""
+"""Sentences of a text: words, boundaries and estimated times (Wojdel 2005, 6.4.1)."""
 
 from __future__ import annotations
 

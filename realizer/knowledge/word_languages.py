@@ -1,4 +1,4 @@
-"""Speeches and word lists in, the language of each text and the words that count in it out."""
+"""The language of each text, and the emotional words that apply to it."""
 
 from __future__ import annotations
 

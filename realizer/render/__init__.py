@@ -1,4 +1,4 @@
-"""FAP rows become pictures: light, cameras, a canvas in a process of its own, contact sheets."""
+"""Rendering: light, cameras, drawing in a process of its own, contact sheets."""
 
 from realizer.render.drawing_process import available
 from realizer.render.renderer import Renderer

@@ -1,4 +1,4 @@
-"""What stands behind the head, and the head's pixels laid over it."""
+"""The backdrop behind the head, and compositing over it."""
 
 from __future__ import annotations
 

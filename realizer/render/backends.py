@@ -1,4 +1,4 @@
-"""A way of drawing in, a canvas out: OpenGL where a graphics card is, otherwise the processor."""
+"""The drawing backends: OpenGL if there is a graphics card, the processor if not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face and a preset's name in; a camera out: where it stands, and where a point lands in the picture."""
+"""Cameras: presets, projection of points to pixels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures and captions in, one contact sheet out."""
+"""Contact sheets of pictures with captions."""
 
 from __future__ import annotations
 

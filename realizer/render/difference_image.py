@@ -1,4 +1,4 @@
-"""A picture and the neutral one in; what differs out, in false colours over a faint neutral."""
+"""A false-colour image of the difference between two pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An order in, a drawing process that follows it out; and what drawing is like on this machine."""
+"""The child process that draws, and the check of what this machine can draw with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face in; the small lights on its eyes out, as vertices that follow each frame's."""
+"""Highlights on the eyes, as vertices that follow each frame."""
 
 from __future__ import annotations
 

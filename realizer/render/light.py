@@ -1,4 +1,4 @@
-"""Normals, colours and a table of lamps in; sRGB a vertex out. The page gets the same table as JSON."""
+"""The lighting model: normals, colours and a table of lamps to sRGB; the page gets the same table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face, a size, a camera, then vertices and normals in; pixels out. The only importer of pyrender."""
+"""The OpenGL backend; the only importer of pyrender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The smallest face: one triangle, to find out whether anything can be drawn."""
+"""A face of one triangle, to test whether drawing works."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the drawing process and its owner say to each other, and the memory they share."""
+"""Messages between the drawing process and its owner, and their shared memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points in pixels, triangles and colours in; pixels out, by the processor. The only importer of numba."""
+"""A triangle rasterizer on the processor; the only importer of numba."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses in, pixels or encoded pictures out, by a drawing process that is started and replaced here."""
+"""The renderer: pictures of poses, drawn by a child process that is restarted if it dies."""
 
 from __future__ import annotations
 

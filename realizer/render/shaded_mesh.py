@@ -1,4 +1,4 @@
-"""A face, a camera and a light in; everything that is drawn out: points and colours, a frame at a time."""
+"""The shaded mesh of a frame: everything that is drawn, with colours."""
 
 from __future__ import annotations
 

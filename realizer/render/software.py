@@ -1,4 +1,4 @@
-"""A face, a size, a camera, then vertices and normals in; pixels out, without OpenGL."""
+"""The software backend, which draws on the processor."""
 
 from __future__ import annotations
 

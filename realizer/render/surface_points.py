@@ -1,4 +1,4 @@
-"""Places in a picture in; where they are on a face's skin out, to be carried along as it moves."""
+"""Points of a face's skin found under pixels, to follow them as it moves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drawing process: poses in over stdin, pixels out into shared memory, files out over stdout."""
+"""The drawing process: poses on stdin, pixels in shared memory, files on stdout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A face in; furrows on its skin out, as strips that darken as the skin beneath is pushed together.
+"""Wrinkles: strips of skin that darken as the skin under them is compressed.
 
 What pushes is seen from the shape itself, two feature points that come nearer, so furrows follow whatever
 moves a face: FAPs, action units or shapes.

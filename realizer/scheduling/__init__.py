@@ -1,4 +1,4 @@
-"""Sync points by least squares: a block's timings in, its sync times out."""
+"""Sync point scheduling by weighted least squares."""
 
 from realizer.scheduling.problem import Member
 from realizer.scheduling.rigid_clusters import warm_up

@@ -1,4 +1,4 @@
-"""Relations that cannot hold together: found as loops and cycles, kept as what they are made of."""
+"""Conflicts: cycles of relations between sync points that cannot hold together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Groups of shapes that break an inequality in, their optimum that keeps all out; or why there is none."""
+"""The optimum of groups of clusters whose least squares solution violates an inequality."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A convex problem of differences in, its optimum out, exact in what binds; or the cycle that prevents it."""
+"""An active-set solver for convex problems of differences; it returns the cycle if there is no solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clashes in, what gives way and the words for it out."""
+"""Explanation of conflicts: which relation gives way, and why, in words."""
 
 from __future__ import annotations
 

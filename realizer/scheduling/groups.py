@@ -1,4 +1,4 @@
-"""Shapes and the orders between them in, the groups out that can only be solved together."""
+"""Grouping of clusters that must be solved together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orders between levels: the least levels that keep them all, or the cycle that cannot; strong components."""
+"""Longest path levels of a graph of orders, the cycles that prevent them, and strong components."""
 
 from __future__ import annotations
 

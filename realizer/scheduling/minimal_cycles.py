@@ -1,4 +1,4 @@
-"""A model and a cycle that cannot close in, the cycle of fewest statements through its points out."""
+"""Search for the cycle of fewest statements through the points of a given cycle."""
 
 from __future__ import annotations
 

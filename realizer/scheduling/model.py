@@ -1,4 +1,4 @@
-"""A problem in, its numbers as arrays out: tied points contracted to classes, gaps, orders."""
+"""The numeric form of a problem: tied points merged into classes; gaps and orders as arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A block and its timings in, a problem out: numbered sync points, what must hold between them, and why."""
+"""The scheduling problem of a block: numbered sync points and the relations between them, with reasons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A model in, its shapes out: behaviours that hold each other, at the least squares of their gaps.
+"""Clusters of behaviours that are tied together, each at the least squares solution of its gaps.
 
 What hangs together without a contradiction keeps its preferred gaps; only the rest needs a solver.
 """

@@ -1,4 +1,4 @@
-"""A block and its behaviours' timings in, a Schedule out: solve, drop what clashes, solve the rest again."""
+"""Scheduling of blocks: solve, drop what conflicts, solve the rest again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A problem of few points in, the times of its least squares out, where those break nothing.
+"""A fast solver for problems of few points, for cases where plain least squares violates nothing.
 
 Most blocks are such: a handful of behaviours, no orders, and time enough for all. For so few numbers arrays
 cost more than they save; so this is in plain floats what `solve` does in arrays for any problem, and it gives

@@ -1,4 +1,4 @@
-"""A problem in, the time of every point out; or the clashes that leave it without a solution.
+"""The solver: a time for every point of a problem, or the conflicts that prevent a solution.
 
 Two stages (Paul 2010, 3.3.3, says only the first): behaviours that hold each other take the least squares of
 their gaps, then every such shape that nothing holds slides to the earliest place that its orders allow. Only

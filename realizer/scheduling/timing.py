@@ -1,4 +1,4 @@
-"""The values of step 2 and 3: what a behaviour wants of time, and the times it got."""
+"""The values of steps 2 and 3: the timing that a behaviour prefers, and the schedule it gets."""
 
 from __future__ import annotations
 

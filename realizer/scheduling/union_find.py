@@ -1,4 +1,4 @@
-"""Union-find whose links carry seconds: equalities in, classes of points at fixed distances out."""
+"""A union-find structure with offsets in seconds, for points at fixed distances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the standards say, as CSV and TOML: one frozen row class a table, read once, checked at the door.
+"""Tables of the standards as CSV and TOML files: one frozen row class a table, validated when read.
 
 Every file names its `source:`, `units:` and `licence:` in its leading `#` lines; a file without them, or a
 row with a bad cell, is refused with its place.

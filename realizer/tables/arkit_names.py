@@ -1,4 +1,4 @@
-"""Names of morph targets as tools write them in, ARKit's own names out."""
+"""Names of ARKit's blend shapes, and the spellings that tools use for them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FAPs and AUs under headings for people: `regions.toml` as rows."""
+"""Groups of FAPs and AUs for user interfaces (`regions.toml`)."""
 
 from __future__ import annotations
 

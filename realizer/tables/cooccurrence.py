@@ -1,4 +1,4 @@
-"""cooccurrence.toml, or a user's own -> the rules that say which action units a face can show together."""
+"""The co-occurrence rules of action units (`cooccurrence.toml`, or a user's file)."""
 
 from __future__ import annotations
 

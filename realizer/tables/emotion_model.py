@@ -1,4 +1,4 @@
-"""emotion_model.toml -> the few numbers that the wheel and the recogniser need."""
+"""The parameters of the emotion wheel and the recogniser (`emotion_model.toml`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""emotional_words_LANGUAGE.csv, or a user's own -> the category of every word of a text."""
+"""The categories of emotional words (`emotional_words_LANGUAGE.csv`, or a user's file)."""
 
 from __future__ import annotations
 

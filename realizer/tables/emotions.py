@@ -1,4 +1,4 @@
-"""emotions.toml -> what the archetypes on the wheel of emotions show in action units."""
+"""The action units of the archetypal emotions (`emotions.toml`)."""
 
 from __future__ import annotations
 

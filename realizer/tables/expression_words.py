@@ -1,4 +1,4 @@
-"""expression_words.csv -> what each shipped expression is asked for by, and what it shows, in words."""
+"""Search words and descriptions of the built-in expressions (`expression_words.csv`)."""
 
 from __future__ import annotations
 

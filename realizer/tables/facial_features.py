@@ -1,4 +1,4 @@
-"""facial_features.csv -> distances between feature points, and the FAPs that they tell of."""
+"""Distances between feature points, and the FAPs that follow from them (`facial_features.csv`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""knowledge.toml -> the rules of Wojdel's knowledge base: what is shown when, and in which company."""
+"""The rules of Wojdel's knowledge base (`knowledge.toml`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lexemes.toml -> what the words of faceLexeme and head mean: action units, and head poses."""
+"""The lexemes of faceLexeme and head: action units and head poses (`lexemes.toml`)."""
 
 from __future__ import annotations
 

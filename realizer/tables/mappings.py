@@ -1,4 +1,4 @@
-"""Mappings of AUs to FAPs as files: Paul's plain text (2010, 5.2), or CSV as `au_to_fap.csv`, and back.
+"""Files that map AUs to FAPs: Paul's text format (2010, 5.2), or CSV like `au_to_fap.csv`.
 
 His text has two kinds of lines. `AU`, `AU<tab>L` or `AU<tab>R` names an action unit; each line of five
 numbers after it, `FAP AU-start AU-end FAP-start FAP-end`, says what it asks of a FAP. Empty lines and

@@ -1,4 +1,4 @@
-"""profiles_*.csv, vocabularies.toml, fap_statistics.csv -> which FAPs an emotion moves, and how far."""
+"""The FAP ranges of emotions (`profiles_*.csv`, `vocabularies.toml`, `fap_statistics.csv`)."""
 
 from __future__ import annotations
 

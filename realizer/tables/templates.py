@@ -1,4 +1,4 @@
-"""templates.toml -> the twelve expression templates of Wojdel: what each shows, and how long."""
+"""The twelve expression templates of Wojdel (`templates.toml`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""timing.toml -> the gaps a behaviour element would like, by element and variant."""
+"""The preferred gaps of behaviours, by element and variant (`timing.toml`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""words_*.csv, emotion_wheel.csv -> words for emotions, and their places on the rings of the wheel."""
+"""Words for emotions and their places on the emotion wheel (`words_*.csv`, `emotion_wheel.csv`)."""
 
 from __future__ import annotations
 

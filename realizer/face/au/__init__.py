@@ -1,1 +1,1 @@
-"""The face model by action units: measured displacements in, functions that move any mesh out."""
+"""The face model by action units (Wojdel 2005, chapter 4)."""

@@ -1,4 +1,4 @@
-"""A face and its model in, made ready out: intensities add displacements to vertices, and turn the jaw."""
+"""The deformer by action units: displacements of vertices, and the rotation of the jaw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A fitted model as a text file: TOML that one can read, and back."""
+"""The text file (TOML) of a fitted model: reader and writer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several action units at once: the additive and the successive mixer, and when which (Wojdel 2005, 5.1)."""
+"""The additive and the successive mixer of action units (Wojdel 2005, 5.1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The face model by action units (Wojdel 2005, chapter 4): places in, how an action unit moves them out."""
+"""The model of a face's action units: functions that displace any point (Wojdel 2005, chapter 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the upper half of a face ends: from the mesh in, as its topology has it, a bent plane out."""
+"""The surface that separates the upper and the lower half of a face at the mouth."""
 
 from __future__ import annotations
 

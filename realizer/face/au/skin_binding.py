@@ -1,4 +1,4 @@
-"""A face in; which of its vertices units move, and where in the skin what grows on it has its roots, out."""
+"""The vertices that action units move, and the skin that hair and lashes are attached to."""
 
 from __future__ import annotations
 

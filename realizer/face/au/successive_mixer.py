@@ -1,4 +1,4 @@
-"""A face and its model in; what its units move each vertex by, one unit after the other, out."""
+"""The successive mixer on a mesh: each unit displaces what the units before it left."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Her 32 action units: what kind of movement each is, and which shapes a face measures it by."""
+"""Wojdel's 32 action units: their kinds of movement, and the shapes that measure them."""
 
 from __future__ import annotations
 

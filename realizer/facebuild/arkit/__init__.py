@@ -1,1 +1,1 @@
-"""Bring your own head: a GLB with ARKit's morph targets in, a face folder out."""
+"""The importer of heads with ARKit blend shapes."""

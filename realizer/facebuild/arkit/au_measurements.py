@@ -1,4 +1,4 @@
-"""An imported face and its shapes in, what its action units do as measurements out: `faces fit` fits them."""
+"""Measurements of action units on an imported face, for `faces fit`."""
 
 from __future__ import annotations
 

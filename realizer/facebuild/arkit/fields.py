@@ -1,4 +1,4 @@
-"""A head's shapes and feature points in, fields of the FAPs out, each exactly 1 at its feature point.
+"""FAP displacement fields of a head with blend shapes, each exactly 1 at its feature point.
 
 A shape such as a raised brow moves several feature points at once. Along the line that joins them each has a
 share that is 1 at itself and 0 at the others; a FAP's field is its share of the shape over what the shape

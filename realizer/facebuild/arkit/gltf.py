@@ -1,4 +1,4 @@
-"""A GLB or glTF 2.0 file in, its JSON and its arrays out.
+"""A reader of GLB and glTF 2.0 files.
 
 Read here and by no library: trimesh leaves morph targets out and pygltflib hands raw bytes, so what a head
 needs (sparse, normalised and strided accessors) would have to be written anyway.

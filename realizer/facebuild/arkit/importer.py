@@ -1,4 +1,4 @@
-"""A GLB head with ARKit's shapes in, a face folder out, and what was found, is missing and is unsure."""
+"""The import of a GLB head with ARKit blend shapes into a face folder, with a report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shape of an opening jaw in, its joint and how far each vertex goes along out."""
+"""The jaw joint and its vertex weights, found from the shape of an opening jaw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pieces of surface in, one mesh out: doubled vertices are one again, and shapes bear ARKit's names."""
+"""Merging of surface pieces into one mesh with ARKit's shape names."""
 
 from __future__ import annotations
 

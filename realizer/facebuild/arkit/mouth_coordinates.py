@@ -1,4 +1,4 @@
-"""A skin and its feature points in, coordinates about the mouth out: along, across, above or below."""
+"""Coordinates around the mouth: along, across, above and below."""
 
 from __future__ import annotations
 

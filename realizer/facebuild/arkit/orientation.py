@@ -1,4 +1,4 @@
-"""A head that stands as its maker left it in, its turn, size and middle out: told by what its shapes move."""
+"""Rotation, scale and centre of an imported head, found from what its shapes move."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A head as one mesh in, its parts out: by the names that it bears, and by what moves with what."""
+"""A classifier of a mesh's parts, by name and by what moves together."""
 
 from __future__ import annotations
 

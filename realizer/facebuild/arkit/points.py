@@ -1,4 +1,4 @@
-"""A head with parts and shapes in, its 84 feature points out: by its form, then by its shapes."""
+"""The 84 feature points of an imported head, found by form and by shapes."""
 
 from __future__ import annotations
 

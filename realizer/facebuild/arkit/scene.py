@@ -1,4 +1,4 @@
-"""A glTF file in, its pieces of surface out: where they lie, what colour they have, what their shapes do."""
+"""The surfaces of a glTF scene: vertices, colours and blend shapes."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Fitting the action unit model of a face."""
+"""Fitting of the face model by action units."""

@@ -1,4 +1,4 @@
-"""A face and what its action units were measured to do in, a fitted model and her table 4.3 out."""
+"""The fit of a face's action unit model to measured displacements (Wojdel 2005, table 4.3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a fitted unit may move anything: the places of a face that are watched in, what goes too far out.
+"""Limits on how far a fitted action unit may move any point of a face.
 
 A fit sees landmarks, not what lies between and behind them: there a sum of Gaussians can grow to metres and
 no table shows it. So no vertex of the face, hidden ones too, goes much further than the furthest landmark;

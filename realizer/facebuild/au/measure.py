@@ -1,4 +1,4 @@
-"""What an action unit does to a face, measured: a CSV file of landmarks, or the face's own shapes."""
+"""Measurements of action units: a CSV file of landmarks, or the face's own shapes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points and how they moved in, the functions that move them so out (Wojdel 2005, 4.2.3)."""
+"""The solver that fits displacement functions to moved points (Wojdel 2005, 4.2.3)."""
 
 from __future__ import annotations
 

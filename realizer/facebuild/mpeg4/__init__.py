@@ -1,1 +1,1 @@
-"""MPEG-4 facial animation on any head: zones of influence in, displacement fields out; and their truth."""
+"""MPEG-4 facial animation on any head: zones of influence, displacement fields and scores."""

@@ -1,4 +1,4 @@
-"""A face folder and zones in, its fields.npz out: run time multiplies the same basis as for any face."""
+"""The build of a face's fields.npz from zones of influence."""
 
 from __future__ import annotations
 

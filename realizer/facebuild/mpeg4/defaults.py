@@ -1,4 +1,4 @@
-"""Feature points and a mesh in, sensible parameters out: what a head without shapes begins with."""
+"""Default parameters of the MPEG-4 deformer for a head without shapes."""
 
 from __future__ import annotations
 

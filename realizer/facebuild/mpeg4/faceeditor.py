@@ -1,4 +1,4 @@
-"""FaceEditor's parameter XML (Paul 2010, appendix C) in, the deformer's parameters out; and back.
+"""FaceEditor's parameter XML (Paul 2010, appendix C): reader and writer.
 
 The printed DTD has lost its beginning. What it does not say is read so: an `fp-position` has fp, x, y, z; a
 deformer's x, y, z is its neutral feature point; a mask lists the vertices that move; smooth-center and

@@ -1,4 +1,4 @@
-"""A distance from the middle of a zone (0) to its edge (1) in, the zone's influence there (1 to 0) out."""
+"""The influence of a zone by distance from its centre (1) to its edge (0)."""
 
 from __future__ import annotations
 

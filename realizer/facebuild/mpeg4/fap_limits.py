@@ -1,4 +1,4 @@
-"""A FAP and a direction in, the most that is usual of it out: what action units ask, or what faces reach."""
+"""The usual range of each FAP: what action units use, or what faces can reach."""
 
 from __future__ import annotations
 

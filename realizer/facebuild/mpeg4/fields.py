@@ -1,4 +1,4 @@
-"""Zones in, one displacement field a FAP out: metres for each metre that the feature point is asked to move.
+"""The displacement field of each FAP, per metre of movement of its feature point.
 
 Neighbours whose zones meet share what they both move. At a vertex every one of them gets a part of the
 influence of the line that joins their points, and the parts add up to one: equal FAPs move the skin between

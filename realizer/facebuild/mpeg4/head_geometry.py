@@ -1,4 +1,4 @@
-"""A head's skin and eyeballs in, the places that its shape itself shows out: what feature points hang on."""
+"""Landmarks that the shape of a head shows by itself, for locating feature points."""
 
 from __future__ import annotations
 

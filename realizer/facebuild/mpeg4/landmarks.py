@@ -1,4 +1,4 @@
-"""A head that nobody has marked in, its 84 feature points out, and which of them to look at again.
+"""Automatic placement of the 84 feature points on an unmarked head.
 
 The template's points are carried over: a smooth map takes the places that the template's shape shows (eyes,
 lids, profile, mouth corners, ears) to where this head shows them, and each point goes to the nearest skin.

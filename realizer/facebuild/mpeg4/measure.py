@@ -1,4 +1,4 @@
-"""A face, a FAP and how it moved in, single measures out: error, mirror, others, flips, roughness."""
+"""Measures of one FAP on a face: error, symmetry, side effects, flips, roughness."""
 
 from __future__ import annotations
 

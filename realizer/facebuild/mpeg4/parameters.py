@@ -1,4 +1,4 @@
-"""A face folder's mpeg4.toml in, the deformer's parameters out; and back."""
+"""The mpeg4.toml of a face folder: reader and writer."""
 
 from __future__ import annotations
 

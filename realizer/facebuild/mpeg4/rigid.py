@@ -1,4 +1,4 @@
-"""Feature points and parts in, what turns out: jaw with teeth and tongue, eyeballs, pupils, head and neck."""
+"""The rigid parts of a head: jaw with teeth and tongue, eyeballs, pupils, head and neck."""
 
 from __future__ import annotations
 

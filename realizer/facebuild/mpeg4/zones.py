@@ -1,4 +1,4 @@
-"""The parameters of the MPEG-4 deformer: a zone a FAP, masks, and which sides go together."""
+"""The zone parameters of the MPEG-4 deformer, with masks and synchronised sides."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Face folders from a recipe and the CC0 MakeHuman data."""
+"""Face folders made from recipes and the CC0 MakeHuman data."""

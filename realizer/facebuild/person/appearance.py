@@ -1,4 +1,4 @@
-"""A recipe's [look] in, figures of brows, lips, skin and collar out."""
+"""The [look] section of a recipe: parameters of brows, lips, skin and collar."""
 
 from __future__ import annotations
 

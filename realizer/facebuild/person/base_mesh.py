@@ -1,4 +1,4 @@
-"""The base mesh with its identity and shapes: what every displacement field is made from."""
+"""The base mesh with its identity and expression shapes."""
 
 from __future__ import annotations
 

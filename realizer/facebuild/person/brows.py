@@ -1,4 +1,4 @@
-"""A skin and its feature points in, brows and lashes out: sheets and fins that go along with the skin."""
+"""Meshes of brows and lashes that follow the skin."""
 
 from __future__ import annotations
 

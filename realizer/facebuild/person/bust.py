@@ -1,4 +1,4 @@
-"""A person and their recipe in, the parts of their bust out, with baked light."""
+"""The assembly of a person's bust from parts, with baked ambient occlusion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clothing: a body in, a cut and lifted surface out; and which vertices of a bust nobody would miss."""
+"""Clothing cut from and lifted above the body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A person and their parts in, the files of a face folder out."""
+"""The writer of face folders."""
 
 from __future__ import annotations
 

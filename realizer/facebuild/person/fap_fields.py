@@ -1,4 +1,4 @@
-"""Displacement fields of the FAPs on the base mesh: identity and expression shapes in, one field a FAP out.
+"""FAP displacement fields on the base mesh, made from identity and expression shapes.
 
 Every field is scaled so that its feature point moves one metre for each metre asked, in the FAP's direction.
 """

@@ -1,4 +1,4 @@
-"""A scalp and a style's figures in, hair out: strands from a pole to the hairline, and what hangs beyond."""
+"""Hair meshes by style: strands from a pole to the hairline and beyond."""
 
 from __future__ import annotations
 

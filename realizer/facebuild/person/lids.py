@@ -1,4 +1,4 @@
-"""The eyelids: each edge falls along the eye's own opening, so that upper and lower meet all along it."""
+"""The eyelids: edges that slide along the eye's opening so that both lids meet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lips: two contours of feature points joined by splines, so that equal FAPs move a lip as one.
+"""The lips: two contours of feature points joined by splines.
 
 A place on the lips has two coordinates: u runs from the right corner (-1) over the middle (0) to the left
 corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60). Every FAP owns a knot.

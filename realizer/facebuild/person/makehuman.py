@@ -1,4 +1,4 @@
-"""The MakeHuman base mesh hm08 and its shape targets (CC0): a folder of files in, arrays out."""
+"""A reader of the MakeHuman base mesh hm08 and its shape targets (CC0)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recipe and the CC0 data in, a `Person` out: the base mesh mixed to them, and what is measured on it."""
+"""A person: the base mesh morphed to a recipe, and the measurements on it."""
 
 from __future__ import annotations
 

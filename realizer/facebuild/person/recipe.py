@@ -1,4 +1,4 @@
-"""A recipe.toml in, a checked `Recipe` out: which shape targets make a person, and their colours."""
+"""The recipe.toml of a person: shape targets and colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A skin in; where hair grows on it and how high a place lies above it out."""
+"""The scalp: where hair grows, and the height of places above it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skin colours and baked ambient occlusion: places in, sRGB and light out."""
+"""Skin colours and baked ambient occlusion."""
 
 from __future__ import annotations
 
