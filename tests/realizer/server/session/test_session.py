@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.core.errors import RenderError, VoiceError
-from realizer.protocol.wire import FrameKind
+from realizer.protocol.wire import FrameKind, unpack
 from realizer.server.journal.entry import Entry, JournalError, Lost
 from realizer.server.journal.journal_writer import Notes
 from realizer.server.journal.sqlite_journal import LocalJournal
@@ -970,3 +970,16 @@ def test_frames_go_on_while_documents_wait_to_be_read(driver) -> None:
     assert not driver.session.reads
     assert driver.clients[1].ids[-1] != "prediction"
     assert {"b0:end", "b1:end", "b2:start"} <= set(driver.clients[1].ids)
+
+
+@pytest.mark.parametrize("message", ["ping", "state", "stop", "unsubscribe"])
+def test_what_is_due_goes_out_before_a_late_message_is_followed(driver, message) -> None:
+    driver.send(FAP | {"fps": 25})
+    driver.send('<bml id="b"><wait id="w" duration="0.5"/></bml>')
+    client = driver.run(0.49)
+    before, driver.now = len(client.messages), 0.53  # nobody has woken it at 0.5 and at 0.52
+    driver.send({"type": message, "stream": "fap"} if message == "unsubscribe" else {"type": message})
+    point, end, frame = client.messages[before : before + 3]
+    assert 'id="b:w:end"' in point
+    assert 'status="DONE"' in end
+    assert unpack(frame).frame == 13
