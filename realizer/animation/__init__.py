@@ -1,1 +1,1 @@
-"""Curves to frames: channels of AUs and FAPs are sampled, blended and mapped. Knows no BML."""
+"""Curves to frames: channels of AUs and FAPs are sampled, blended and mapped."""

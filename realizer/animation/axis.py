@@ -1,4 +1,4 @@
-"""The fixed axis of what can be animated: AUs by side, 68 FAPs, how far something is taken, AUs' order."""
+"""The fixed axis of animation: AUs by side, 68 FAPs, mask channels, and the AUs' mixing order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Channels and times -> AUFrames: layers laid over each other, whatever the order of the channels."""
+"""Step 5, blending: channels sampled and laid over each other in layers, in any order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The value of step 4: one target's key times and values."""
+"""The value of step 4: key times and values of one target."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Action units that were asked for -> those that a face can show together (Wojdel 2005, 5.2)."""
+"""Co-occurrence rules: requested action units to those a face can show together (Wojdel 2005, 5.2)."""
 
 from __future__ import annotations
 

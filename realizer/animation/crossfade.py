@@ -1,4 +1,4 @@
-"""Channels that play and the channels they become in; both out, the second going on where the first stops."""
+"""Crossfades from channels to their replacements, without a jump."""
 
 from __future__ import annotations
 

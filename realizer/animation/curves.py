@@ -1,4 +1,4 @@
-"""Channels and times -> their values: smooth or linear between keys, 0 outside, times the gains they have."""
+"""Sampling of channels: smooth or linear between keys, zero outside."""
 
 from __future__ import annotations
 

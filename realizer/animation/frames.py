@@ -1,4 +1,4 @@
-"""The values of steps 5 and 6: sampled AUs, and MPEG-4 FAP frames."""
+"""The values of steps 5 and 6: sampled AUs and MPEG-4 FAP frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows that fall into groups -> one row for each group, a round of slices at a time."""
+"""Vectorised reduction of rows by group."""
 
 from __future__ import annotations
 

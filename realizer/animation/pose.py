@@ -1,4 +1,4 @@
-"""AUFrames and what a face takes in, the rows that it is drawn by out."""
+"""The rows of parameters that a face's deformer takes, from AU frames."""
 
 from __future__ import annotations
 

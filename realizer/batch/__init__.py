@@ -1,1 +1,1 @@
-"""Many documents in, an output each and a manifest out; what was done before is not done again."""
+"""Batch realization: many documents to outputs and a manifest; done work is not repeated."""

@@ -1,4 +1,4 @@
-"""Tasks in, outcomes out in any order, by the workers of a Dask scheduler on any number of machines."""
+"""Execution of tasks on a Dask cluster."""
 
 from __future__ import annotations
 

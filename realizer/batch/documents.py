@@ -1,4 +1,4 @@
-"""Files, folders, patterns and lists in, documents with a name each out."""
+"""Named documents from files, folders, patterns and lists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The manifest of a folder of outputs: what came of each document, a JSON line each; survives a crash."""
+"""The manifest: the result of each document as a JSON line; it survives a crash."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks in, outcomes out in any order, by processes of this machine that are replaced when they die."""
+"""Execution of tasks by local processes, which are replaced when they die."""
 
 from __future__ import annotations
 

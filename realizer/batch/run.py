@@ -1,4 +1,4 @@
-"""Documents in, outputs and a manifest in a folder out, whoever does the work."""
+"""The batch run: documents to outputs and a manifest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A document and how it is to be played in, the key of what comes out: same key, same bytes."""
+"""A task: a document, its options and the key of its result; same key, same bytes."""
 
 from __future__ import annotations
 

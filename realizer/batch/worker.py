@@ -1,4 +1,4 @@
-"""A task in, the bytes of its outputs and its row of the manifest out; the same wherever it is done."""
+"""The worker of tasks: outputs and a manifest row for each, the same wherever it runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What behaviours there are: each module brings the kinds of a family; this is the only list of them."""
+"""The behaviours: kinds of all families, and the vocabulary of the parser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""audiofile: a sound file of the media folder, or a clip a client sent -> what sounds from start to end."""
+"""audiofile: plays a sound file of the media folder, or a clip that a client sent."""
 
 from __future__ import annotations
 

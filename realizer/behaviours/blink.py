@@ -1,4 +1,4 @@
-"""blink: one blink of both lids, or a wink of one."""
+"""blink: a blink of both lids, or a wink."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""interrupt, activate, parametervaluechange: what a behaviour does to others when it starts."""
+"""interrupt, activate, parametervaluechange: behaviours that act on other blocks."""
 
 from __future__ import annotations
 

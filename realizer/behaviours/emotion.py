@@ -1,4 +1,4 @@
-"""emotion, mood: a word or a place on the wheel of emotions -> its archetypes' AUs, a while or for good."""
+"""emotion, mood: an emotion word or place on the wheel as action units, for a while or until changed."""
 
 from __future__ import annotations
 

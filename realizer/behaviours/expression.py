@@ -1,4 +1,4 @@
-"""expression: a name of the expression library -> its action units, for about as long as people show it."""
+"""expression: an entry of the expression library as action units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""faceLexeme, faceFacs, face, faceShift: words and action units -> AU channels that rise, hold and relax."""
+"""faceLexeme, faceFacs, face, faceShift: AU channels that rise, hold and relax."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A FAPClip in, a BML document that plays it out: one <facekeyframe> of all its frames."""
+"""A BML document that plays a FAP clip, as one <facekeyframe>."""
 
 from __future__ import annotations
 

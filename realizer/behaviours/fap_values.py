@@ -1,4 +1,4 @@
-"""faps, fapFile: raw facial animation parameters, a pose of them or a file -> FAP channels."""
+"""faps, fapFile: a pose or a file of facial animation parameters as channels."""
 
 from __future__ import annotations
 

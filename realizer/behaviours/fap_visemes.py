@@ -1,4 +1,4 @@
-"""A FAPClip with visemes and expressions (FAP 1 and 2) in, the same with the FAPs that show them out."""
+"""Expansion of visemes and expressions (FAP 1 and 2) into the FAPs that show them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""gaze, gazeShift: the eyes lead to the target, the head follows, the eyes turn back by as much."""
+"""gaze, gazeShift: the eyes lead, the head follows, and the eyes turn back by as much."""
 
 from __future__ import annotations
 

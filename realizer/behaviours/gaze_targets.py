@@ -1,4 +1,4 @@
-"""A target and the scene -> the angles to look there; signed angles -> AU channels of eyes or head."""
+"""Gaze targets: angles to a target of the scene, and their AU channels for eyes and head."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""head, headDirectionShift: nods, shakes and tilts as strokes, and a direction the head keeps."""
+"""head, headDirectionShift: nods, shakes and tilts as strokes, and a new base direction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""idle: how many of its blinks and how much of its small movements a face keeps from now on."""
+"""idle: scales the blinks and small movements of a face."""
 
 from __future__ import annotations
 

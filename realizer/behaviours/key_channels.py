@@ -1,4 +1,4 @@
-"""Keys from a file or a document -> a channel through them that starts and ends at rest."""
+"""Channels through keys that start and end at rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""facekeyframe: keys of FAPs or action units, as BMLT writes them -> channels through them."""
+"""facekeyframe: BMLT's keyframes of FAPs or action units as channels."""
 
 from __future__ import annotations
 

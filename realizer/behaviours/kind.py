@@ -1,4 +1,4 @@
-"""What a family of behaviours brings: its node, what it wants of time, and what it shows."""
+"""The behaviour kind: node class, timing and expansion; and the context of planning."""
 
 from __future__ import annotations
 

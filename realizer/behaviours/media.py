@@ -1,4 +1,4 @@
-"""The name of a file in a document -> what is in it; only files inside the media folder are ever opened."""
+"""Access to files of the media folder; nothing outside it is ever opened."""
 
 from __future__ import annotations
 

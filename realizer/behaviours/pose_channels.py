@@ -1,4 +1,4 @@
-"""Action units by intensity and a behaviour's times -> channels that rise to a pose and leave or keep it."""
+"""AU channels that rise to a pose, and relax or keep it."""
 
 from __future__ import annotations
 

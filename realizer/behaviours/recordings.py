@@ -1,4 +1,4 @@
-"""The name of a recording in a document -> its sound: a clip a client sent, or a file of the media folder."""
+"""Recordings that documents name: clips that clients sent, and files of the media folder."""
 
 from __future__ import annotations
 

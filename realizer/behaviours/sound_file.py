@@ -1,4 +1,4 @@
-"""The bytes of a sound file -> mono sound: WAV by ourselves, others by PyAV where it is installed."""
+"""A reader of sound files: WAV by our own code, other formats by PyAV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""speech: its text or SSML, or a recording -> what a voice has to say, the times it took, and the lips."""
+"""speech: the request to a voice, the times of the utterance, and the lips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""timing.toml -> the Timing of a behaviour whose wishes are all in the table."""
+"""The timing of behaviours that timing.toml describes completely."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""timeline: a designer's file of the media folder -> channels of its action units and of their mixing."""
+"""timeline: a timeline file of the media folder as channels of action units and mixing orders."""
 
 from __future__ import annotations
 

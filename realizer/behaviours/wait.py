@@ -1,4 +1,4 @@
-"""wait: nothing for some seconds, so that others can refer to its end."""
+"""wait: a pause that other behaviours can refer to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bytes of a WAV file -> mono sound."""
+"""A reader of WAV files."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Pictures of schedules: blocks as plain data, laid out as shapes, written as SVG or PNG."""
+"""Charts of schedules as SVG or PNG."""

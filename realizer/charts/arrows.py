@@ -1,4 +1,4 @@
-"""The links of a block in, lines between its rows out: what is tied, and how much room orders leave."""
+"""Arrows of a chart: links between sync points, and the slack of orders."""
 
 from __future__ import annotations
 

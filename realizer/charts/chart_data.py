@@ -1,4 +1,4 @@
-"""Blocks that play in, what a timeline tells of them out."""
+"""Chart data of the blocks that play."""
 
 from __future__ import annotations
 

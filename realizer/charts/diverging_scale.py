@@ -1,4 +1,4 @@
-"""A stretch in, a colour out: a diverging scale that does not need red and green told apart."""
+"""A diverging colour scale that is safe for red-green colour blindness."""
 
 from __future__ import annotations
 

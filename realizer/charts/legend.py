@@ -1,4 +1,4 @@
-"""What is in a picture in, the words that explain it out."""
+"""The legend of a chart."""
 
 from __future__ import annotations
 

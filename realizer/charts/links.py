@@ -1,4 +1,4 @@
-"""A block and its schedule in, what ties its sync points out: to what, by what, with how much room."""
+"""Links between the sync points of a block: their targets, causes and slack."""
 
 from __future__ import annotations
 

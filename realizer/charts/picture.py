@@ -1,4 +1,4 @@
-"""Blocks in, one picture of their timelines out: a row a behaviour, time from left to right."""
+"""The chart of blocks: a row a behaviour, time from left to right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture in, PNG bytes out: drawn with Pillow."""
+"""A chart as PNG, drawn with Pillow."""
 
 from __future__ import annotations
 

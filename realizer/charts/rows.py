@@ -1,4 +1,4 @@
-"""One behaviour in, its row out: its names, its gaps in colour, its sync points, its words."""
+"""The row of one behaviour: names, gaps in colour, sync points, text."""
 
 from __future__ import annotations
 

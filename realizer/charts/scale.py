@@ -1,4 +1,4 @@
-"""A span of time and a width in, where a time stands and which times the axis names out."""
+"""The time axis: positions of times and labelled ticks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a picture is made of, in pixels from its top left corner, and how wide text is."""
+"""Shapes of a chart in pixels from the top left corner, and text widths."""
 
 from __future__ import annotations
 

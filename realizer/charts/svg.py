@@ -1,4 +1,4 @@
-"""A picture in, SVG text out."""
+"""A chart as SVG."""
 
 from __future__ import annotations
 

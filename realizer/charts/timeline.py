@@ -1,4 +1,4 @@
-"""What a timeline tells of a block: its points, how far its gaps are stretched, what ties it, what went.
+"""The values of a chart: behaviours with points and stretch, links, dropped behaviours.
 
 Plots and the stream `schedule` show this same data.
 """

@@ -1,4 +1,4 @@
-"""Blocks and a path in, a picture of their timelines there: its suffix says as what."""
+"""Writing of charts to files; the suffix selects the format."""
 
 from __future__ import annotations
 

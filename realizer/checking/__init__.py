@@ -1,1 +1,1 @@
-"""What is wrong with a document, and what looks like a slip of its author, as `realizer check` tells it."""
+"""Checking of documents: faults with explanations, and advice."""

@@ -1,4 +1,4 @@
-"""A sound block in, what looks like a slip of its author all the same out."""
+"""Advice on valid blocks that look like mistakes of their author."""
 
 from __future__ import annotations
 

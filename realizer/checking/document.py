@@ -1,4 +1,4 @@
-"""A document in, every fault of it out, block by block, also where one fault ends it all."""
+"""The check of a document: every fault of every block."""
 
 from __future__ import annotations
 

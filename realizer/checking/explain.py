@@ -1,4 +1,4 @@
-"""A warning about a document in, the finding that explains it out: what to mark, and what may help."""
+"""Findings that explain warnings: places to mark, and suggestions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scheduler's words for what cannot hold in, a label for each line that has a part in it out.
+"""Labels for the lines that take part in a scheduling conflict.
 
 The words are those of realizer/scheduling/explain.py.
 """

@@ -1,4 +1,4 @@
-"""What is wrong with a document, or looks like it: words, the places they are about, what may help."""
+"""The finding value: text, labelled places and help."""
 
 from __future__ import annotations
 

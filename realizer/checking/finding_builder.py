@@ -1,4 +1,4 @@
-"""What becomes of one warning while it is explained: its place in, labels and notes out."""
+"""A builder of findings: collects places, labels and notes of one warning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the parser dropped in, what else is wrong with it out: a fault hides those that are sought later."""
+"""Faults that other faults mask, found by parsing again without these."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line; exit status 0 done, 1 refused, 2 wrong usage, 3 something is missing."""
+"""The command line. Exit status: 0 done, 1 refused, 2 wrong usage, 3 something is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`align`: a recording and its text -> when it says each word and phoneme."""
+"""`align`: aligns a recording with its text."""
 
 from __future__ import annotations
 

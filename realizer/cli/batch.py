@@ -1,4 +1,4 @@
-"""`batch`: thousands of documents, played once each."""
+"""`batch`: realizes many documents, each once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A block and its schedule in, what the knowledge base has to say about its expressions out, as findings."""
+"""Advice of the knowledge base on the expressions of a block, as findings."""
 
 from __future__ import annotations
 

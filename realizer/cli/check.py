@@ -1,4 +1,4 @@
-"""`check`: documents in, every fault explained out, and advice on what looks like a slip."""
+"""`check`: explains every fault of documents, and gives advice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`demo`: the examples played over the wire and filmed, and a page to look at."""
+"""`demo`: plays the examples over the wire, films them, and serves the page."""
 
 from __future__ import annotations
 

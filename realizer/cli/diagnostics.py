@@ -1,4 +1,4 @@
-"""A fault and the text it is in, in; lines for people out: where, the source line, what is marked, help."""
+"""Findings as text for people: place, source line, marks and help."""
 
 from __future__ import annotations
 

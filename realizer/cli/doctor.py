@@ -1,4 +1,4 @@
-"""`doctor`: what this machine has, and what to install for the rest."""
+"""`doctor`: reports what this machine has, and what to install for the rest."""
 
 from __future__ import annotations
 

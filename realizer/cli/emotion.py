@@ -1,4 +1,4 @@
-"""`emotion`: what a word, or a place on the wheel of emotions, looks like, in FAPs and as a picture."""
+"""`emotion`: shows a word or a place on the emotion wheel, as FAPs and as a picture."""
 
 from __future__ import annotations
 

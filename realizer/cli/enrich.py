@@ -1,4 +1,4 @@
-"""`enrich`: a text or documents in, BML with the expressions of the knowledge base out."""
+"""`enrich`: adds expressions of the knowledge base to a text or to documents."""
 
 from __future__ import annotations
 

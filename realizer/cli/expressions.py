@@ -1,4 +1,4 @@
-"""`expressions`: what the library holds, and what in it means or shows what is asked for."""
+"""`expressions`: lists the expression library and searches it."""
 
 from __future__ import annotations
 

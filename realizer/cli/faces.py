@@ -1,4 +1,4 @@
-"""`faces`: the face folders, whether they are sound, and how they are built."""
+"""`faces`: lists, checks and builds face folders."""
 
 from __future__ import annotations
 

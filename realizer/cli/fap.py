@@ -1,4 +1,4 @@
-"""`fap`: what is in a FAP file, the same as another file, and what it looks like."""
+"""`fap`: inspects, converts and plays FAP files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`faces fit`: the action unit model of a face, fitted to measurements or to the face's own shapes."""
+"""`faces fit`: fits the action unit model of a face to measurements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`faces import` and `faces check`: a head of another make becomes a face; what is wrong with either."""
+"""`faces import` and `faces check`: imports a head; reports what is wrong with a face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`voices` and `outputs`: what there is, and how to get what is missing."""
+"""`voices` and `outputs`: list what there is, and how to get what is missing."""
 
 from __future__ import annotations
 

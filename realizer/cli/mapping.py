@@ -1,4 +1,4 @@
-"""`faces mapping`: what action units ask of FAPs on a face, as a file to read, change and play with."""
+"""`faces mapping`: prints a face's mapping of action units to FAPs as a file to edit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`realize` and `schedule`: documents played without a clock."""
+"""`realize` and `schedule`: play documents offline."""
 
 from __future__ import annotations
 

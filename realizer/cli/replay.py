@@ -1,4 +1,4 @@
-"""`replay`: a session that `serve --record` wrote, played again."""
+"""`replay`: plays a recorded session again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`faces sheet`: what every FAP, action unit and emotion does to a face, as one picture to look at."""
+"""`faces sheet`: draws every FAP, action unit and emotion of a face in one picture."""
 
 from __future__ import annotations
 

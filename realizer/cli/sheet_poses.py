@@ -1,4 +1,4 @@
-"""FAPs, action units and emotions in; the poses that a sheet shows of them out."""
+"""The poses that a face sheet shows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`timeline`: a designer's file of expressions played as documents are; and what is to say about one."""
+"""`timeline`: plays a timeline file, or reports what is wrong with it."""
 
 from __future__ import annotations
 

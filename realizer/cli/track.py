@@ -1,4 +1,4 @@
-"""`track`: feature points of a real face, as a tracker saw them, to a FAP file."""
+"""`track`: converts tracked feature points to a FAP file."""
 
 from __future__ import annotations
 

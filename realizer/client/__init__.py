@@ -1,4 +1,4 @@
-"""A client of the service: BML out, feedback, frames and films in; `async with` or plain `with`."""
+"""Clients of the service, for `async with` and plain `with`."""
 
 from realizer.client.async_client import Client
 from realizer.client.connection import connect

@@ -1,4 +1,4 @@
-"""A connection to the service inside an event loop."""
+"""The asynchronous client."""
 
 from __future__ import annotations
 

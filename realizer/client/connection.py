@@ -1,4 +1,4 @@
-"""An address of the service in, an open connection out: `async with` or plain `with`."""
+"""Opening of client connections, for `async with` or plain `with`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages of the service in, sorted by what they are; knows no sockets."""
+"""A router of the service's messages to those that wait for them; it knows no sockets."""
 
 from __future__ import annotations
 

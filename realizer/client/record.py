@@ -1,4 +1,4 @@
-"""Pictures and sound of a block that plays in, a film out."""
+"""Filming of a block over the wire: pictures and sound to a film."""
 
 from __future__ import annotations
 

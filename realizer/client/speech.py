@@ -1,4 +1,4 @@
-"""A speech that a client says as its text comes: feedback in, syncs that have passed and its end out."""
+"""Streaming speech of a client: text sent as it is produced, with feedback of its syncs."""
 
 from __future__ import annotations
 

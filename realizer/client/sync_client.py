@@ -1,4 +1,4 @@
-"""A connection to the service without an event loop of yours: one runs in a thread."""
+"""The synchronous client: an asynchronous one in a thread."""
 
 from __future__ import annotations
 

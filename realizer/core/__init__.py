@@ -1,1 +1,1 @@
-"""Values and settings that every layer shares."""
+"""Values, errors and settings that every layer shares."""

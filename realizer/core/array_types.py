@@ -1,4 +1,4 @@
-"""The array types that flow between the steps; shapes stand where they are used."""
+"""Array types that flow between the steps; shapes are documented where they are used."""
 
 from typing import TypeAlias
 

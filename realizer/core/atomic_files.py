@@ -1,4 +1,4 @@
-"""A path in, a place to write out: the file appears whole or not at all."""
+"""Atomic writing: a file appears complete or not at all."""
 
 from __future__ import annotations
 

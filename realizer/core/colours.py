@@ -1,4 +1,4 @@
-"""8-bit sRGB in, linear light out, and back (IEC 61966-2-1): the one place that knows the curve."""
+"""Conversion between 8-bit sRGB and linear light (IEC 61966-2-1)."""
 
 from __future__ import annotations
 

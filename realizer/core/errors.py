@@ -1,4 +1,4 @@
-"""What can go wrong outside a document.
+"""The errors of the library, other than those of documents.
 
 RealizerError
 ├── ScheduleError    constraints that cannot hold together

@@ -1,4 +1,4 @@
-"""Log records in, lines out: words for a reader, or JSON for a collector."""
+"""Log formatters: text for people, or JSON for collectors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every setting in one typed object: flags win over REALIZER_* variables, those over a TOML file."""
+"""Settings in one typed object: flags, then REALIZER_* variables, then a TOML file."""
 
 from __future__ import annotations
 

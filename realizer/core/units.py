@@ -1,4 +1,4 @@
-"""Conversions at the edges: frames of a duration, the MPEG-4 angle unit."""
+"""Unit conversions: durations to frames, the MPEG-4 angle unit."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A path in, the encoding for its suffix out. To add one: a module with OUTPUTS, and its name in MODULES."""
+"""The outputs: encodings of a realization, by file suffix."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A realization as ARKit's weights (.arkit.csv): a row a frame, in the layout of the app Live Link Face."""
+"""The output .arkit.csv: ARKit weights, in the layout of the app Live Link Face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A realization in, what is said by the line out, and such lines as a track of a film."""
+"""Captions: the speech of a realization as subtitle lines of a film."""
 
 from __future__ import annotations
 

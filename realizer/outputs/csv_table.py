@@ -1,4 +1,4 @@
-"""A realization as a table (.csv): a row a frame; time, every AU, every FAP."""
+"""The output .csv: time, every AU and every FAP, a row a frame."""
 
 from __future__ import annotations
 

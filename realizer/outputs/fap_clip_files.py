@@ -1,4 +1,4 @@
-"""A FAPClip to the text of a .fap, .csv or .json file, and back from what any of them says."""
+"""FAP clips as .fap, .csv and .json files: reader and writer."""
 
 from __future__ import annotations
 

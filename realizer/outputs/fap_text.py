@@ -1,4 +1,4 @@
-"""FAP frames as MPEG-4 text (.fap, version 2.1), as Xface and Greta read it; `fap_reader` reads it back."""
+"""The output .fap: MPEG-4 FAP text (version 2.1), as Xface and Greta read it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A realization as a film (.mp4: H.264 and AAC; .webm: VP9 and Opus), with its sound and subtitles."""
+"""The outputs .mp4 (H.264, AAC) and .webm (VP9, Opus), with sound and subtitles."""
 
 from __future__ import annotations
 

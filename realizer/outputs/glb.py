@@ -1,4 +1,4 @@
-"""A realization as an animated head (.glb): glTF 2.0 with morph targets, joints, and a key a frame."""
+"""The output .glb: an animated glTF 2.0 head with morph targets, joints and a key a frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Some of a face's vertices in, a glTF mesh of them out: rigid, or with morph targets and joints."""
+"""glTF meshes of a face's parts: rigid, or with morph targets and joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A realization as JSON (.json): schedule, FAPs, AUs, feedback and warnings."""
+"""The output .json: schedule, FAPs, AUs, feedback and warnings."""
 
 from __future__ import annotations
 

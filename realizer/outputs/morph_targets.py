@@ -1,4 +1,4 @@
-"""A face and its poses in, morph targets with a weight a frame out: as many as it takes to stay true."""
+"""Morph targets and weights that reproduce a face's poses within a tolerance."""
 
 from __future__ import annotations
 

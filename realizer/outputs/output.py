@@ -1,4 +1,4 @@
-"""What an encoding is: a suffix, a media type, and a function from a realization to bytes."""
+"""The output value: suffix, media type, and the function that encodes a realization."""
 
 from __future__ import annotations
 

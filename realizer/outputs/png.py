@@ -1,4 +1,4 @@
-"""A realization as one picture (.png): a contact sheet over time, or the face at one instant."""
+"""The output .png: a contact sheet over time, or the face at one instant."""
 
 from __future__ import annotations
 

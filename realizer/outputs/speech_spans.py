@@ -1,4 +1,4 @@
-"""A realization in, the spans of what is said and the instants of sync points out, on one clock."""
+"""Spans of speech and instants of sync points in a realization, on one clock."""
 
 from __future__ import annotations
 

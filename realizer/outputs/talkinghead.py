@@ -1,4 +1,4 @@
-"""A realization as what TalkingHead's `speakAudio` takes (.talkinghead.json): words, visemes, face, sound."""
+"""The output .talkinghead.json: the arguments of TalkingHead's `speakAudio`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A realization as a TextGrid (.textgrid), as Praat and ELAN read it: words, phonemes, sync points."""
+"""The output .textgrid: words, phonemes and sync points, as Praat and ELAN read them."""
 
 from __future__ import annotations
 

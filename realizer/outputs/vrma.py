@@ -1,4 +1,4 @@
-"""A realization as a VRM animation (.vrma): preset expressions, the head and the gaze, for any VRM avatar."""
+"""The output .vrma: VRM animation of preset expressions, head and gaze, for any VRM avatar."""
 
 from __future__ import annotations
 

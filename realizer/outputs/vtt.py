@@ -1,4 +1,4 @@
-"""A realization as WebVTT (.vtt): words, phonemes and sync points, as cues."""
+"""The output .vtt: words, phonemes and sync points as WebVTT cues."""
 
 from __future__ import annotations
 

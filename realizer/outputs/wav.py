@@ -1,4 +1,4 @@
-"""A realization's sound (.wav): 16 bit, mono, as long as the realization; silence where nobody speaks."""
+"""The output .wav: the sound of a realization (16 bit, mono)."""
 
 from __future__ import annotations
 

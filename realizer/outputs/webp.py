@@ -1,4 +1,4 @@
-"""A realization as an animated picture (.webp), for pages and messages that take no film."""
+"""The output .webp: an animated picture."""
 
 from __future__ import annotations
 

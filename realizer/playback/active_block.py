@@ -1,4 +1,4 @@
-"""One accepted block: its plan laid on the session clock, and what is done to it while it waits or plays."""
+"""An accepted block on the session clock, and what happens to it while it waits or plays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocks that were announced and are not here yet, and what was done to them meanwhile."""
+"""Blocks that were announced and have not arrived, and the commands for them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Utterances that play in, their sound as it is heard out: at any rate, cut off and faded."""
+"""The mix of the utterances that play, cut off and faded as heard, at any sample rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What behaviours do to other blocks and behaviours when they start: interrupt, activate, change."""
+"""Commands of behaviours to other blocks: interrupt, activate, change a parameter."""
 
 from __future__ import annotations
 

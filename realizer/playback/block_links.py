@@ -1,4 +1,4 @@
-"""A block and those that are alive in; what it waits for, whom it ends, what they hold, their points out."""
+"""Links between a block and the active ones: what it waits for, replaces and refers to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All blocks of a session: accepted in turn, started, moved and ended as they depend on each other."""
+"""The manager of a session's blocks: accepts, starts, moves and ends them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steps 2 to 4 for one block: its timings, the solved schedule, and the channels it expands to."""
+"""Steps 2 to 4 for one block: timings, schedule and channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The blocks of a session: who plays or waits, who is still to be seen, and when their points are."""
+"""The store of a session's blocks, and of the times of their sync points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One face of a session: its base states and what a client set directly, as channels."""
+"""One face of a session: base states and direct values, as channels."""
 
 from __future__ import annotations
 

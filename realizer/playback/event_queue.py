@@ -1,4 +1,4 @@
-"""What is due when: the events of all blocks, in the order of report."""
+"""The queue of events of all blocks, in the order of report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A planned block in; the BML feedback that tells of it out, each with the time it is due."""
+"""BML feedback of a planned block, with the time each element is due."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which blocks are alive: documents are composed here, their feedback comes due and their faces are sampled.
+"""The player: composes blocks, reports their feedback and samples their faces.
 
 Knows no clock and no I/O: every call is told `now`, in seconds on the session clock.
 """

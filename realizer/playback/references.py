@@ -1,4 +1,4 @@
-"""A block in, every sync reference it makes out, or the block with others."""
+"""The sync references of a block: collection and replacement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocks that play in, as the scheduler sees them beside a new one: what refers to what, what has passed."""
+"""Active blocks as the scheduler sees them beside a new one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What behaviours need for themselves and when in; which of them have to go out."""
+"""Exclusive resources of behaviours (gaze, head, speech ...), and conflicts over them."""
 
 from __future__ import annotations
 

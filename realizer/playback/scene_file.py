@@ -1,4 +1,4 @@
-"""The text of a scene in, where its targets are out."""
+"""A parser of scene files: the positions of gaze targets."""
 
 from __future__ import annotations
 

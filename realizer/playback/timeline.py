@@ -1,4 +1,4 @@
-"""The blocks that were accepted: laid on the clock, moved, solved again, cut off, stopped as they depend."""
+"""The timeline of accepted blocks: placed, moved, rescheduled, cut off and stopped."""
 
 from __future__ import annotations
 

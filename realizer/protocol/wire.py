@@ -1,4 +1,4 @@
-"""Frames to bytes and back: the binary header and payloads of the streams, and their JSON form."""
+"""Binary and JSON encoding of stream frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The service: settings in, open doors out; prints where they are, drains and ends."""
+"""The service: opens the transports, prints where they are, drains and ends."""
 
 from __future__ import annotations
 

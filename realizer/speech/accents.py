@@ -1,4 +1,4 @@
-"""An utterance in, its phrases and the accents in them out: where a voice pauses and what it stresses."""
+"""Phrases of an utterance and the accents in them: where a voice pauses and what it stresses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requests in, what a voice made of the latest of them out, so that the same is not spoken twice."""
+"""A cache of recent utterances."""
 
 from __future__ import annotations
 

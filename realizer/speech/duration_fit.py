@@ -1,4 +1,4 @@
-"""What is to be said, and how long it is to last, in; an utterance of that length out."""
+"""Synthesis to a given duration, by speaking rate and a small time stretch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The client's end of an engine's process: a request in, an answer out, a dead or hung process replaced."""
+"""The client of an engine's process; it replaces a process that dies or hangs."""
 
 from __future__ import annotations
 

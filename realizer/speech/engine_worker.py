@@ -1,4 +1,4 @@
-"""A process around one engine: JSON requests on stdin, JSON heads and bodies (PCM) on stdout.
+"""A process around one engine: JSON requests on stdin; JSON headers and bodies (PCM) on stdout.
 
     arguments        the engine's file, [--no-fork], and what is the engine's own
     first line out   what the engine says of itself, or {"error": text}

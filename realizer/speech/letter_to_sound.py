@@ -1,4 +1,4 @@
-"""A written word in, its vowel units and rough phonemes out; by language, from tables."""
+"""Vowel units and approximate phonemes of written words, by tables per language."""
 
 from __future__ import annotations
 

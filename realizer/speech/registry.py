@@ -1,4 +1,4 @@
-"""Which voices there are, which can speak here, and what to install for the others."""
+"""The registry of voices: which can speak here, and what to install for the others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The voice that needs nothing: text in, the times of words, marks and rough phonemes out, no sound."""
+"""The silent voice: estimated times of words, marks and phonemes, without sound."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pieces of speech in, one sound with its phonemes, words and marks out."""
+"""A buffer that joins pieces of speech to one utterance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a voice is asked to say, made safe: SSML text in, a script of text, marks, breaks and tags out."""
+"""A parser of SSML: text, marks, breaks and tags."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attributes of SSML's <prosody> in, factors on rate, pitch and loudness out."""
+"""Attributes of SSML's <prosody> as factors on rate, pitch and volume."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a voice makes of a text: sound, and the times of words, phonemes and marks."""
+"""The values of speech: request, utterance, words, phonemes, and the voice protocol."""
 
 from __future__ import annotations
 

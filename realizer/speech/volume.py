@@ -1,4 +1,4 @@
-"""What was asked for and what a voice made of it in, its phonemes as loud as the text wants them out."""
+"""Phoneme loudness from the volume that a text requests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words that an engine says as one in, where each begins among their phonemes out."""
+"""Boundaries of words that an engine reports as one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A script in, its words with their places out: what a reader would point at, whatever an engine merges."""
+"""The words of a script with their places."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""MPEG-4 FAP frames: from action units, from files."""
+"""MPEG-4 FAP frames, from action units and from files."""

@@ -1,4 +1,4 @@
-"""What each action unit asks of each FAP, as a value: the table, and rows that go before it."""
+"""The mapping of AUs to FAPs as a value: the built-in table with a user's rows on top."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""AUFrames -> FAPFrames: each action unit asks FAPs for something, a mapping says how much."""
+"""Step 6, the conversion of AU frames to FAP frames."""
 
 from __future__ import annotations
 

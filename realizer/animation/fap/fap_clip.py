@@ -1,4 +1,4 @@
-"""The value of a FAP file: MPEG-4 FAP frames as whole numbers, at a rate of its own."""
+"""The value of a FAP file: integer MPEG-4 FAP frames at their own rate."""
 
 from __future__ import annotations
 

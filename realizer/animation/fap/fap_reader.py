@@ -1,4 +1,4 @@
-"""MPEG-4 FAP text in, as every known program writes it; a FAPClip and what was odd out."""
+"""A tolerant reader of MPEG-4 FAP text files, with warnings."""
 
 from __future__ import annotations
 

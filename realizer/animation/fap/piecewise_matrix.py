@@ -1,4 +1,4 @@
-"""Rows of action units and FAPs in, what they ask of whole arrays out: sums of hinges."""
+"""A piecewise linear product of action unit rows and FAP breakpoints."""
 
 from __future__ import annotations
 

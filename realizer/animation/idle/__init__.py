@@ -1,1 +1,1 @@
-"""What a face does by itself: blinks, small head motion, saccades, motion that goes with speech."""
+"""Involuntary motion: blinks, small head motion, saccades, motion that accompanies speech."""

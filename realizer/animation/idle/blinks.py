@@ -1,4 +1,4 @@
-"""A seed and a span of time -> the blinks of a face, which come where its phrases end.
+"""Blinks of a face, aligned with the ends of its phrases.
 
 Each has a number k = 0, 1, 2, .. and draws what is random about it from (seed, kind, k), so any two windows
 of time agree where they overlap.

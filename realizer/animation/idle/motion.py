@@ -1,4 +1,4 @@
-"""A seed and a span of time -> what a face does when it does nothing: blinks, small head motion, saccades.
+"""Idle motion of a face: blinks, small head motion, saccades.
 
 Everything is a function of (seed, time) alone: each movement has a number k = 0, 1, 2, .. and draws what is
 random about it from (seed, kind, k), so any two windows of time agree where they overlap.

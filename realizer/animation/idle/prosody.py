@@ -1,4 +1,4 @@
-"""Who speaks, and what documents ask for -> what a face does by itself while it speaks.
+"""Motion that accompanies speech: nods, brow raises, blinks and glances.
 
 Small nods and raised brows on accents, looks aside, and where phrases end, for blinks. Everything is a
 function of the seed, of what is said and when it starts, and of time, not of the frames that are asked for.

@@ -1,4 +1,4 @@
-"""A seed, a kind and numbers -> what chance says of each of them: always the same, on any machine."""
+"""Random numbers that depend only on seed, kind and index: the same on any machine."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Phonemes to lip, jaw and tongue channels."""
+"""Lip synchronisation: phonemes to lip, jaw and tongue channels."""

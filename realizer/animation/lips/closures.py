@@ -1,4 +1,4 @@
-"""The sounds of an utterance in, when speech has the lips and when a sound closes or bites them out."""
+"""Lip closures: the times at which sounds close or bite the lips."""
 
 from __future__ import annotations
 

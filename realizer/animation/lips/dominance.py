@@ -1,4 +1,4 @@
-"""Phonemes with their times in, how much each sound has to say at a time out: dominance functions.
+"""Dominance functions of phonemes: the influence of each sound over time.
 
 Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
 """

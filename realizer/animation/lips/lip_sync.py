@@ -1,4 +1,4 @@
-"""Phonemes with their times in, lip, jaw and tongue channels out: dominance functions and hard closures."""
+"""Lip, jaw and tongue channels from phonemes: dominance functions and hard closures."""
 
 from __future__ import annotations
 

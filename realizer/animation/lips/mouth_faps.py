@@ -1,4 +1,4 @@
-"""Shapes of the mouth in, the FAPs of lips, jaw and tongue that make them out."""
+"""The FAPs of lips, jaw and tongue that make a mouth shape."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Phonemes with their times in, how much of each viseme is seen out: of MPEG-4 (FAP 1), or of Oculus."""
+"""Weights of visemes over time, of MPEG-4 (FAP 1) or Oculus."""
 
 from __future__ import annotations
 

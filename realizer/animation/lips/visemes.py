@@ -1,4 +1,4 @@
-"""IPA in, mixtures of the MPEG-4 visemes out: by articulatory features, so that every language has lips."""
+"""IPA phonemes as mixtures of MPEG-4 visemes, by articulatory features."""
 
 from __future__ import annotations
 

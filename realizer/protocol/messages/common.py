@@ -1,4 +1,4 @@
-"""What all messages share: the protocol's version, its streams with their encodings, the bases."""
+"""Base classes of messages; protocol version, streams and encodings."""
 
 from __future__ import annotations
 

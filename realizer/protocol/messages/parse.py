@@ -1,4 +1,4 @@
-"""JSON text in, a control message out, or the error to answer with."""
+"""The parser of control messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages out that are JSON: answers to control messages, and frames in their JSON form."""
+"""Messages of the service: answers, and frames in JSON form."""
 
 from __future__ import annotations
 

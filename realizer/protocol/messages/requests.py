@@ -1,4 +1,4 @@
-"""Control messages in, but `speech`: one class each."""
+"""Control messages of clients, except `speech`."""
 
 from __future__ import annotations
 

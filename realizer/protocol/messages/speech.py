@@ -1,4 +1,4 @@
-"""The message `speech`: text piece by piece, or what is said in a sound clip."""
+"""The message `speech`: text chunk by chunk, or annotations of a sound clip."""
 
 from __future__ import annotations
 

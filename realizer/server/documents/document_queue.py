@@ -1,4 +1,4 @@
-"""Messages with documents in, their blocks and faults one by one out."""
+"""The queue of received texts, parsed one document at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A text, block, plan or stream in, which limit of the service it is beyond, and where that is set, out."""
+"""Limits of the service on texts, blocks, plans and streams."""
 
 from __future__ import annotations
 

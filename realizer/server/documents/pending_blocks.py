@@ -1,4 +1,4 @@
-"""Blocks between their arrival and their planning: they wait for their voice, and for what they refer to."""
+"""Blocks that wait for speech, or for the blocks they refer to."""
 
 from __future__ import annotations
 

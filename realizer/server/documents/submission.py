@@ -1,4 +1,4 @@
-"""Documents in, blocks that play out: read one by one, spoken for, planned when nothing is missing."""
+"""The submission of documents to the player."""
 
 from __future__ import annotations
 

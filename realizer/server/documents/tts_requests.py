@@ -1,4 +1,4 @@
-"""What blocks want said in, orders for voices out; answers go to the blocks, long texts part by part."""
+"""Requests to voices for the speech of blocks; long texts are requested in parts."""
 
 from __future__ import annotations
 

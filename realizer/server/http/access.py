@@ -1,4 +1,4 @@
-"""A request in, whether whoever sends it may come in out; and how fast its messages are read."""
+"""Access control: tokens, connection slots and rate limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the service's port answers over HTTP: the page and what its tools ask, faces as GLB, its health."""
+"""HTTP answers on the service's port: page, tools, faces as GLB, health."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A JSON Web Token (RFC 7519) in, what its bearer may do out."""
+"""Verification of JSON Web Tokens (RFC 7519)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a service counts in, the text that Prometheus reads out (exposition format 0.0.4)."""
+"""Metrics in the Prometheus text format (0.0.4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page's tools ask of the service: faults of a text, the face of a feeling, a pose as a FAP file."""
+"""Tools of the page: checks of a text, emotion previews, pose export."""
 
 from __future__ import annotations
 

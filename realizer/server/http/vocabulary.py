@@ -1,4 +1,4 @@
-"""What documents and tools may name, as JSON: elements, lexemes, emotions, AUs, FAPs, profiles, voices."""
+"""The vocabulary as JSON: elements, lexemes, emotions, AUs, FAPs, profiles, voices."""
 
 from __future__ import annotations
 

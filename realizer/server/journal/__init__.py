@@ -1,4 +1,4 @@
-"""What happened to a session, kept: another process can go on with it, and anybody can play it again."""
+"""Journals of sessions: another process can resume them, and recordings can be replayed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A session at rest in, all of it that outlives its blocks as JSON out; and back into a new session."""
+"""Checkpoints: the state of a session as journal parts, and its restoration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What journals keep of sessions: each thing that was done, as a line of JSON, and what that has come to."""
+"""The journal's entries and protocols."""
 
 from __future__ import annotations
 

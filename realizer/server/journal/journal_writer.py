@@ -1,4 +1,4 @@
-"""What is done to one session in, entries of its journal and of its record out."""
+"""The writer of a session's journal and recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A record in, what was told, seen and heard of its session out, as those had it who were there."""
+"""Replay of a recording: feedback, frames and sound as its viewers received them."""
 
 from __future__ import annotations
 

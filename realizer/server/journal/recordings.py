@@ -1,4 +1,4 @@
-"""A journal to look at and to play again: a file of JSON lines for each session, in a folder."""
+"""Recordings: a file of JSON lines for each session."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A journal that many nodes share (Redis): whichever of them a client comes to goes on with its session."""
+"""The journal in Redis, which several nodes share."""
 
 from __future__ import annotations
 

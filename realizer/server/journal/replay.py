@@ -1,4 +1,4 @@
-"""Entries of a session in, the session as it was out: everything is done again, each at its own time."""
+"""Replay of journal entries into a session."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A session that is played again in, the frames of its faces out: each as those got it who were there."""
+"""The frames of a replayed session, as a live viewer received them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What outlives blocks in (faces with what they hold, schedules), data that JSON can hold out; and back."""
+"""Serialization of characters and schedules to JSON data, and back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A journal in a file of this machine (SQLite): what a service that was killed goes on with afterwards."""
+"""The journal in a SQLite file, which the workers of one machine share."""
 
 from __future__ import annotations
 

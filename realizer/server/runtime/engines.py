@@ -1,4 +1,4 @@
-"""Voices and renderers behind threads: a Speak or a Draw in, an utterance or a picture out. Blocks."""
+"""Voices and renderers in threads; they answer the effects Speak and Draw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When objects that hold each other are looked for: seldom, since all sessions stand still meanwhile."""
+"""The garbage collection policy of the service: full collections are rare."""
 
 from __future__ import annotations
 

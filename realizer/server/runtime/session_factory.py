@@ -1,4 +1,4 @@
-"""Where sessions come from: settings in, new sessions out, and those that another process has had."""
+"""The factory of sessions: new ones, and those restored from a journal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sessions inside an event loop: messages of connections in, what sessions want done carried out."""
+"""The host of sessions in an event loop: delivers messages, carries out effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sessions by name: connections join, make, leave and outlive them. No sockets, no clock."""
+"""The registry of sessions by name, with their connections and expiry."""
 
 from __future__ import annotations
 

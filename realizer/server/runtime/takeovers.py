@@ -1,4 +1,4 @@
-"""Sessions of this process in, those that another one has taken over out; nothing else may ever tell."""
+"""Detection of sessions that another process has taken over."""
 
 from __future__ import annotations
 

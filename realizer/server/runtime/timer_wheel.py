@@ -1,4 +1,4 @@
-"""Things and the times at which they want to be woken in, one timer of the event loop for all of them out."""
+"""A timer wheel: many wake-up times share one event loop timer."""
 
 from __future__ import annotations
 

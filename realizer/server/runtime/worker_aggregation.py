@@ -1,4 +1,4 @@
-"""A request in, which each worker answers for itself; one answer for all of them out."""
+"""Aggregation of the workers' metrics and health."""
 
 from __future__ import annotations
 

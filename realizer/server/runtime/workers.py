@@ -1,4 +1,4 @@
-"""Connections of one port in, each handed to the worker process that has its session.
+"""Worker processes; connections of one port are passed to the worker of their session.
 
 The parent looks at the first line of a request and leaves it in the socket. What it hands over is the socket
 itself, so that nothing stands between a client and its worker afterwards.

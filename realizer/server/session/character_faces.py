@@ -1,4 +1,4 @@
-"""Who has which face: the faces of one session's characters in, what is drawn and streamed of them out."""
+"""The faces assigned to the characters of a session."""
 
 from __future__ import annotations
 

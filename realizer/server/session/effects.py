@@ -1,4 +1,4 @@
-"""What a session wants done, as values: the shell sends, speaks, draws and closes."""
+"""Effects: what a session asks its host to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Feedback in, numbered XML out: what a session keeps for clients that come back."""
+"""The feedback log of a session: numbered, bounded, resumable."""
 
 from __future__ import annotations
 

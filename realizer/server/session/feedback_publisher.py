@@ -1,4 +1,4 @@
-"""Feedback that is due in, numbered messages to all who take it out."""
+"""The publisher of due feedback to subscribers."""
 
 from __future__ import annotations
 

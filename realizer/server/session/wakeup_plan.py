@@ -1,4 +1,4 @@
-"""When a session is wanted again: its parts in, the next time out. No sockets, no clock."""
+"""The time at which a session must be woken next."""
 
 from __future__ import annotations
 

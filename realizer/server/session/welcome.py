@@ -1,4 +1,4 @@
-"""A session in, what it says to a client that says hello out: what there is, and what is too much."""
+"""The `welcome` message: version, capabilities and limits."""
 
 from __future__ import annotations
 

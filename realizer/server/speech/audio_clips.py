@@ -1,4 +1,4 @@
-"""Pieces of sound clips and what is told of their times in, recordings that documents name `clip:ID` out."""
+"""Sound clips that clients send in chunks, with their annotations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a voice made of a long text so far in; an utterance of all of it, the rest guessed, out."""
+"""Long texts spoken in parts, so that sound starts early."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text as it comes in, with tags in it, whole sentences out as soon as they are whole."""
+"""An incremental splitter of tagged text into sentences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A piece of text with syncs, SSML and behaviours in it -> the block that says it."""
+"""Blocks that speak chunks of text with syncs, SSML and behaviours."""
 
 from __future__ import annotations
 

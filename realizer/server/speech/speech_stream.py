@@ -1,4 +1,4 @@
-"""One speech that a client says piece by piece: text and clips in, the block around it and its pieces out."""
+"""One streaming speech: text chunks and clips, and the block that spans them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speeches that clients say piece by piece: text and clips in, their blocks and one around them out."""
+"""The streaming speeches of a session."""
 
 from __future__ import annotations
 

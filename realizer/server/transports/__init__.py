@@ -1,1 +1,1 @@
-"""The doors of the service: one module each, all of them leading into the same sessions."""
+"""Transports: WebSocket, Xface, Asap and STOMP, all leading into the same sessions."""

@@ -1,4 +1,4 @@
-"""The Asap TCP door: BML comes in on one port, feedback goes out over a call-back to the client's own port.
+"""The Asap TCP transport: BML on one port, feedback to a port of the client.
 
 A client connects to our BML port and sends documents, without frames. We connect back to its address at the
 feedback port, where it may begin to listen only now. Neither side says hello or good-bye: who closes its BML

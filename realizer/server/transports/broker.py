@@ -1,4 +1,4 @@
-"""One connection to a message broker, over stomp.py: its threads on one side, the event loop on the other."""
+"""A connection to a message broker over stomp.py, between its threads and the event loop."""
 
 from __future__ import annotations
 

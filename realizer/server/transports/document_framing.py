@@ -1,4 +1,4 @@
-"""Bytes of a stream in, in reads of any size; whole BML documents out, a Fault for what holds none."""
+"""Framing of BML documents in a byte stream."""
 
 from __future__ import annotations
 

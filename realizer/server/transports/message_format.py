@@ -1,4 +1,4 @@
-"""What a dialect of a broker's messages is, and what it makes of them."""
+"""The protocol of message formats on a broker."""
 
 from __future__ import annotations
 

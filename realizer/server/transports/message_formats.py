@@ -1,4 +1,4 @@
-"""The dialects that are spoken over a broker, and those of Asap: BML in JSON, and bare BML; no sockets.
+"""The message formats on a broker: bare BML, and Asap's BML in JSON.
 
 A new one is a class as in `dialect` and a row of DIALECTS.
 """

@@ -1,4 +1,4 @@
-"""The STOMP door: we are a client of somebody's message broker and talk all dialects there at once."""
+"""The STOMP transport: a client of a message broker that speaks all formats there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A TCP port in, a conversation for each client that comes out, until the door closes."""
+"""A TCP listener with a conversation per client."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a door is: something clients come in by, each of which becomes a connection of a session."""
+"""The protocol of transports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VHMSG: vrSpeak in gives documents, feedback in gives vrAgentBML; no sockets."""
+"""The VHMSG format: vrSpeak to documents, feedback to vrAgentBML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page's sources in, `realizer/server/static` out, when the package is built; by npm and esbuild."""
+"""The build hook of the page: bundles the sources into `realizer/server/static` with npm and esbuild."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""A recording and what it says in, when it says each word and phoneme out."""
+"""Alignment of recordings with their text."""

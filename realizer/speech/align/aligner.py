@@ -1,4 +1,4 @@
-"""A recording and what it says in, when it says each word and phoneme out; the best aligner that is there."""
+"""Forced alignment: the times of words and phonemes in a recording, by the best aligner installed."""
 
 from __future__ import annotations
 

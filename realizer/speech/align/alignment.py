@@ -1,4 +1,4 @@
-"""What an aligner found: words and phonemes with times, and how far they can be trusted."""
+"""The result of an aligner: words and phonemes with times and a confidence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""IPA in, ARPABET out, and back; by a table."""
+"""Conversion between IPA and ARPABET, by a table."""
 
 from __future__ import annotations
 

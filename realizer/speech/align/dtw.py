@@ -1,4 +1,4 @@
-"""Two rows of features, one with places where a pause may be, in; which frame belongs to which out."""
+"""Dynamic time warping of two feature sequences, with optional pauses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording and a voice that says the same in; when the recording says each word and phoneme out."""
+"""The aligner for any language: dynamic time warping against a voice that says the same text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sound in, what an ear would compare out: cepstra and loudness by frames, and where somebody speaks."""
+"""Acoustic features: cepstra, loudness and voice activity by frame."""
 
 from __future__ import annotations
 

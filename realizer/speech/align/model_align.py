@@ -1,4 +1,4 @@
-"""English sound and a reference's words in, an alignment by pocketsphinx out."""
+"""The aligner for English, by the acoustic model of pocketsphinx."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples as they come in, sound at 16 kHz out; what cannot be one is refused in words."""
+"""Validation of recordings, and resampling to 16 kHz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording and a text with marks in, an utterance with its words, lips and marks out."""
+"""Utterances from recordings: words, phonemes and the times of marks."""
 
 from __future__ import annotations
 

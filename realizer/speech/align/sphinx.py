@@ -1,4 +1,4 @@
-"""English sound and its words in, when each phone is said out; the only module that knows pocketsphinx."""
+"""Phone alignment with pocketsphinx; its only importer."""
 
 from __future__ import annotations
 

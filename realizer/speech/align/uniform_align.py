@@ -1,4 +1,4 @@
-"""A recording and a reference without sound in, its words spread over what sounds out: a guess."""
+"""The aligner of last resort: words spread evenly over voiced time."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The espeak-ng voice, whose engine runs in a process of its own."""
+"""The espeak-ng voice."""

@@ -1,4 +1,4 @@
-"""A script in, the SSML that espeak-ng is given and where our words and marks stand in it out."""
+"""The SSML that espeak-ng is given, with the places of words and marks in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What espeak-ng reports in, times of our words, phonemes and marks out: merged words split, marks found."""
+"""Times of words, phonemes and marks from the events that espeak-ng reports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What espeak-ng's process answers in, the engine's events and its samples out."""
+"""A parser of the answers of espeak-ng's process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The espeak-ng voice: a request in, sound with exact times out; the engine lives in a process of its own."""
+"""The espeak-ng voice; its engine runs in a process of its own."""
 
 from __future__ import annotations
 

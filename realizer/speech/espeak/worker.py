@@ -1,4 +1,4 @@
-"""espeak-ng as `engine_worker` runs it: text and a voice in, PCM and the engine's own events out.
+"""The espeak-ng engine, run by `engine_worker`: text to PCM and events.
 
 espeak-ng is GPL-3 and not thread-safe, and what it says depends on what it said before: it is only ever
 loaded in a process of its own.

@@ -1,1 +1,1 @@
-"""The hibari voice, whose model runs in a process of its own."""
+"""The hibari voice."""

@@ -1,4 +1,4 @@
-"""A script in, runs of text that hibari speaks in one go out, and where the marks stand among the words."""
+"""Runs of text that hibari speaks in one go, with the places of marks among the words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""hibari's readings and the lengths of their signs in, phonemes in IPA and the places of our words out."""
+"""Times of words and IPA phonemes from hibari's readings and durations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The hibari voice: a request in, neural English speech with its times out; the model has its own process."""
+"""The hibari voice: neural English speech; its model runs in a process of its own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""hibari as `engine_worker` runs it: text in, readings out; a reading in, PCM and how long each sign is out.
+"""The hibari engine, run by `engine_worker`: text to readings, readings to PCM and durations.
 
     hello   {"rate", "durations": whether the model tells how long its signs are}
     read    {"texts"} -> {"texts": [[[[word, phonemes, blank after], ...] a sentence, ...] a text, ...]}

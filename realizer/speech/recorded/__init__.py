@@ -1,1 +1,1 @@
-"""Speech from recordings and clips."""
+"""Utterances from recordings and clips."""

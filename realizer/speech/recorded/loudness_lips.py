@@ -1,4 +1,4 @@
-"""Sound of which nobody says what is said in it, in; phonemes that open the mouth as it is loud, out."""
+"""Lip motion from loudness, for sound without a transcript."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording in, with what was told of its times, and the text that is asked for; an utterance out."""
+"""Utterances from a recording and its known times."""
 
 from __future__ import annotations
 

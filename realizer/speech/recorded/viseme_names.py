@@ -1,4 +1,4 @@
-"""A viseme by the name that another's set has for it in, a sound with the same mouth out; by a table."""
+"""Viseme names of other systems, mapped to phonemes by a table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A WebSocket of a client in, its visit to a session out: from its greeting to its end."""
+"""One WebSocket connection: admission, session, messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An HTTP request in, who sends it and what it asks for out; and an answer to it as a response."""
+"""The HTTP request of a WebSocket, and HTTP responses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The WebSocket door: messages in and out of sessions at /ws, faults of texts at /check, HTTP beside them."""
+"""The WebSocket transport: sessions at /ws, checks at /check, HTTP beside them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages of a session in, one WebSocket's own frames out, without waiting for anybody."""
+"""The writer of a session's messages to one WebSocket, without waiting."""
 
 from __future__ import annotations
 

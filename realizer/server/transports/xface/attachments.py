@@ -1,4 +1,4 @@
-"""What an Xface task brings, as it came, in; a clip, a script, or why it is neither out."""
+"""Files attached to Xface tasks: scripts, FAP and sound."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Xface player door: we are a client of somebody's player, and it shows one of our sessions."""
+"""The connection to an Xface player, which shows the frames of a session."""
 
 from __future__ import annotations
 

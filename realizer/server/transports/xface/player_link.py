@@ -1,4 +1,4 @@
-"""What an Xface player is sent and when: frames and notes in, one task after the other out. No sockets."""
+"""The protocol of an Xface player (Paul 2010): states and messages."""
 
 from __future__ import annotations
 

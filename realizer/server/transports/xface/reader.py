@@ -1,4 +1,4 @@
-"""A stream from an Xface client in, the tasks in it, their contents and what is neither out."""
+"""A parser of Xface messages in a byte stream."""
 
 from __future__ import annotations
 

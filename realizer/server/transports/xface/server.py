@@ -1,4 +1,4 @@
-"""The Xface TCP door: clients that push FAPs to an Xface player, and scripts, find one here."""
+"""The Xface TCP transport."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one Xface client asks for: tasks and feedback in; notes, BML and control messages out."""
+"""The task runner of an Xface client: tasks to documents, feedback to notifications."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The texts of the Xface protocol: tasks and notes to bytes, and what a player sends back to notes."""
+"""Xface messages: XML and framing."""
 
 from __future__ import annotations
 
