@@ -1,0 +1,68 @@
+"""The Markdown files: links resolve, and the files, modules and tests that they name exist."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+FILES = ("README.md", "docs/*.md", "faces/*.md", "docker/*.md", "bml_schema/xsd/*.md")
+PAGES = [page for pattern in FILES for page in sorted(ROOT.glob(pattern))]
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(r"```.*?```|`[^`\n]+`", re.DOTALL)
+# A path with a folder and a suffix of ours, or a folder of the packages; not a part of a longer path.
+PATH = re.compile(
+    r"(?<![\w./:$-])((?:[\w-]+/)+[\w.-]+\.(?:py|csv|toml|js|xsd|sh)\b|(?:realizer|bml_schema|tests)/(?:[\w-]+/)*)"
+)
+MODULE = re.compile(r"python -m ((?:tests|realizer)[\w.]*)")
+TEST = re.compile(r"\btest_\w+")
+
+
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def code(page: Path) -> str:
+    return "\n".join(CODE.findall(page.read_text("utf-8")))
+
+
+@cache
+def known_tests() -> str:
+    """All names of test functions and test modules."""
+    files = [*(ROOT / "tests").rglob("test_*.py")]
+    functions = [m for f in files for m in re.findall(r"def (test_\w+)", f.read_text("utf-8"))]
+    return "\n".join([f.stem for f in files] + functions)
+
+
+def test_readme_is_short() -> None:
+    if not (ROOT / "README.md").is_file():
+        pytest.skip("no README.md beside the tests")
+    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) < 200
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_resolve(page: Path) -> None:
+    links = [link for link in LINK.findall(page.read_text("utf-8")) if "://" not in link and link[0] != "#"]
+    missing = [link for link in links if not (page.parent / link.partition("#")[0]).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_paths_exist(page: Path) -> None:
+    bases = (ROOT, ROOT / "realizer", ROOT / "tests", page.parent)
+    missing = {path for path in PATH.findall(code(page)) if not any((base / path).exists() for base in bases)}
+    for module in MODULE.findall(code(page)):
+        path = ROOT / module.replace(".", "/")
+        if not (path.is_dir() or path.with_suffix(".py").is_file()):
+            missing.add(module)
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_named_tests_exist(page: Path) -> None:
+    # A name may be shortened: `test_a_flood_...` stands for all tests that begin so.
+    missing = [test for test in TEST.findall(code(page)) if f"\n{test}" not in f"\n{known_tests()}"]
+    assert not missing
