@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realizer.outputs.arkit import ARKIT_NAMES, ArkitFrames, arkit
+from realizer.animation.arkit import ARKIT_NAMES, ArkitFrames, arkit
 from realizer.outputs.output import Drawing, Output
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.lips.viseme_weights import oculus_visemes
 from realizer.animation.lips.visemes import sounds
 from realizer.outputs import speech_spans
-from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.outputs.output import Drawing, Output
 from realizer.outputs.speech_spans import Span
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.axis import AU_NAMES, au
 from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
-from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.outputs.glb import quaternions
 from realizer.outputs.output import Drawing, Output
 from realizer.tables import read_toml, text_of

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16, Int32
-from realizer.outputs.arkit import ARKIT_NAMES, arkit
 from realizer.playback.player import Player
 from realizer.protocol.wire import HEADER, PAYLOADS, FrameKind, json_frame, pack, pack_frames
 

@@ -7,7 +7,7 @@ import gc
 import numpy as np
 import pytest
 
-from realizer.outputs.arkit import ARKIT_NAMES, arkit
+from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.protocol.wire import FrameKind
 from realizer.server.streams.audio_stream import Sound
 from realizer.server.streams.frame_windows import TURNS, Timeline

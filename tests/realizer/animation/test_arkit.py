@@ -1,17 +1,13 @@
-"""ARKit's weights: what they say of a face, and the file that Live Link Face would write."""
+"""The weights of ARKit's blend shapes that show a face."""
 
 from __future__ import annotations
-
-import csv
-import io
 
 import numpy as np
 import pytest
 
+from realizer.animation.arkit import ARKIT_NAMES, arkit, arkit_faps
 from realizer.animation.axis import AU_NAMES, axis, fap
 from realizer.animation.frames import AUFrames
-from realizer.outputs import OUTPUTS, Drawing, output_for
-from realizer.outputs.arkit import ARKIT_NAMES, arkit, arkit_faps
 from realizer.pipeline import realize
 from realizer.tables import faps
 
@@ -19,18 +15,6 @@ SAYS = "Hello my beautiful world, four blue boats have a very good view of the s
 SPEECH = (
     '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
     f'<speech id="s"><text>{SAYS}</text></speech></bml>'
-)
-# The header of the app's files, as it stands in recordings.
-HEADER = (
-    "Timecode,BlendShapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,EyeLookUpLeft,"
-    "EyeSquintLeft,EyeWideLeft,EyeBlinkRight,EyeLookDownRight,EyeLookInRight,EyeLookOutRight,EyeLookUpRight,"
-    "EyeSquintRight,EyeWideRight,JawForward,JawRight,JawLeft,JawOpen,MouthClose,MouthFunnel,MouthPucker,"
-    "MouthRight,MouthLeft,MouthSmileLeft,MouthSmileRight,MouthFrownLeft,MouthFrownRight,MouthDimpleLeft,"
-    "MouthDimpleRight,MouthStretchLeft,MouthStretchRight,MouthRollLower,MouthRollUpper,MouthShrugLower,"
-    "MouthShrugUpper,MouthPressLeft,MouthPressRight,MouthLowerDownLeft,MouthLowerDownRight,MouthUpperUpLeft,"
-    "MouthUpperUpRight,BrowDownLeft,BrowDownRight,BrowInnerUp,BrowOuterUpLeft,BrowOuterUpRight,CheekPuff,"
-    "CheekSquintLeft,CheekSquintRight,NoseSneerLeft,NoseSneerRight,TongueOut,HeadYaw,HeadPitch,HeadRoll,"
-    "LeftEyeYaw,LeftEyePitch,LeftEyeRoll,RightEyeYaw,RightEyePitch,RightEyeRoll"
 )
 UNITS = {"MNS": 0.022, "MW": 0.05, "ENS": 0.044, "IRISD": 0.011}  # about how many mm
 
@@ -128,51 +112,3 @@ def test_weights_are_of_their_frame_alone(spoken):
     np.testing.assert_allclose(alone, whole[[0, 20, 40]], atol=2e-3)
     assert whole.min() >= 0
     assert whole.max() <= 1
-
-
-def test_the_file_has_the_columns_of_live_link_face(spoken, tmp_path):
-    path = tmp_path / "Take.ARKit.csv"
-    output = output_for(path)
-    assert output is OUTPUTS[".arkit.csv"]
-    output.write(spoken, path, Drawing())
-    reader = csv.DictReader(io.StringIO(path.read_text("utf-8")))
-    rows = list(reader)
-    assert ",".join(reader.fieldnames) == HEADER
-    assert len(rows) == spoken.frames
-    assert {row["BlendShapeCount"] for row in rows} == {"61"}
-    assert [row["Timecode"] for row in rows[:2]] == ["00:00:00:00.000", "00:00:00:01.000"]
-    assert rows[30]["Timecode"] == "00:00:01:05.000"
-    found = arkit(spoken.aus, spoken.mapping).weights
-    for name in ("jawOpen", "mouthFunnel", "mouthSmileRight"):
-        column = [float(row[name[0].upper() + name[1:]]) for row in rows]
-        np.testing.assert_allclose(column, found[:, ARKIT_NAMES().index(name)], atol=1e-6)
-
-
-def test_a_rate_that_is_no_whole_number_has_timecodes_that_go_up(tmp_path):
-    quiet = realize(SPEECH, idle=False, voice="silent", fps=29.97)
-    OUTPUTS[".arkit.csv"].write(quiet, tmp_path / "x.arkit.csv", Drawing())
-    codes = [line.split(",")[0] for line in (tmp_path / "x.arkit.csv").read_text().splitlines()[1:]]
-    assert codes == sorted(codes)
-    assert len(set(codes)) == len(codes) == quiet.frames
-
-
-def test_other_csv_files_are_what_they_were():
-    assert output_for("x.csv") is OUTPUTS[".csv"]
-    assert output_for("my.take.csv") is OUTPUTS[".csv"]
-
-
-def test_a_reader_of_live_link_face_finds_the_weights_at_their_times(spoken, tmp_path):
-    read_csv = pytest.importorskip("openfacefx.importers_csv", reason="pip install openfacefx").read_csv
-    OUTPUTS[".arkit.csv"].write(spoken, tmp_path / "x.arkit.csv", Drawing())
-    track, notes = read_csv(str(tmp_path / "x.arkit.csv"), fps=25, epsilon=0)
-    # It takes every column for a weight, and says of turns that they are none.
-    assert all("Head" in note or "Eye" in note for note in notes)
-    found = arkit(spoken.aus, spoken.mapping)
-    for channel in track.channels:
-        name = channel.name[0].lower() + channel.name[1:]
-        if name in ARKIT_NAMES():
-            keys = [(key.time, key.value) for key in channel.keys]
-            got = np.interp(found.times, *zip(*keys, strict=True))
-            wanted = found.weights[:, ARKIT_NAMES().index(name)]
-            np.testing.assert_allclose(got, wanted, atol=1e-3, err_msg=name)
-    assert {"JawOpen", "MouthFunnel", "MouthClose"} <= {channel.name for channel in track.channels}
