@@ -1,4 +1,4 @@
-"""AUFrames in, the 52 weights of ARKit's blend shapes and the turns of head and eyes out."""
+"""The weights of ARKit's 52 blend shapes, and the turns of head and eyes, that show given AU frames."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.tables import faps, read_csv, text_of
+from realizer.tables.arkit_names import shapes
 
-__all__ = ["ARKIT_NAMES", "ArkitFrames", "arkit", "arkit_faps"]
+__all__ = ["ARKIT_NAMES", "ArkitFrames", "arkit", "arkit_faps", "warm_up"]
 
 # About how many millimetres a unit is on a grown-up's face; of an angle, on an eyeball of 12 mm.
 MILLIMETRES = {
@@ -59,8 +60,6 @@ class ArkitFrames:
 @cache
 def ARKIT_NAMES() -> tuple[str, ...]:
     """ARKit's names of its 52 shapes, such as "jawOpen", alphabetically."""
-    from realizer.tables.arkit_names import shapes
-
     return tuple(sorted(shapes()))
 
 
@@ -97,6 +96,12 @@ def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
         np.ascontiguousarray(turns[:, [48, 47, 49]]),
         np.stack([turns[:, [22, 24]], turns[:, [23, 25]]], axis=1),
     )
+
+
+def warm_up(mapping: FapMapping | None = None) -> None:
+    """Read the tables and invert the matrices, which would otherwise delay the first frames."""
+    _from_aus(mapping)
+    _system(mapping)
 
 
 def arkit_faps(weights: Float32, mapping: FapMapping | None = None) -> Float32:
@@ -139,8 +144,6 @@ def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, floa
 @cache
 def _from_aus(mapping: FapMapping | None) -> tuple[list[int], Float32, Float32]:
     """The AUs that shapes show, what each adds to each shape (n_au, 52), and what speech owns of a shape."""
-    from realizer.tables.arkit_names import shapes
-
     share = np.zeros((len(AU_NAMES()), len(ARKIT_NAMES())), np.float32)
     for k, name in enumerate(ARKIT_NAMES()):
         for column in _columns(shapes()[name].au, shapes()[name].side):
@@ -172,8 +175,6 @@ def _beside(side: str) -> Float32:
 @cache
 def _effects(mapping: FapMapping | None) -> Float32:
     """(52, 68) FAPU: what each shape at weight 1 does, as the mapping has it of its action unit."""
-    from realizer.tables.arkit_names import shapes
-
     names = ARKIT_NAMES()
     values = np.zeros((len(names), len(axis())), np.float32)
     for row, name in zip(values, names, strict=True):

@@ -9,9 +9,11 @@ import socket
 from collections.abc import Awaitable, Coroutine, Iterator
 from types import TracebackType
 
+from realizer.animation import arkit
 from realizer.core.errors import RealizerError
 from realizer.core.logs import write_json
 from realizer.core.settings import Settings, SettingsError
+from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
 from realizer.server.runtime.gc_policy import leave_to_shell
 from realizer.server.runtime.session_host import Shell
@@ -202,8 +204,9 @@ class Server:
         except BaseException:
             await self.close()
             raise
-        # What large blocks need is loaded while the first clients come, not while the first block waits.
-        asyncio.get_running_loop().run_in_executor(None, warm_up)
+        # What large blocks and the stream arkit need is loaded while the first clients come, not while the
+        # event loop waits for it.
+        asyncio.get_running_loop().run_in_executor(None, _warm_up, self.settings)
         return self
 
     def take(self, client: socket.socket) -> None:
@@ -241,6 +244,12 @@ class Server:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self.close()
+
+
+def _warm_up(settings: Settings) -> None:
+    """Load what is loaded once for all sessions and takes long enough to delay frames."""
+    warm_up()
+    arkit.warm_up(mapping_of(settings.face, settings.mapping))
 
 
 def _doors(web: WebSocketDoor, shell: Shell, settings: Settings) -> list[Door]:

@@ -348,3 +348,34 @@ def test_a_worker_can_be_ended_before_it_says_that_it_is_ready() -> None:
     asyncio.run(run())
     assert len(handlers) == 1
     assert handlers[0] != signal.SIG_DFL
+
+
+FIRST_ARKIT = """
+import asyncio, json, sys
+from concurrent.futures import ThreadPoolExecutor
+from websockets.asyncio.client import connect
+from realizer.animation import arkit
+from realizer.core.settings import Settings
+from realizer.server.serve import Server
+
+async def run():
+    loop = asyncio.get_running_loop()
+    loop.set_default_executor(ThreadPoolExecutor(1))
+    async with Server(Settings(port=0, voice="silent")) as server, connect(server.url) as socket:
+        await loop.run_in_executor(None, len, "")  # after what the service loads in the background
+        for stream in ("fap", "arkit"):
+            modules, misses = set(sys.modules), arkit._system.cache_info().misses
+            await socket.send(json.dumps({"type": "subscribe", "stream": stream, "encoding": "json"}))
+            while json.loads(await socket.recv())["type"] != stream:
+                pass
+        print(json.dumps([sorted(set(sys.modules) - modules), arkit._system.cache_info().misses - misses]))
+
+asyncio.run(run())
+"""
+
+
+def test_first_arkit_subscription_loads_nothing() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_ARKIT], capture_output=True, text=True, check=True, timeout=LIMIT
+    )
+    assert json.loads(done.stdout) == [[], 0]
