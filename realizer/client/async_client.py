@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.message_router import ANSWERS, ClientError, Frame, Mail, Until, blank
@@ -19,14 +20,19 @@ __all__ = ["Client"]
 class Client:
     """An open connection; made by `connect`. Several tasks may use it at once.
 
+    Args:
+        connect: opens another connection to an address of the same service.
+
     Attributes:
         url: where it is connected to.
         welcome: what the service said first: session, version, capabilities, limits.
     """
 
-    def __init__(self, socket: Any, url: str, token: str | None = None) -> None:
+    def __init__(
+        self, socket: Any, url: str, connect: Callable[[str], contextlib.AbstractAsyncContextManager[Client]]
+    ) -> None:
         self.url = url
-        self._token = token
+        self._connect = connect
         self.welcome: Mapping[str, Any] = {}
         self._socket = socket
         self._mail = Mail()
@@ -75,7 +81,7 @@ class Client:
         async with self._asking:
             self._mail.ask(type)
             await self.control(type, **fields)
-            await self._wait(lambda: self._mail.answered)
+            await self.wait_for(lambda: self._mail.answered)
             return self._mail.answer()
 
     async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
@@ -96,9 +102,34 @@ class Client:
         Raises:
             ClientError: the block was refused, or the connection ended.
         """
-        until = await self._follow(bml)
-        await self._wait(lambda: until.over)
+        until = await self.follow(bml)
+        await self.wait_for(lambda: until.over)
         return until.end()
+
+    async def follow(self, bml: str) -> Until:
+        """Send BML and return what its last block does from now on: when it starts, whether it has ended.
+
+        Raises:
+            ClientError: there is nothing in the text, or the connection has ended.
+        """
+        if blank(bml):
+            raise ClientError("wanted <bml>, got nothing", "refused")
+        self._mail.sent(bml)
+        until = Until(self._mail.last_block)
+        self._mail.follow(until)
+        await self._post(bml)
+        return until
+
+    async def wait_for(self, condition: Callable[[], bool]) -> None:
+        """Wait until a condition holds, which is checked with every message that comes.
+
+        Raises:
+            ClientError: the connection has ended before.
+        """
+        async with self._news:
+            await self._news.wait_for(lambda: condition() or self._ended)
+        if not condition():
+            self._check()
 
     @contextlib.asynccontextmanager
     async def speech(self, id: str, **opening: Any) -> AsyncIterator[Speech]:
@@ -110,7 +141,7 @@ class Client:
             id: of the block that others can name; the syncs of its text are `ID:ID:sync` there.
             opening: composition, character, language of the message `speech`.
         """
-        speech = Speech(id, self.control, self._wait, self._check, opening)
+        speech = Speech(id, self.control, self.wait_for, self._check, opening)
         self._mail.follow(speech.heard)
         try:
             yield speech
@@ -125,7 +156,7 @@ class Client:
         """Feedback as it comes, until the connection ends; each is given to one iterator."""
         with contextlib.suppress(ClientError):
             while True:
-                await self._wait(lambda: bool(self._mail.feedback))
+                await self.wait_for(lambda: bool(self._mail.feedback))
                 yield self._mail.feedback.popleft()
 
     async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
@@ -146,7 +177,7 @@ class Client:
         kept = self._mail.of(stream)
         with contextlib.suppress(ClientError):
             while True:
-                await self._wait(lambda: bool(kept))
+                await self.wait_for(lambda: bool(kept))
                 yield kept.popleft()
 
     async def film(self, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
@@ -165,22 +196,13 @@ class Client:
         """
         from realizer.client.record import record
 
-        return await record(self, Path(path), bml, fps, look)
+        # A connection of its own: what this one has subscribed to stays.
+        return await record(self._connect(_joining(self.url, self.session)), Path(path), bml, fps, look)
 
     async def close(self) -> None:
         """Say goodbye."""
         await self._socket.close()
         await self._reader
-
-    async def _follow(self, bml: str) -> Until:
-        """Send BML; how far its last block is."""
-        if blank(bml):
-            raise ClientError("wanted <bml>, got nothing", "refused")
-        self._mail.sent(bml)
-        until = Until(self._mail.last_block)
-        self._mail.follow(until)
-        await self._post(bml)
-        return until
 
     async def _post(self, text: str) -> None:
         from websockets.exceptions import ConnectionClosed
@@ -188,7 +210,7 @@ class Client:
         try:
             await self._socket.send(text)
         except ConnectionClosed:
-            await self._wait(lambda: False)  # until the reader knows why
+            await self.wait_for(lambda: False)  # until the reader knows why
 
     async def _read(self) -> None:
         from websockets.exceptions import ConnectionClosed
@@ -206,12 +228,13 @@ class Client:
             async with self._news:
                 self._news.notify_all()
 
-    async def _wait(self, there: Any) -> None:
-        async with self._news:
-            await self._news.wait_for(lambda: there() or self._ended)
-        if not there():
-            self._check()
-
     def _check(self) -> None:
         if self._ended:
             raise ClientError("the connection has ended" + (f": {self._why}" if self._why else ""))
+
+
+def _joining(url: str, session: str) -> str:
+    """Return the address of another connection to the same session."""
+    parts = urlsplit(url)
+    others = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]
+    return parts._replace(query=urlencode([*others, ("session", session)])).geturl()

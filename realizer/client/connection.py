@@ -50,7 +50,7 @@ class Connecting:
             raise _refusal(refused.response.status_code, bytes(refused.response.body)) from None
         except WebSocketException as error:
             raise ClientError(f"{self._url}: {error}") from None
-        self._client = Client(socket, self._url, self._token)
+        self._client = Client(socket, self._url, lambda url: Connecting(url, self._token))
         said = {"version": PROTOCOL} if self._token is None else {"version": PROTOCOL, "token": self._token}
         try:
             self._client.welcome = await self._client.ask("hello", **said)

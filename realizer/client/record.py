@@ -6,29 +6,46 @@ import asyncio
 import errno
 import io
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl, urlencode, urlsplit
+from typing import Any, Protocol
 
 import numpy as np
 
 from bml_schema.feedback import BlockProgress
-from realizer.client.message_router import ClientError
+from realizer.client.message_router import ClientError, Frame, Until
 from realizer.core.array_types import Int16, UInt8
 from realizer.protocol.wire import WireFrame
-
-if TYPE_CHECKING:
-    from realizer.client.async_client import Client
 
 RATE = 48_000  # Hz
 # Pictures on their way from service to encoder: good enough that the film's own encoder decides.
 LOOK = {"format": "jpeg", "quality": 95}
 
 
-async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping[str, Any]) -> BlockProgress:
-    """As `Client.film`, which see. A connection of its own: what the client subscribed to stays."""
-    from realizer.client.connection import connect
+class Camera(Protocol):
+    """What a recording needs of a connection; a `Client` has it."""
+
+    @property
+    def errors(self) -> list[dict[str, Any]]: ...
+
+    async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]: ...
+
+    def frames(self, stream: str) -> AsyncIterator[Frame]: ...
+
+    async def follow(self, bml: str) -> Until: ...
+
+    async def wait_for(self, condition: Callable[[], bool]) -> None: ...
+
+
+async def record(
+    connection: AbstractAsyncContextManager[Camera], path: Path, bml: str, fps: float, look: Mapping[str, Any]
+) -> BlockProgress:
+    """Play BML and save its last block as a film. Arguments and errors are those of `Client.film`.
+
+    Args:
+        connection: opens a connection to the session that is used for this alone.
+    """
     from realizer.core.atomic_files import replacing
     from realizer.outputs.film import FORMATS, encode_film
 
@@ -36,7 +53,7 @@ async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping
         raise ClientError(f"wanted a film ({' or '.join(FORMATS)}), got {path.name}", "film")
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path.parent))
-    async with connect(_joining(client.url, client.session), token=client._token) as camera:
+    async with connection as camera:
         await camera.subscribe("video", fps=fps, **{**LOOK, **look})
         await camera.subscribe("audio", rate=RATE, **{k: v for k, v in look.items() if k == "character"})
         pictures: list[WireFrame] = []
@@ -45,13 +62,13 @@ async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping
             asyncio.create_task(_take(camera, "video", pictures)),
             asyncio.create_task(_take(camera, "audio", packets)),
         ]
-        await camera._wait(lambda: bool(pictures) or bool(camera.errors))
-        until = await camera._follow(bml)
-        await camera._wait(lambda: until.over)
+        await camera.wait_for(lambda: bool(pictures) or bool(camera.errors))
+        until = await camera.follow(bml)
+        await camera.wait_for(lambda: until.over)
         end = until.end()
         assert until.start is not None
         # The picture of the last instant is still being drawn.
-        await camera._wait(lambda: bool(camera.errors) or pictures[-1].time >= end.global_time)
+        await camera.wait_for(lambda: bool(camera.errors) or pictures[-1].time >= end.global_time)
         if camera.errors:
             raise ClientError.of(camera.errors[0])
         for task in taking:
@@ -68,7 +85,7 @@ async def record(client: Client, path: Path, bml: str, fps: float, look: Mapping
     return end
 
 
-async def _take(camera: Client, stream: str, kept: list[WireFrame]) -> None:
+async def _take(camera: Camera, stream: str, kept: list[WireFrame]) -> None:
     async for frame in camera.frames(stream):
         assert isinstance(frame, WireFrame)
         kept.append(frame)
@@ -100,10 +117,3 @@ def _sound(packets: Sequence[WireFrame], start: float, seconds: float) -> Int16:
         there = pcm[max(0, first) :][: len(samples)]
         there[:] = samples[: len(there)]
     return pcm
-
-
-def _joining(url: str, session: str) -> str:
-    """The address of another connection to the same session."""
-    parts = urlsplit(url)
-    others = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]
-    return parts._replace(query=urlencode([*others, ("session", session)])).geturl()

@@ -183,7 +183,7 @@ def test_feedback_ends_with_the_connection() -> None:
             await client._socket.close()
             assert [f async for f in client.feedback()] == []
             with pytest.raises(ClientError, match="has ended"):
-                await client._wait(lambda: False)
+                await client.wait_for(lambda: False)
 
     serving(test)
 
