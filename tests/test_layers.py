@@ -144,3 +144,23 @@ def test_a_document_is_scheduled_without_loading_what_draws() -> None:
     ).stdout.split()
     heavy = {"scipy", "trimesh", "pyrender", "av", "PIL", "pydantic"}
     assert not heavy & {name.split(".")[0] for name in loaded}
+
+
+def test_client_loads_no_engine() -> None:
+    code = "import sys, realizer.client; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    ours = {name for name in loaded if within(name, "realizer")} - {"realizer", "realizer.core"}
+    # Beside the client itself: the messages, the frames, and the array types and errors of all packages.
+    # Feedback quotes behaviours, so that all of the language is there too.
+    assert {name for name in ours if not within(name, "realizer.client")} == {
+        "realizer.core.array_types",
+        "realizer.core.errors",
+        "realizer.protocol",
+        "realizer.protocol.messages",
+        "realizer.protocol.messages.common",
+        "realizer.protocol.wire",
+    }
+    heavy = {"scipy", "trimesh", "pyrender", "av", "PIL", "websockets"}
+    assert not heavy & {name.split(".")[0] for name in loaded}
