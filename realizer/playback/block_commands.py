@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from realizer.animation.channel import Gain
 from realizer.behaviours.kind import Act, Activate, Change, Interrupt
-
-if TYPE_CHECKING:
-    from realizer.playback.active_block import Playing
-    from realizer.playback.block_manager import Ensemble
+from realizer.playback.active_block import Playing
+from realizer.playback.timeline import Course
 
 __all__ = ["ActFault", "perform"]
 
@@ -17,11 +15,23 @@ __all__ = ["ActFault", "perform"]
 AT_ONCE = {False: 0.1, True: 0.02}  # s
 
 
+class Blocks(Protocol):
+    """The blocks of a session, as far as a command changes them."""
+
+    course: Course
+
+    def activate(self, id: str, now: float) -> bool: ...
+
+    def revoke(self, id: str, now: float) -> bool: ...
+
+    def knew(self, id: str) -> bool: ...
+
+
 class ActFault(Exception):
     """What could not be done; the text says what was wanted and what there was."""
 
 
-def perform(blocks: Ensemble, playing: Playing, behaviour: str, act: Act, now: float) -> None:
+def perform(blocks: Blocks, playing: Playing, behaviour: str, act: Act, now: float) -> None:
     """Do what a behaviour of a playing block is there for.
 
     Raises:
@@ -38,8 +48,8 @@ def perform(blocks: Ensemble, playing: Playing, behaviour: str, act: Act, now: f
             _change(blocks, act, now, until)
 
 
-def _interrupt(blocks: Ensemble, act: Interrupt, now: float) -> None:
-    target = blocks.cast.find(act.block)
+def _interrupt(blocks: Blocks, act: Interrupt, now: float) -> None:
+    target = blocks.course.cast.find(act.block)
     if target is None:
         if not blocks.revoke(act.block, now) and not blocks.knew(act.block):
             raise ActFault(f"target: wanted a block, got {act.block!r}, of which nothing was heard")
@@ -55,8 +65,8 @@ def _interrupt(blocks: Ensemble, act: Interrupt, now: float) -> None:
         blocks.course.cut(target, left & chosen, now)
 
 
-def _change(blocks: Ensemble, act: Change, now: float, until: float) -> None:
-    target = blocks.cast.find(act.block)
+def _change(blocks: Blocks, act: Change, now: float, until: float) -> None:
+    target = blocks.course.cast.find(act.block)
     if target is None or act.behaviour not in target.unfinished(now) or not target.begun:
         raise ActFault(f"target: wanted a behaviour that plays, got {act.block}:{act.behaviour}")
     node = target.block[act.behaviour]
