@@ -13,8 +13,8 @@ from realizer.animation.crossfade import joined
 from realizer.behaviours.kind import Kind, World
 from realizer.core.array_types import Float64
 from realizer.playback.block_planner import Plan
+from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import RELAX, Shift
-from realizer.playback.feedback_events import State
 from realizer.playback.references import abroad
 from realizer.playback.resources import claims
 from realizer.scheduling.timing import Schedule
@@ -174,6 +174,10 @@ class Playing:
         if self.state is State.PENDING:
             return float("inf")
         return max([self.floor, *(wait.until for wait in self.waits)])
+
+    def change_state(self, event: BlockEvent) -> None:
+        """Take the state that follows from an event."""
+        self.state = next_state(self.state, event)
 
     def await_too(self, wait: Wait) -> None:
         """Wait for one more block."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from bml_schema import Block
 from realizer.playback.active_block import Wait
+from realizer.playback.block_states import BlockEvent, State, next_state
 
 __all__ = ["Expected", "Fate"]
 
@@ -15,15 +16,23 @@ class Fate:
     """What was done to a block before it came.
 
     Attributes:
-        revoked: it was ended; that was told.
+        state: IN_PREP, or REVOKED where it was ended; that was reported.
         activated: it need not wait for activation.
         waits: what was put before it.
     """
 
     block: Block
-    revoked: bool = False
+    state: State = State.IN_PREP
     activated: bool = False
     waits: list[Wait] = field(default_factory=list)
+
+    @property
+    def revoked(self) -> bool:
+        return self.state is State.REVOKED
+
+    def change_state(self, event: BlockEvent) -> None:
+        """Take the state that follows from an event."""
+        self.state = next_state(self.state, event)
 
 
 class Expected:

@@ -12,11 +12,11 @@ from realizer.playback import block_links
 from realizer.playback.active_block import Playing, Wait
 from realizer.playback.announced_blocks import Expected, Fate
 from realizer.playback.block_commands import ActFault, perform
+from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
 from realizer.playback.feedback_events import (
     Event,
     Phase,
-    State,
     acknowledgement,
     prediction,
     progress,
@@ -73,8 +73,9 @@ class Ensemble:
 
     def withdraw(self, block: Block, now: float) -> None:
         """Give up a block that was announced."""
-        if not self._expected.arrive(block).revoked:
-            self.reports.tell(progress(block, "end", now, State.REVOKED))
+        fate = self._expected.arrive(block)
+        if not fate.revoked:
+            self._revoke(fate, now)
 
     def submit(self, block: Block, character: int, world: World, now: float) -> Schedule:
         """Plan a block and take it in, or refuse it."""
@@ -93,8 +94,8 @@ class Ensemble:
             self._expected.arrive(block)
             return Schedule(block.id, {}, {}, start=now, failed=True)
         ended = block_links.ended(block, character, self.cast.alive())
-        state = State.PENDING if block.preplan and not fate.activated else State.LURKING
-        start = FOREVER if state is State.PENDING else max([now, *(w.until for w in waits)])
+        pending = block.preplan and not fate.activated
+        start = FOREVER if pending else max([now, *(w.until for w in waits)])
         planned, others = self.course.plan(block, character, world, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
@@ -107,6 +108,7 @@ class Ensemble:
             self.course.stop(earlier, now)
         for name in block.interrupt:
             self.revoke(name, now)
+        state = next_state(fate.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
         playing = Playing(planned, self.kinds, world, character, self.cast.next_number, now, waits, state)
         playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
         self.cast.add(playing)
@@ -169,7 +171,7 @@ class Ensemble:
                     if (act := self.kinds[node.tag].act) is not None:
                         self._act(playing, event.name, act(node), time)
             case Phase.START:
-                playing.state = State.IN_EXEC
+                playing.change_state(BlockEvent.START)
                 playing.waits.clear()
                 self.reports.tell(progress(block, "start", time, playing.state))
                 self.reports.tell(prediction(block, playing.schedule, playing.state))
@@ -178,10 +180,10 @@ class Ensemble:
                         text = f"onStart: wanted a block that was preplanned and waits, got {id!r}"
                         self.reports.warn(Warning(block.id, "EXECUTION_FAILURE", text), block.character_id)
             case Phase.SUBSIDES:
-                playing.state = State.SUBSIDING
+                playing.change_state(BlockEvent.SUBSIDE)
                 self.reports.tell(prediction(block, playing.schedule, playing.state))
             case Phase.END:
-                playing.state = State.DONE
+                playing.change_state(BlockEvent.END)
                 self.cast.end(playing)
                 self.reports.tell(progress(block, "end", time, playing.state, playing.said(time)))
 
@@ -209,9 +211,12 @@ class Ensemble:
         fate = self._expected.fate(id)
         if fate is None or fate.revoked:
             return False
-        fate.revoked = True
-        self.reports.tell(progress(fate.block, "end", now, State.REVOKED))
+        self._revoke(fate, now)
         return True
+
+    def _revoke(self, fate: Fate, now: float) -> None:
+        fate.change_state(BlockEvent.STOP)
+        self.reports.tell(progress(fate.block, "end", now, fate.state))
 
     def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
         """Stop these blocks, or all; returns the ids of those that played or waited."""
@@ -234,7 +239,8 @@ class Ensemble:
             return True
         if playing.state is not State.PENDING:
             return False
-        playing.state, playing.floor = State.LURKING, now
+        playing.change_state(BlockEvent.ACTIVATE)
+        playing.floor = now
         if self.course.move(playing, now):
             self.course.follow(playing, now)
         return True

@@ -6,7 +6,8 @@ import heapq
 from collections.abc import Collection, Iterator
 
 from realizer.playback.active_block import Playing
-from realizer.playback.feedback_events import Event, Phase, State, events
+from realizer.playback.block_states import State
+from realizer.playback.feedback_events import Event, Phase, events
 
 __all__ = ["Calendar"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import IntEnum, StrEnum
+from enum import IntEnum
 from typing import NamedTuple
 
 from bml_schema import (
@@ -16,22 +16,10 @@ from bml_schema import (
     WarningFeedback,
     predicted,
 )
+from realizer.playback.block_states import State
 from realizer.scheduling.timing import Schedule, Warning
 
-__all__ = ["Event", "Phase", "Reports", "State"]
-
-
-class State(StrEnum):
-    """What becomes of a block, in the words of BMLA."""
-
-    IN_PREP = "IN_PREP"  # being planned
-    PENDING = "PENDING"  # planned, and waits to be activated
-    LURKING = "LURKING"  # planned, and waits for its start
-    IN_EXEC = "IN_EXEC"
-    SUBSIDING = "SUBSIDING"  # every behaviour is past its relax, some are not past their end
-    DONE = "DONE"
-    INTERRUPTED = "INTERRUPTED"
-    REVOKED = "REVOKED"  # ended before it started
+__all__ = ["Event", "Phase", "Reports"]
 
 
 class Phase(IntEnum):

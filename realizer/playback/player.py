@@ -26,9 +26,9 @@ from realizer.core.array_types import Float64
 from realizer.expressions.library import library_of
 from realizer.playback.active_block import Speaking
 from realizer.playback.block_manager import Ensemble
+from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.block_store import Cast
 from realizer.playback.character import RELAX, Character
-from realizer.playback.feedback_events import State
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Recording, Say, Utterance
 from realizer.tables.cooccurrence import chosen
@@ -331,7 +331,8 @@ class Player:
         for p in self._blocks.cast.alive():
             if p.end <= now:
                 continue
-            status = State.IN_EXEC if p.state is State.LURKING and p.start <= now else p.state
+            starts = p.state is State.LURKING and p.start <= now
+            status = next_state(p.state, BlockEvent.START) if starts else p.state
             blocks.append({"id": p.block.id, "character": p.block.character_id, "status": status.value})
             if p.start < float("inf"):
                 blocks[-1] |= {"start": p.start, "end": p.end}

@@ -13,10 +13,11 @@ from realizer.playback import block_links
 from realizer.playback.active_block import Playing, Wait
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_planner import plan as plan_block
+from realizer.playback.block_states import BlockEvent
 from realizer.playback.block_store import Cast
 from realizer.playback.character import Character
 from realizer.playback.event_queue import Calendar
-from realizer.playback.feedback_events import Reports, State, prediction, progress
+from realizer.playback.feedback_events import Reports, prediction, progress
 from realizer.playback.replanning import member, touched
 from realizer.playback.resources import claims, losses
 from realizer.scheduling import schedule_together
@@ -226,12 +227,12 @@ class Course:
         """Cut a block off at `now`: what plays relaxes, what waits never comes, its end is reported."""
         tied = self.tied(playing, now) if playing.begun else []
         self.calendar.drop(playing)
-        state = State.INTERRUPTED if playing.begun else State.REVOKED
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         playing.cut(list(playing.schedule.times), now, ends=True)
-        playing.stopped, playing.state = now, state
+        playing.stopped = now
+        playing.change_state(BlockEvent.STOP)
         self.cast.end(playing)
-        self.reports.tell(progress(playing.block, "end", now, state, playing.said(now)))
+        self.reports.tell(progress(playing.block, "end", now, playing.state, playing.said(now)))
         self.changed()
         self.solve_again([p for p in tied if not p.done], playing.start, now)
         self.follow(playing, now)

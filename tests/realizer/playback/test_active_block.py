@@ -10,7 +10,7 @@ from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
 from realizer.playback.active_block import Playing, Wait
 from realizer.playback.block_planner import plan
-from realizer.playback.feedback_events import State
+from realizer.playback.block_states import State
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bml_schema import parse
 from realizer.playback.announced_blocks import Expected
+from realizer.playback.block_states import BlockEvent
 
 BLOCK = parse('<bml id="a"/>')
 
@@ -22,7 +23,7 @@ def test_what_was_done_meanwhile_is_its_fate_once() -> None:
     expected.add(BLOCK)
     fate = expected.fate("a")
     assert fate is not None
-    fate.revoked = True
+    fate.change_state(BlockEvent.STOP)
     assert expected.arrive(BLOCK).revoked
     assert not expected.arrive(BLOCK).revoked
 

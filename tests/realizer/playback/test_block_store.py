@@ -9,8 +9,8 @@ from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
 from realizer.playback.active_block import Playing
 from realizer.playback.block_planner import plan
+from realizer.playback.block_states import BlockEvent
 from realizer.playback.block_store import PAST, Cast
-from realizer.playback.feedback_events import State
 
 
 def added(cast: Cast, id: str, start: float = 0.0, character: int = 0) -> Playing:
@@ -24,7 +24,8 @@ def added(cast: Cast, id: str, start: float = 0.0, character: int = 0) -> Playin
 
 def ended(cast: Cast, id: str, start: float = 0.0) -> Playing:
     made = added(cast, id, start)
-    made.state = State.DONE
+    made.change_state(BlockEvent.START)
+    made.change_state(BlockEvent.END)
     cast.end(made)
     return made
 
@@ -34,7 +35,8 @@ def test_a_block_is_found_by_its_id_while_it_is_alive() -> None:
     made = added(cast, "a")
     assert cast.find("a") is made
     assert cast.alive() == cast.all() == [made]
-    made.state = State.DONE
+    made.change_state(BlockEvent.START)
+    made.change_state(BlockEvent.END)
     cast.end(made)
     assert cast.find("a") is None
     assert cast.all() == [made], "it may still be seen"

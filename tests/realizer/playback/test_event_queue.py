@@ -7,8 +7,9 @@ from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
 from realizer.playback.active_block import Playing
 from realizer.playback.block_planner import plan
+from realizer.playback.block_states import BlockEvent
 from realizer.playback.event_queue import Calendar
-from realizer.playback.feedback_events import Phase, State
+from realizer.playback.feedback_events import Phase
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 
@@ -83,6 +84,7 @@ def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> N
 def test_a_block_that_plays_does_not_start_or_subside_again() -> None:
     calendar = Calendar()
     block = playing(0, 0.0)
-    block.state = State.SUBSIDING
+    block.change_state(BlockEvent.START)
+    block.change_state(BlockEvent.SUBSIDE)
     calendar.put(block, only={("s", "end")})
     assert [(e.phase, e.sync) for e in calendar.due(10.0)] == [(Phase.SYNC, "end"), (Phase.END, "")]

@@ -10,8 +10,8 @@ from bml_schema import BlockProgress, parse
 from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
 from realizer.playback.active_block import Playing, Wait
+from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.character import Character
-from realizer.playback.feedback_events import State
 from realizer.playback.timeline import Course
 
 
@@ -35,7 +35,7 @@ def test_a_block_that_is_stopped_gives_its_place_to_its_followers() -> None:
     first = taken_in(blocks, "a")
     second = taken_in(blocks, "b", after=first)
     third = taken_in(blocks, "c", after=second)
-    first.state = State.IN_EXEC
+    first.change_state(BlockEvent.START)
     blocks.stop(first, 0.5)
     assert (first.state, first.end) == (State.INTERRUPTED, 0.5)
     assert (second.start, third.start) == (0.5, 2.5)
@@ -56,7 +56,7 @@ def test_a_block_that_is_not_activated_is_on_no_calendar() -> None:
     blocks = course()
     pending = taken_in(blocks, "p", state=State.PENDING)
     assert blocks.calendar.next is None
-    pending.state = State.LURKING
+    pending.change_state(BlockEvent.ACTIVATE)
     assert blocks.move(pending, 3.0)
     assert blocks.calendar.next == pending.start == 0.0
 
