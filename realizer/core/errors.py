@@ -5,12 +5,21 @@ RealizerError
 ├── TableError       a table under realizer/tables or in a face folder: file, line, column
 ├── FaceError        a face folder: which file, what to change
 ├── VoiceError       a voice that is not installed or failed
+├── PluginError      an entry point of another package that cannot be used
 └── RenderError      no GL, or a lost context
 
 Faults of documents are `bml_schema.BMLError`.
 """
 
-__all__ = ["FaceError", "RealizerError", "RenderError", "ScheduleError", "TableError", "VoiceError"]
+__all__ = [
+    "FaceError",
+    "PluginError",
+    "RealizerError",
+    "RenderError",
+    "ScheduleError",
+    "TableError",
+    "VoiceError",
+]
 
 
 class RealizerError(Exception):
@@ -31,6 +40,10 @@ class FaceError(RealizerError):
 
 class VoiceError(RealizerError):
     """A voice that is not installed or failed; the text says what to install."""
+
+
+class PluginError(RealizerError):
+    """An entry point of another package that cannot be used; the text says which and why."""
 
 
 class RenderError(RealizerError):

@@ -1,0 +1,106 @@
+"""Registries: names of objects that are imported when they are first used, ours and those of plug-ins.
+
+A plug-in is an installed package with entry points (https://packaging.python.org/specifications/entry-points)
+in the group of a registry.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, cached_property
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Generic, TypeVar
+
+from realizer.core.errors import PluginError
+
+__all__ = ["Registry"]
+
+T = TypeVar("T")
+
+log = logging.getLogger(__name__)
+
+_installed = cache(entry_points)  # reading those of all packages takes 10 ms
+
+
+class Registry(Mapping[str, T], Generic[T]):
+    """The objects of one kind by name. A plug-in cannot replace an object of ours.
+
+    `registry[name]` imports the object, and raises PluginError if it is a plug-in's and cannot be used.
+    `working()` leaves such plug-ins out.
+
+    Args:
+        group: the group of entry points that plug-ins use, such as "realizer.outputs".
+        ours: name -> "module:attribute".
+        wanted: what the objects are, for messages.
+        accepts: returns whether an object of a plug-in is one.
+    """
+
+    def __init__(
+        self, group: str, ours: Mapping[str, str], wanted: str, accepts: Callable[[Any], bool]
+    ) -> None:
+        self.group = group
+        self._ours = ours
+        self._wanted = wanted
+        self._accepts = accepts
+        self._objects: dict[str, T] = {}
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self._objects:
+            self._objects[name] = self._load(name)
+        return self._objects[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self._ours, *self._plugins))
+
+    def __len__(self) -> int:
+        return len(self._ours) + len(self._plugins)
+
+    def __contains__(self, name: object) -> bool:  # without an import
+        return name in self._ours or name in self._plugins
+
+    def working(self) -> dict[str, T]:
+        """Return the objects by name, without the plug-ins that cannot be used: each is one warning."""
+        found = {}
+        for name in self:
+            try:
+                found[name] = self[name]
+            except PluginError as error:
+                self._warn(str(error))
+        return found
+
+    @cached_property
+    def _plugins(self) -> dict[str, EntryPoint]:
+        found: dict[str, EntryPoint] = {}
+        for point in _installed().select(group=self.group):
+            if point.name in self._ours or point.name in found:
+                self._warn(f"{_described(point)} is not used: there is another of this name")
+            else:
+                found[point.name] = point
+        return dict(sorted(found.items()))
+
+    @cached_property
+    def _warn(self) -> Callable[[str], None]:
+        """Log a warning, each text once."""
+        return cache(log.warning)
+
+    def _load(self, name: str) -> T:
+        if name in self._ours:
+            module, _, attribute = self._ours[name].partition(":")
+            ours: T = getattr(import_module(module), attribute)
+            return ours
+        point = self._plugins[name]
+        try:
+            loaded: T = point.load()
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise PluginError(f"{_described(point)} cannot be imported: {reason}") from error
+        if not self._accepts(loaded):
+            raise PluginError(f"{_described(point)} cannot be used: wanted {self._wanted}, got {loaded!r}")
+        return loaded
+
+
+def _described(point: EntryPoint) -> str:
+    package = f" of {point.dist.name}" if point.dist else ""
+    return f"plug-in {point.name!r}{package} ({point.group}, {point.value})"
