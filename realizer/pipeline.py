@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bml_schema import Block, BMLError, read
-from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import Position
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import VoiceError
 from realizer.face.fap_mapping import mapping_of
 from realizer.playback.player import Player

@@ -29,7 +29,7 @@ from bml_schema import Block, BlockProgress, BMLError, WarningFeedback, read
 from bml_schema.feedback import parse_feedback
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.outputs.fap_text import encode

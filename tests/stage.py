@@ -14,7 +14,7 @@ import numpy as np
 from bml_schema import Block, BMLError, Feedback, PredictionFeedback, WarningFeedback, parse_feedback, read
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.pipeline import speak, warning_of
 from realizer.playback.player import Player, Speaking
 from realizer.scheduling.timing import Schedule

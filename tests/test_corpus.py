@@ -21,7 +21,7 @@ from bml_schema import (
 from bml_schema.node_schema import shape_of
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.curves import gain_at
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from tests.cases import CASES, Case, Instant, Told
 from tests.stage import Played, play
 

@@ -11,7 +11,7 @@ import pytest
 from websockets.asyncio.client import connect
 
 from bml_schema import Block, BMLError, Feedback, read
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.session.feedback_log import FeedbackLog

@@ -8,7 +8,7 @@ from typing import Any
 
 from bml_schema import Behaviour, Block, Required, read
 from bml_schema.source import Source
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.checking.explain import finding_of
 from realizer.checking.finding import Finding
 from realizer.checking.masked_faults import hidden, told_of, without_faults

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bml_schema import Block, BMLError, Problem, read
 from bml_schema.source import Source
-from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import VOCABULARY
 from realizer.checking.explain import attributes_of
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Warning

@@ -221,7 +221,7 @@ def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int,
     A broken document is left out.
     """
     from bml_schema import Block, Speech, read
-    from realizer.behaviours import VOCABULARY
+    from realizer.behaviours.registry import VOCABULARY
 
     blocks: list[Block] = []
     languages: list[str] = []

@@ -323,7 +323,7 @@ def _table(planned: Schedule) -> str:
 def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule]) -> str:
     """The documents of texts with the times of their schedules, one of each, in order."""
     from bml_schema import Block, read, timed, write
-    from realizer.behaviours import VOCABULARY
+    from realizer.behaviours.registry import VOCABULARY
 
     blocks = [item for text in texts for item in read(text, VOCABULARY) if isinstance(item, Block)]
     pairs = zip(blocks, schedules, strict=True)

@@ -20,8 +20,8 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle.motion import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
-from realizer.behaviours import KINDS
 from realizer.behaviours.kind import Kind, Position, World
+from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64
 from realizer.expressions.library import library_of
 from realizer.playback.active_block import Speaking

@@ -28,7 +28,7 @@ from contextlib import contextmanager
 from stopwatch import helped
 
 from bml_schema import Block, read
-from realizer.behaviours import KINDS, VOCABULARY
+from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.playback.block_planner import plan
 from realizer.playback.player import Player
 from realizer.server.session.feedback_log import FeedbackLog

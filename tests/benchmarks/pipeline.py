@@ -16,7 +16,7 @@ from stopwatch import helped, measure, noise
 
 from bml_schema import parse
 from realizer.animation.fap.conversion import to_fap
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.playback.player import Player

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from bml_schema import Block, BMLError, BMLSizeError, read
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings, raises
 from realizer.pipeline import warning_of
 from realizer.scheduling.timing import Warning

@@ -8,7 +8,7 @@ from typing import Any
 
 from bml_schema import CORE, EXTENSIONS, Block, Constraint, Required
 from bml_schema.node_schema import local, shape_of
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 
 __all__ = ["vocabulary"]
 

@@ -50,7 +50,7 @@ def greeting(session: Session, t: float) -> Welcome:
 def capabilities(settings: Settings) -> dict[str, Any]:
     """What `welcome` tells beside streams; names, as documents and messages take them."""
     from realizer.animation.axis import AU_NAMES
-    from realizer.behaviours import KINDS
+    from realizer.behaviours.registry import KINDS
     from realizer.emotions.words import known_words
     from realizer.face.load import list_faces, load_face
     from realizer.render.cameras import camera_names

@@ -11,7 +11,7 @@ from xml.sax.saxutils import escape, quoteattr, unescape
 from bml_schema import Block, read
 from bml_schema.escape import legal
 from bml_schema.nodes import BMLA, BMLT, CORE, OWN
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import TAG
 from realizer.speech.ssml import EMPTY, SPOKEN
 

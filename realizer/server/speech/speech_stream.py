@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 from bml_schema import Block, read
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import Clauses, whole
 from realizer.server.speech.speech_chunks import Piece, clip_block, text_block
 

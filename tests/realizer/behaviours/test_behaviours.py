@@ -15,8 +15,8 @@ from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample
-from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Fault, World
+from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Phoneme, Say, Utterance

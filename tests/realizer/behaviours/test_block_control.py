@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import Activate, Change, Interrupt
+from realizer.behaviours.registry import KINDS, VOCABULARY
 
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
 

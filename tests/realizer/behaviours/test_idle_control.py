@@ -7,7 +7,7 @@ import pytest
 
 from bml_schema import parse
 from realizer.animation.axis import AU_NAMES
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.playback.player import Player
 from tests.realizer.behaviours.conftest import NAMESPACES
 

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.charts.chart_data import lines_of
 from realizer.playback.player import Player
 

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from bml_schema import Block, SyncRef, parse, read
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.cli import cli
 
 CORPUS = Path(__file__).parents[2] / "corpus"

@@ -6,8 +6,8 @@ import pytest
 
 from bml_schema import parse
 from realizer.animation.channel import Gain
-from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import Playing, Wait
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import State

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bml_schema import Block, SyncRef, parse
-from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import Playing, Wait
 from realizer.playback.block_links import awaited, before, ended, followers, held, instants
 from realizer.playback.block_planner import plan

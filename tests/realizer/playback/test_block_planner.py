@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours import KINDS, VOCABULARY
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.pipeline import realize
 from realizer.playback.block_planner import Plan, plan
 from realizer.speech.silent import SilentVoice

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import Playing
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import BlockEvent

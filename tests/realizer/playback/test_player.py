@@ -16,7 +16,7 @@ from bml_schema.feedback import (
     WarningFeedback,
 )
 from realizer.animation.axis import AU_NAMES
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.playback.player import Player
 from realizer.speech.silent import SilentVoice
 

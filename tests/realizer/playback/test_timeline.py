@@ -7,8 +7,8 @@ from graphlib import CycleError
 import pytest
 
 from bml_schema import BlockProgress, parse
-from realizer.behaviours import KINDS
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import Playing, Wait
 from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.character import Character

@@ -11,8 +11,8 @@ import pytest
 
 import realizer
 from bml_schema import Speech
-from realizer.behaviours import VOCABULARY
 from realizer.behaviours.kind import World
+from realizer.behaviours.registry import VOCABULARY
 from realizer.behaviours.speech import say
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.tables.templates import templates
 from realizer.tables.timing import Gaps, all_gaps
 

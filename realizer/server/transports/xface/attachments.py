@@ -8,12 +8,12 @@ from html import unescape
 from bml_schema import Block, BMLError, read
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.behaviours import VOCABULARY
 from realizer.behaviours.fap_document import document_of
 from realizer.behaviours.fap_values import MOST_BYTES
 from realizer.behaviours.fap_visemes import shown
 from realizer.behaviours.kind import World
 from realizer.behaviours.media import media_file
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, raises
 from realizer.server.documents.limits import too_large

@@ -10,7 +10,7 @@ import pytest
 
 from bml_schema import Block, parse
 from realizer import schedule
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Schedule
 from realizer.server.documents import limits

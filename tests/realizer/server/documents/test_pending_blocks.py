@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.server.documents.pending_blocks import Preparation
 from realizer.speech.utterance import Say
 from tests.realizer.server.conftest import spoken

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from bml_schema.node_schema import local
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.server.http.vocabulary import vocabulary
 
 ALL = json.loads(vocabulary())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse, parse_feedback
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
 from realizer.server.documents.submission import Intake
