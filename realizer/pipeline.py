@@ -23,8 +23,6 @@ from realizer.speech.utterance import Say, Utterance, Voice
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Realization", "realize", "schedule", "speak"]
-
 
 def realize(
     documents: str | bytes | Iterable[str | bytes],

@@ -28,8 +28,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-__all__ = ["Performance", "Realization", "Worn", "counted", "seen", "warned"]
-
 # Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
 WINDOW = 10.0  # s
 # More is a mistake (four hours at 25 fps) and would not fit into memory as JSON or film.

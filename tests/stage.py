@@ -16,7 +16,8 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
 from realizer.pipeline import speak, warning_of
-from realizer.playback.player import Player, Speaking
+from realizer.playback.active_block import Speaking
+from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice
 from realizer.tables import faps

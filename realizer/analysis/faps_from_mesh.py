@@ -13,8 +13,6 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.deform import deform
 from realizer.face.model import Face
 
-__all__ = ["faps_from_face", "faps_from_mesh", "points_of"]
-
 PROBE = 60.0  # FAPU; far enough to be measured, near enough to be proportional
 ROUNDS = 4  # what turns or slides is not proportional; each round takes away most of what is left
 

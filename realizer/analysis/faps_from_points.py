@@ -17,14 +17,6 @@ from realizer.tables.facial_features import facial_features
 if TYPE_CHECKING:
     from realizer.face.model import Fapu
 
-__all__ = [
-    "as_features_see",
-    "faps_from_features",
-    "faps_from_points",
-    "features_from_faps",
-    "features_from_points",
-]
-
 Points = Mapping[str, Any]  # name such as "2.1" -> (n, 3) or (3,) metres
 
 # Where the skin lies on the skull; corners of the eyes are next best, where a tracker sees nothing else.

@@ -20,8 +20,6 @@ from realizer.face.load import list_faces, takes
 from realizer.render import Renderer
 from realizer.render.light import presets
 
-__all__ = ["Likeness", "UnknownPictureError", "by_picture", "read_picture"]
-
 HEIGHT = 96  # pixels that pictures are compared at, so that a brow counts wherever in its way it is
 FINE = 4  # times as high they are drawn, so that they are as smooth as one made smaller
 STEPS = (0.5, 1.0)  # intensities that are compared: weak and strong ones move other places

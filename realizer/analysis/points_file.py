@@ -11,8 +11,6 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.face.features import NAMES
 
-__all__ = ["bridge", "read_points"]
-
 COLUMNS = ["frame", "point", "x", "y", "z"]
 MOST_FRAMES = 100_000  # an hour at 25 frames a second, and a little
 

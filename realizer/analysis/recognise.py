@@ -15,8 +15,6 @@ from realizer.emotions.wheel import wheel
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.wheel_words import ring
 
-__all__ = ["Recogniser", "Recognition", "recogniser"]
-
 
 @dataclass(frozen=True)
 class Recognition:

@@ -11,8 +11,6 @@ from realizer import tables
 from realizer.emotions.profile import Profile
 from realizer.tables.profiles import statistics
 
-__all__ = ["from_faces", "from_statistics", "published_statistics"]
-
 LEAST = 1.0  # FAPU; what moves less on average is not part of an expression
 
 

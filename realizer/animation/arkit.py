@@ -17,8 +17,6 @@ from realizer.core.units import ANGLE_UNIT
 from realizer.tables import faps, read_csv, text_of
 from realizer.tables.arkit_names import shapes
 
-__all__ = ["ARKIT_NAMES", "ArkitFrames", "arkit", "arkit_faps", "warm_up"]
-
 # About how many millimetres a unit is on a grown-up's face; of an angle, on an eyeball of 12 mm.
 MILLIMETRES = {
     "none": 0.0, "MNS": 0.022, "MW": 0.05, "ENS": 0.044, "ES": 0.06, "IRISD": 0.011, "angle_unit": 1.2e-4,

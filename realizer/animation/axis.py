@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from realizer import tables
 
-__all__ = ["AU_NAMES", "PRESENCES", "Target", "au", "axis", "fap", "presence", "rank", "region"]
-
 # How far (0..1) something is taken from what shows it otherwise: speech takes the lips, a temporary gaze
 # takes eyes and head from the base gaze, a document takes blinks and small movements from the idle face, and
 # the successive mixer takes the action units from the additive one.

@@ -17,8 +17,6 @@ from realizer.animation.idle.motion import Idle
 from realizer.core.array_types import Float32, Float64, Index
 from realizer.tables.cooccurrence import Rules
 
-__all__ = ["blend"]
-
 # What replaces what lies below, the upper one last.
 OVER = (Layer.FAPS, Layer.DIRECT)
 # What is worked out apart from the others, where it adds up.

@@ -13,8 +13,6 @@ import numpy as np
 from realizer.animation.axis import Target
 from realizer.core.array_types import Float64
 
-__all__ = ["Channel", "Gain", "Joint", "Layer", "later"]
-
 
 class Layer(IntEnum):
     """Bottom up: where a channel is blended; `animation.blend` says what each layer does to those below."""

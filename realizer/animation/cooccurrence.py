@@ -13,8 +13,6 @@ from realizer.animation.group_reduce import Rounds
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
-__all__ = ["Bounds", "Shown", "bounds", "cooccur"]
-
 
 class Shown(NamedTuple):
     """What is left of the units that were asked for.

@@ -10,8 +10,6 @@ import numpy as np
 from realizer.animation.channel import Channel, Joint
 from realizer.animation.curves import sample, weights
 
-__all__ = ["joined"]
-
 # s; a face is back on its new course after that: about the attack of an expression.
 HEALS = 0.3
 # s; keys that differ by less are the same, solved again.

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from realizer.animation.channel import Channel, Gain, Joint
 from realizer.core.array_types import Float64, Index
 
-__all__ = ["CURVES", "Samples", "gain_at", "in_order", "sample", "samples", "smooth", "weights"]
-
 Values = TypeVar("Values", Float64, Index)
 
 # From this many keys on, a linear channel (lips: 100 keys a second) is interpolated on its own.

@@ -14,8 +14,6 @@ from realizer.animation.cooccurrence import Bounds, bounds
 from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.tables.cooccurrence import Rules
 
-__all__ = ["AUFrames", "FAPFrames"]
-
 
 @dataclass(frozen=True, eq=False)
 class AUFrames:

@@ -8,8 +8,6 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Index
 
-__all__ = ["Rounds"]
-
 
 @dataclass(frozen=True, eq=False)
 class Rounds:

@@ -10,8 +10,6 @@ from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32
 
-__all__ = ["poses"]
-
 
 def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
     """What a face is drawn by: stills, films, sheets and streams of pictures and meshes alike.

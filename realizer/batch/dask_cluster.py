@@ -11,8 +11,6 @@ from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, failed, perform
 from realizer.core.errors import RealizerError
 
-__all__ = ["Cluster"]
-
 log = logging.getLogger(__name__)
 
 AHEAD = 4  # tasks a worker has waiting, so that it never waits for us; their outcomes must fit in memory

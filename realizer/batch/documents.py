@@ -9,8 +9,6 @@ from pathlib import Path
 
 from realizer.core.errors import RealizerError
 
-__all__ = ["Document", "DocumentsError", "find"]
-
 SUFFIXES = (".bml", ".xml")  # of what is taken for a document in a folder
 
 

@@ -12,8 +12,6 @@ from typing import Any, TextIO
 from realizer.core.atomic_files import write_text
 from realizer.core.errors import RealizerError
 
-__all__ = ["NAME", "BusyError", "Manifest", "Row"]
-
 NAME = "manifest.jsonl"
 LOCK = ".manifest.lock"
 

@@ -15,8 +15,6 @@ from typing import Any
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker, failed
 
-__all__ = ["Processes"]
-
 TRIES = 3  # a document that ends its process so often is the reason for it
 # A process a core is the rule: libraries that start threads of their own would only be in each other's way.
 ALONE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

@@ -13,8 +13,6 @@ from realizer.batch.task import Options, Task, fingerprint, key_of
 from realizer.batch.worker import Outcome, failed
 from realizer.core.atomic_files import write_bytes
 
-__all__ = ["Crew", "batch"]
-
 
 class Crew(Protocol):
     """Whoever plays documents: `Processes` or a `Cluster`."""

@@ -13,8 +13,6 @@ import bml_schema
 import realizer
 from realizer.behaviours.kind import Position
 
-__all__ = ["Options", "Task", "fingerprint", "key_of"]
-
 # What decides about bytes beside our own files, where it is installed: voices, and what encodes.
 # Parts of our packages that no output is made by.
 APART = {"static", "web", "_faces", "server", "cli", "batch"}

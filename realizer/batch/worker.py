@@ -17,8 +17,6 @@ from realizer.realization import Realization
 from realizer.render import Renderer
 from realizer.speech.utterance import Say, Utterance, Voice
 
-__all__ = ["Outcome", "Worker", "failed", "perform"]
-
 
 @dataclass(frozen=True, slots=True)
 class Outcome:

@@ -14,8 +14,6 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Utterance
 
-__all__ = ["KINDS"]
-
 
 def timing(node: AudioFile, world: World) -> Timing:
     """As long as the file, exactly; one whose end the document gives is cut off there, or silent from its own

@@ -10,8 +10,6 @@ from realizer.behaviours.table_timing import preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 
 def timing(node: Blink, world: World) -> Timing:
     return preferred("blink")

@@ -11,8 +11,6 @@ from realizer.behaviours.table_timing import preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 
 def _kind(node_class: type[Any], element: str) -> Kind:
     def timing(node: Any, world: World) -> Timing:

@@ -24,8 +24,6 @@ from realizer.scheduling.timing import Timing
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.emotions import emotion_faces
 
-__all__ = ["KINDS", "values_of"]
-
 # Ours play as action units, so that speech and blinks find their place in them; the published ones as FAPs.
 OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
 PARAMETERS = {"intensity": "intensity", "amount": "intensity"}

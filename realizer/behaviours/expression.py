@@ -10,8 +10,6 @@ from realizer.behaviours.table_timing import from_gaps
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 POINTS = ("start", "attackPeak", "relax", "end")
 
 

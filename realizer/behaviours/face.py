@@ -17,8 +17,6 @@ from realizer.behaviours.table_timing import from_gaps, preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 Part: TypeAlias = FaceLexeme | FaceFacs
 Compound: TypeAlias = Face | FaceShift
 

@@ -9,8 +9,6 @@ from realizer import tables
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
 
-__all__ = ["document_of"]
-
 
 def document_of(clip: FAPClip, block: str) -> str:
     """BML text with the clip as keys, a line each; FAPs are limited to the range of the standard.

@@ -18,8 +18,6 @@ from realizer.behaviours.table_timing import preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 # 1/s^2; a recording bends less than an expression with which it is tied, and more than what is said.
 RECORDED = 100.0
 MOST_BYTES = 8 * 2**20  # of text; about ten minutes, read in about a second

@@ -14,8 +14,6 @@ from realizer.animation.lips.visemes import shape_table
 from realizer.core.array_types import Float64, Int32
 from realizer.emotions.archetypes import archetypes
 
-__all__ = ["FapExpression", "fap_expressions", "shown"]
-
 MOST = 63  # of viseme_blend, and of the intensities of expressions
 
 

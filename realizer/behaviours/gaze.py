@@ -17,8 +17,6 @@ from realizer.behaviours.table_timing import preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 # offsetDirection -> part of the offset that is yaw (left positive) and pitch (up positive).
 DIAGONAL = 2**-0.5
 DIRECTIONS = {

@@ -20,8 +20,6 @@ from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
 from realizer.tables.timing import Gap, gaps
 
-__all__ = ["KINDS"]
-
 # The plain `stroke` of several is the last one: it stays beside its number however the rest is stretched.
 SAME = Gap("same", 0.0, 0.0, 1e4, "BML 1.0 gives the plain stroke of a repeated movement no meaning; ours")
 

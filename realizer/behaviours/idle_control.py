@@ -13,8 +13,6 @@ from realizer.behaviours.table_timing import preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 
 def timing(node: Idle, world: World) -> Timing:
     return preferred("idle")

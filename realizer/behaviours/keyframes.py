@@ -18,8 +18,6 @@ from realizer.behaviours.kind import Fault, Kind, World
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 PLAIN = re.compile(r"[0-9.eE+\-\s]*")  # what numbers are made of; float reads more than that
 MOST = 1e6

@@ -13,8 +13,6 @@ from realizer.expressions.library import Library, shipped
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, Say, Utterance
 
-__all__ = ["Act", "Activate", "Change", "Interrupt", "Kind", "World"]
-
 Position = tuple[float, float, float]
 
 

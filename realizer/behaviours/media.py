@@ -15,8 +15,6 @@ from urllib.parse import unquote, urlsplit
 from realizer.behaviours.kind import Fault, World
 from realizer.core.errors import RealizerError
 
-__all__ = ["MediaError"]
-
 T = TypeVar("T")
 
 MOST_BYTES = 64 * 2**20

@@ -10,8 +10,6 @@ from realizer.behaviours.media import MediaError
 from realizer.behaviours.sound_file import read_sound
 from realizer.speech.utterance import Recording
 
-__all__ = ["CLIP"]
-
 CLIP = "clip:"  # before the id of a clip
 
 

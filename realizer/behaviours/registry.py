@@ -9,8 +9,6 @@ from typing import Any
 from realizer.behaviours.kind import Kind
 from realizer.core.registry import Registry
 
-__all__ = ["FAMILIES", "KINDS", "VOCABULARY"]
-
 
 def _is_family(value: Any) -> bool:
     return isinstance(value, tuple) and all(isinstance(kind, Kind) for kind in value)

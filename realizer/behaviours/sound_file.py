@@ -13,8 +13,6 @@ from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Recording
 
-__all__ = ["read_sound"]
-
 # How a file begins -> FFmpeg's name of its kind. Only these are handed over, each by its name: FFmpeg also
 # takes playlists, which lead to other files.
 KINDS = (

@@ -18,8 +18,6 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MOST_TEXT, Recording, Say, Utterance
 
-__all__ = ["KINDS"]
-
 SSML = "application/ssml+xml"
 # 1/s: a second of speech resists as much as a stiff gap of the face; shorter gaps than SHORT count as such.
 BEND, SHORT = 1000.0, 0.01

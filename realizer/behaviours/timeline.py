@@ -17,8 +17,6 @@ from realizer.expressions.timeline import Timeline, Track, faults_of, remarks
 from realizer.expressions.timeline_reader import read_timeline
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 # 1/s^2; it bends like an expression, as far as what it is tied to asks.
 STIFFNESS = 4.0
 # s; the mixer changes over so long, or what else the face shows would jump.

@@ -13,8 +13,6 @@ from realizer.behaviours.table_timing import preferred
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
-__all__ = ["KINDS"]
-
 # 1/s^2. A duration that was written down bends less than any gap of the table with which it is tied.
 STATED = 1000.0
 

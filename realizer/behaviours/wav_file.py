@@ -10,8 +10,6 @@ import numpy as np
 from realizer.core.array_types import Float32, Int16
 from realizer.core.errors import RealizerError
 
-__all__ = ["read_wav"]
-
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
 RATES = (1000, 384_000)  # Hz
 SUPPORTED = "PCM of 8, 16, 24 or 32 bits, or 32-bit floats"

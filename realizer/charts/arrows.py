@@ -6,12 +6,11 @@ import math
 from collections.abc import Mapping
 
 from realizer.charts.diverging_scale import HELD, LINK, PAPER, ROOM, TIGHT
+from realizer.charts.links import Link
 from realizer.charts.rows import ABOVE, BAR, SMALL
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
-from realizer.charts.timeline import BlockLine, Line, Link
-
-__all__ = ["Place", "draw_links"]
+from realizer.charts.timeline import BlockLine, Line
 
 # block, behaviour -> its line, the start of its block, and the top of its row
 Place = Mapping[tuple[str, str], tuple[Line, float, float]]

@@ -6,14 +6,12 @@ import math
 from collections.abc import Callable, Iterable
 
 from bml_schema import Behaviour, Block, Place
-from realizer.charts.links import links_of
-from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Link, Point, Spoken
+from realizer.charts.links import Link, links_of
+from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Point, Spoken
 from realizer.playback.active_block import Playing
 from realizer.playback.block_links import instants
 from realizer.playback.block_store import Cast
 from realizer.scheduling.timing import Schedule, Timing, Warning
-
-__all__ = ["line_of", "lines_of"]
 
 
 def lines_of(cast: Cast, schedules: Iterable[Schedule]) -> list[BlockLine]:

@@ -5,21 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 
-__all__ = [
-    "FAINT",
-    "GRID",
-    "HELD",
-    "INK",
-    "LINK",
-    "LOST",
-    "PAPER",
-    "RIGID",
-    "ROOM",
-    "TIGHT",
-    "colour_of",
-    "on",
-]
-
 PAPER = "#ffffff"
 INK = "#1f2430"
 FAINT = "#6b7280"

@@ -11,8 +11,6 @@ from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
 from realizer.charts.timeline import BlockLine
 
-__all__ = ["draw"]
-
 SIZE = 10.5
 TITLE = "length of gaps"
 STEPS = 40  # of the colour scale

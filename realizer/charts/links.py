@@ -9,8 +9,6 @@ from typing import Any
 from bml_schema import After, Before, Block, Constraint, Speech, Synchronize, SyncRef
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["Link", "links_of"]
-
 # An order with less room than this binds.
 BINDS = 1e-6  # s
 _MIRROR = {"before": "after", "after": "before"}

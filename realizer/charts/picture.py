@@ -13,8 +13,6 @@ from realizer.charts.scale import Scale, last_of, scale_of
 from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut_inside, width_of
 from realizer.charts.timeline import BlockLine, Line
 
-__all__ = ["timeline"]
-
 AXIS = 30.0
 TALL = 600.0  # a picture that is taller has an axis below too
 HEAD = 34.0  # of a block

@@ -11,8 +11,6 @@ from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, cut, cut_inside, fold, hatch, width_of
 from realizer.charts.timeline import Dropped, Gap, Line
 
-__all__ = ["BAR", "HEIGHT", "NAME", "draw_dropped", "draw_line", "height_of"]
-
 HEIGHT = 46.0
 # Above the bar there is room for pins and for what orders leave, below it for the names of the points.
 ABOVE, BAR = 13.0, 18.0

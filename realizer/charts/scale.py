@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from realizer.charts.timeline import BlockLine
 
-__all__ = ["GUTTER", "Scale", "scale_of"]
-
 GUTTER = 190.0  # where the names stand
 MARGIN = 26.0  # on the right
 WIDTH = 1200.0

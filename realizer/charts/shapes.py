@@ -11,21 +11,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-__all__ = [
-    "FINE",
-    "Box",
-    "Path",
-    "Picture",
-    "Shape",
-    "Text",
-    "cut",
-    "cut_inside",
-    "fold",
-    "font",
-    "hatch",
-    "width_of",
-]
-
 DOTS = "..."
 FINE = 2  # text is measured, and drawn in PNG, with this many pixels for one of the picture
 

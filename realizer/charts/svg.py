@@ -6,8 +6,6 @@ from xml.sax.saxutils import escape, quoteattr
 
 from realizer.charts.shapes import Box, Path, Picture, Shape, Text, width_of
 
-__all__ = ["svg"]
-
 FAMILY = "Aileron, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 
 

@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 from realizer.charts.links import Link
 from realizer.scheduling.timing import Warning
 
-__all__ = ["BlockLine", "Dropped", "Gap", "Line", "Link", "Point", "Spoken"]
-
 # Digits after the point of seconds in JSON: a microsecond.
 DIGITS = 6
 

@@ -12,8 +12,6 @@ from realizer.charts.svg import svg
 from realizer.charts.timeline import BlockLine
 from realizer.core.atomic_files import write_bytes
 
-__all__ = ["WRITERS", "write_timeline", "writer_for"]
-
 Writer = Callable[[Picture], bytes]
 WRITERS: Mapping[str, Writer] = {".svg": lambda picture: svg(picture).encode(), ".png": png}
 

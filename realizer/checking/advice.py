@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from realizer.playback.player import Player
     from realizer.scheduling.timing import Schedule
 
-__all__ = ["ADVICE", "advice"]
-
 ADVICE = "ADVICE"
 # s; nobody plans a single face so far ahead, but 250 and more are often milliseconds.
 LONG = 250.0

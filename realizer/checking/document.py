@@ -18,8 +18,6 @@ from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 
-__all__ = ["Checked", "checked"]
-
 
 @dataclass(frozen=True)
 class Checked:

@@ -17,8 +17,6 @@ from realizer.checking.finding import Finding, Label
 from realizer.checking.finding_builder import Draft
 from realizer.scheduling.timing import Warning
 
-__all__ = ["attributes_of", "finding_of", "near"]
-
 _PLACED = re.compile(r"line (\d+)(?:, (/[^\s:]+))?: (.*)", re.DOTALL)
 _LOST = re.compile(r"(.*); with it went (.*)", re.DOTALL)
 _PIECE = re.compile(r"; (?=[A-Za-z][\w.:-]*: |\{[^}]*\}[\w.-]+: )")

@@ -14,8 +14,6 @@ from realizer.checking.finding import Label
 from realizer.checking.finding_builder import Draft
 from realizer.scheduling.timing import Clause, Warning
 
-__all__ = ["explain_clash"]
-
 _STATED = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")
 _CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
 _ASTRAY = re.compile(

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from bml_schema.source import Spot
 
-__all__ = ["Finding", "Label"]
-
 
 @dataclass(frozen=True, slots=True)
 class Label:

@@ -8,8 +8,6 @@ from bml_schema.source import Source
 from bml_schema.tolerant_scanner import Element
 from realizer.checking.finding import Label
 
-__all__ = ["Draft"]
-
 
 @dataclass
 class Draft:

@@ -13,8 +13,6 @@ from realizer.checking.explain import attributes_of
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Warning
 
-__all__ = ["hidden", "told_of", "without_faults"]
-
 
 def told_of(block: Block, id: str, type: str, text: str) -> Warning:
     """A warning of a behaviour, with its place."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from realizer.speech.utterance import Utterance
     from realizer.tables.knowledge import Mood, Role
 
-__all__ = ["habits"]
-
 
 def habits(
     file: str,

@@ -13,8 +13,6 @@ import click
 from bml_schema.source import Source
 from realizer.checking.finding import Finding, Label
 
-__all__ = ["one_line", "render"]
-
 _TAB = 4  # columns, wherever the tab stands: what counts is that the mark is below the right character
 _CUT = "..."
 _LEAST = 20  # columns of source that are shown however narrow the terminal is

@@ -14,8 +14,6 @@ from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.message_router import ANSWERS, ClientError, Frame, Mail, Until, blank
 from realizer.client.speech import Speech
 
-__all__ = ["Client"]
-
 
 class Client:
     """An open connection; made by `connect`. Several tasks may use it at once.

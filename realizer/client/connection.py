@@ -10,8 +10,6 @@ from realizer.client.message_router import ClientError
 from realizer.client.sync_client import SyncClient
 from realizer.protocol.messages.common import PROTOCOL
 
-__all__ = ["Connecting", "connect"]
-
 
 def connect(url: str, *, token: str | None = None) -> Connecting:
     """`async with connect("ws://127.0.0.1:8765/ws?session=show") as client`, or `with` and no event loop.

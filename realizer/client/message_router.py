@@ -13,8 +13,6 @@ from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, War
 from realizer.core.errors import RealizerError
 from realizer.protocol.wire import PAYLOADS, WireFrame, unpack
 
-__all__ = ["ClientError", "Frame"]
-
 # Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
 KEPT = 1_000
 KEPT_FEEDBACK = 10_000

@@ -10,8 +10,6 @@ from typing import Any
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
 from realizer.client.message_router import ClientError
 
-__all__ = ["Speech", "SyncSpeech"]
-
 LONGEST = 20_000  # characters that one message may append
 # What comes sooner behind the last message goes with the next one: nobody reads faster, and a service takes
 # only so many messages a second, behind which a stop would wait.

@@ -14,8 +14,6 @@ from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError, Frame
 from realizer.client.speech import SyncSpeech
 
-__all__ = ["SyncClient"]
-
 T = TypeVar("T")
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
 
-__all__ = ["linear", "srgb"]
-
 
 def linear(colours: UInt8) -> Float32:
     """Linear light 0..1, float32, of 8-bit sRGB."""

@@ -11,16 +11,6 @@ RealizerError
 Faults of documents are `bml_schema.BMLError`.
 """
 
-__all__ = [
-    "FaceError",
-    "PluginError",
-    "RealizerError",
-    "RenderError",
-    "ScheduleError",
-    "TableError",
-    "VoiceError",
-]
-
 
 class RealizerError(Exception):
     """Any fault of the realizer that a caller may want to catch."""

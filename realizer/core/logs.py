@@ -8,8 +8,6 @@ import sys
 from datetime import UTC, datetime
 from typing import TextIO
 
-__all__ = ["JsonFormatter", "write_json", "write_words"]
-
 # What every record has; the rest of its attributes was given by `extra`.
 USUAL = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
 

@@ -15,8 +15,6 @@ from typing import Any, Generic, TypeVar
 
 from realizer.core.errors import PluginError
 
-__all__ = ["Registry"]
-
 T = TypeVar("T")
 
 log = logging.getLogger(__name__)

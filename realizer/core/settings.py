@@ -13,8 +13,6 @@ from typing import Any, TypeVar
 
 from realizer.core.errors import RealizerError
 
-__all__ = ["Settings", "SettingsError", "raises"]
-
 T = TypeVar("T")
 PREFIX = "REALIZER_"
 # Read elsewhere: where faces lie and are made, what draws.

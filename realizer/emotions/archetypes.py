@@ -9,8 +9,6 @@ from typing import Literal
 from realizer.emotions.profile import Profile
 from realizer.tables.profiles import own_ranges, published_ranges
 
-__all__ = ["SETS", "ProfileSet", "archetypes"]
-
 ProfileSet = Literal["own", "published", "raw"]
 SETS: tuple[ProfileSet, ...] = ("own", "published", "raw")
 

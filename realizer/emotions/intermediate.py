@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from realizer.emotions.profile import Profile
 
-__all__ = ["Anchor", "between", "same_category"]
-
 
 class Anchor(NamedTuple):
     """An archetype on the wheel: its profile, activation above 0, and angle in degrees."""

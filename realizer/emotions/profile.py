@@ -13,8 +13,6 @@ import numpy as np
 from realizer import tables
 from realizer.core.array_types import Float32
 
-__all__ = ["Profile"]
-
 RANGE = re.compile(r"\s*F(\d+)\s*\[\s*([^,\[\]]+),([^,\[\]]+)\]\s*")
 OUTER = 47  # the FAP of a point of the outer lips is that of the inner one + 47 (ISO/IEC 14496-2 annex C)
 

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 
 from realizer.emotions.profile import Profile
 
-__all__ = ["read_profiles", "write_profiles"]
-
 
 def read_profiles(text: str, where: str = "profiles") -> tuple[Profile, ...]:
     """The profiles of a file: a line with an emotion and a number, then a line of ranges, and so on.

@@ -12,8 +12,6 @@ from realizer.emotions.profile import Profile
 from realizer.tables.emotion_model import emotion_model
 from realizer.tables.wheel_words import ring as places
 
-__all__ = ["affect", "place_of_affect", "shares", "strength_at", "wheel"]
-
 NEUTRAL = "neutral"
 
 

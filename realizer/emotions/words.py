@@ -15,8 +15,6 @@ from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import NEUTRAL, neighbours, shares, wheel
 from realizer.tables.wheel_words import own_words, ring, whissell_words
 
-__all__ = ["UnknownWordError", "WordPlace", "emotion", "known_words", "place_of", "strength_of"]
-
 
 class WordPlace(NamedTuple):
     """A place on a ring of the wheel.

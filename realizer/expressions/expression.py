@@ -10,8 +10,6 @@ from typing import Any
 
 from realizer.tables.timing import Gap
 
-__all__ = ["Expression", "key"]
-
 LETTERS = {"LEFT": "L", "RIGHT": "R", "BOTH": ""}
 
 

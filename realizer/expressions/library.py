@@ -17,8 +17,6 @@ from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import Template, apex, templates
 from realizer.tables.timing import Gap, gaps
 
-__all__ = ["Library", "library_of", "shipped"]
-
 PREFIX = "template:"
 log = logging.getLogger(__name__)
 

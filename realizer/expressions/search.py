@@ -11,8 +11,6 @@ import numpy as np
 from realizer.expressions.expression import Expression
 from realizer.tables import by_number
 
-__all__ = ["by_action_units", "by_meaning"]
-
 # What a word of a question counts for, by where it is found.
 NAMED, MEANT, SEEN, NEARLY = 3.0, 2.0, 1.0, 0.5
 LITTLE = frozenset(

@@ -9,8 +9,6 @@ from itertools import pairwise
 from realizer.expressions.expression import Expression
 from realizer.expressions.timeline import Entry, Timeline, Track
 
-__all__ = ["Span", "evident", "lasts", "spans"]
-
 BREAK = 0.5  # s; a break that says no duration
 
 

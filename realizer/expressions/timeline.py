@@ -9,8 +9,6 @@ from typing import Literal
 from realizer.expressions.expression import key
 from realizer.expressions.library import Library
 
-__all__ = ["Curve", "Entry", "Joins", "Mixer", "Timeline", "Track", "faults_of", "remarks"]
-
 Joins = Literal["both", "onset", "offset"]
 Curve = Literal["linear", "smooth"]
 Mixer = Literal["additive", "successive"]

@@ -13,8 +13,6 @@ from realizer.core.errors import TableError
 from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
 from realizer.tables import action_units
 
-__all__ = ["read_timeline"]
-
 SHORTEST, LONGEST = 0.04, 3600.0  # s
 TIMELINE = ("mixer", "order", "channel")
 TRACK = ("name", "start", "joins", "curve", "entries")

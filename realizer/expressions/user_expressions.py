@@ -14,8 +14,6 @@ from realizer.expressions.expression import Expression, key
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import Gap, gaps
 
-__all__ = ["read_folder"]
-
 KEYS = ("name", "means", "features", "aus", "onset", "apex", "offset", "possible", "probable", "source")
 NEUTRAL = "NEUTRAL"  # the word for no expression, in timelines
 NAME = re.compile(r"[^\W\d_][\w .:'-]{0,99}")

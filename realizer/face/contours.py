@@ -11,8 +11,6 @@ from realizer.core.array_types import Float32, Int32
 from realizer.face.model import Fapu
 from realizer.tables import faps
 
-__all__ = ["CONTOURS", "Contours", "contours_of", "together"]
-
 # FAP of the inner contour -> the same move of the outer one.
 CONTOURS = {4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60}
 AXES = {"up": 1, "down": 1, "left": 0, "right": 0}

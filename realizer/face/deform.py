@@ -13,8 +13,6 @@ from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_C
 from realizer.face.contours import together
 from realizer.face.model import Face
 
-__all__ = ["deform"]
-
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
 LIDS = slice(18, 22)  # columns: upper left and right, lower left and right
 CHUNK = 16  # frames at once: what a cache holds

@@ -9,8 +9,6 @@ from realizer.animation.fap.au_fap_mapping import FapMapping, standard
 from realizer.core.errors import FaceError, TableError
 from realizer.tables.mappings import own_file, read_mapping
 
-__all__ = ["mapping_of"]
-
 
 def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
     """What action units ask of FAPs: an action unit is as the file says, else as the face, else as the table.

@@ -12,8 +12,6 @@ from realizer.face.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals
 
-__all__ = ["to_glb"]
-
 
 def to_glb(face: Face) -> bytes:
     """The face's rest mesh as GLB.

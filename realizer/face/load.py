@@ -24,8 +24,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.au.model import Model
 
-__all__ = ["FaceInfo", "face_name", "list_faces", "load_face", "takes"]
-
 DEFAULT = "ada"  # what the name "default" means
 VARIABLE = "REALIZER_FACES"
 DEFORMER = "REALIZER_DEFORMER"

@@ -14,8 +14,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.au.model import Model
 
-__all__ = ["Face", "Fapu"]
-
 
 @dataclass(frozen=True)
 class Fapu:

@@ -10,8 +10,6 @@ import numpy as np
 from realizer.core.array_types import Float32, Int16
 from realizer.face.model import Face
 
-__all__ = ["face_scale", "normals", "quantise"]
-
 ROOM = 0.15  # m around the neutral mesh for all that the head's turns and the jaw may reach
 
 

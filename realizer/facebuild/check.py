@@ -19,8 +19,6 @@ from realizer.face.npz_file import read_arrays
 from realizer.tables import faps
 from realizer.tables.mappings import own_file, read_mapping
 
-__all__ = ["check_face"]
-
 FARTHEST = 20  # FAPU a FAP unit; no skin goes further than its feature point by that much
 OFF = 0.004  # m; a feature point further than this from its vertex is off the mesh
 PARTS = (

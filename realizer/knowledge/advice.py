@@ -14,8 +14,6 @@ from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import Company, Mood, Placing, Role, knowledge
 from realizer.tables.templates import templates
 
-__all__ = ["Advice", "Seen", "advise", "lasting"]
-
 NEAR = 1.0  # s; what is nearer than that is "in the neighbourhood" (6.3.3)
 FRAME = 0.04  # s; she counted frames
 FEW = 3  # expressions; of fewer no pace can be told

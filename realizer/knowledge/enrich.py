@@ -15,8 +15,6 @@ from realizer.knowledge.word_languages import ENGLISH, Words, language_of
 from realizer.tables.knowledge import Company, Knowledge, Mood, Role, knowledge
 from realizer.tables.templates import Template, apex, templates
 
-__all__ = ["Enricher", "Heard", "template_of"]
-
 PREFIX = "template:"
 LEAST = 500  # characters of a long text that are not cut any further
 MARK, ESCAPE = (

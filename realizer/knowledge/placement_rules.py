@@ -9,8 +9,6 @@ from realizer.knowledge.sentences import Sentence, SpokenWord
 from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import Knowledge, Mood, Placing, Role
 
-__all__ = ["Placement", "place"]
-
 # A negation turns a word around that stands at most so many words after it: "not so very bad".
 REACH = 3
 # What a negation turns around: who says "do not be afraid" is not.

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from realizer.speech.letter_to_sound import syllable_facts, units
 from realizer.speech.words import words_in
 
-__all__ = ["Sentence", "SpokenWord", "sentences"]
-
 QUESTION, EXCLAMATION = "?？؟՞\u037e", "!！՜"  # U+037E is the Greek one, which looks like a semicolon
 PICTURE = "\U0001f000-\U0001faff\u2600-\u27bf"  # emoji, which no voice says
 ENDS = re.compile(

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from bml_schema import Block, Speech
 from realizer.tables.emotional_words import WordList, word_list
 
-__all__ = ["ENGLISH", "Words", "language_of"]
-
 SSML = "application/ssml+xml"
 LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 

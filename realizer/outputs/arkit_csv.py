@@ -14,8 +14,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["COLUMNS", "OUTPUTS", "encode_arkit_csv"]
-
 _EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
 # In the order of the app's files.
 SHAPES = (

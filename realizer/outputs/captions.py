@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from realizer.playback.active_block import Speaking
     from realizer.realization import Realization
 
-__all__ = ["Track", "captions"]
-
 # As subtitles are usually made: about 40 letters a line, a new one where the voice rests.
 MOST, ENOUGH = 42, 20  # letters; a line that has enough ends at a short rest
 REST, LONG_REST = 0.12, 0.6  # s

@@ -13,8 +13,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_csv"]
-
 
 def encode_csv(realization: Realization) -> str:
     """A header, then a row a frame: `time` in seconds, `AU12L` ... 0..1, `open_jaw` ... integers in FAPU."""

@@ -18,8 +18,6 @@ from realizer.core.errors import RealizerError
 from realizer.outputs import fap_text
 from realizer.tables import faps
 
-__all__ = ["ENCODINGS", "limited", "read_clip"]
-
 # Columns of a table for the numbers of FAP 1 and 2.
 VISEME = tuple(f"viseme_{part}" for part in ("select1", "select2", "blend", "def"))
 EXPRESSION = tuple(

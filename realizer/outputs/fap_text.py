@@ -18,8 +18,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode"]
-
 SMALL = 4096  # what FAPs of the face do not reach; turns do
 
 

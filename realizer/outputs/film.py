@@ -24,8 +24,6 @@ from realizer.outputs.speech_spans import Span
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["FORMATS", "OUTPUTS", "Format", "encode_film", "write_film"]
-
 log = logging.getLogger(__name__)
 
 RATE = 48000  # Hz; the one rate that AAC and Opus share with every player

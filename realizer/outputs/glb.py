@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_glb", "quaternions"]
-
 # Nodes by their numbers in the file; those of the eyes follow.
 FACE, NECK, HEAD = 0, 1, 2
 EYES = ("left_eye", "right_eye")

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
     from realizer.outputs.morph_targets import Morphs
 
-__all__ = ["morphing_mesh", "rigid_mesh"]
-
 BENT = 0.01  # what a target turns a normal less, nobody sees: half a degree
 
 

@@ -10,8 +10,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_json"]
-
 
 def encode_json(realization: Realization) -> str:
     """One line of JSON and a line end.

@@ -15,8 +15,6 @@ from realizer.core.units import ANGLE_UNIT
 if TYPE_CHECKING:
     from realizer.face.model import Face
 
-__all__ = ["Morphs", "morphs"]
-
 HEAD = (48, 49, 50)  # FAPs that turn the head: pitch, yaw, roll
 EYES = ((25, 23), (26, 24))  # and the eyeballs: pitch and yaw of the left, of the right
 THRUST = (27, 28)  # and what pushes them forward

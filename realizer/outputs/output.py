@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
     from realizer.render import Renderer
 
-__all__ = ["Drawing", "Output"]
-
 
 @dataclass(frozen=True)
 class Drawing:

@@ -14,8 +14,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "Moment", "encode_png", "moments", "row_at"]
-
 MOST = 24  # pictures on a sheet
 LEAST = 8  # and so many at least, where there are as many frames
 PACE = 0.25  # s; what a sheet without many sync points shows

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 
-__all__ = ["Span", "phonemes", "points", "words"]
-
 LEAST = 0.001  # s; shorter is a rounding error of who told the times
 
 

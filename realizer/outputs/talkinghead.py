@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from realizer.playback.active_block import Speaking
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_talkinghead"]
-
 RATE = 22050  # Hz; what TalkingHead takes PCM for where nobody says otherwise
 # Ready Player Me's names of these visemes, where they are not those of Oculus.
 NAMES = {"ih": "I", "oh": "O", "ou": "U"}

@@ -13,8 +13,6 @@ from realizer.outputs.speech_spans import Span
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_textgrid"]
-
 DIGITS = 6  # after the point: microseconds
 
 

@@ -20,8 +20,6 @@ from realizer.tables.lexemes import face_lexemes
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_vrma", "expressions"]
-
 FILE = "vrm.toml"
 EXTENSION, VERSION = "VRMC_vrm_animation", "1.0"
 BLINKS = {"blinkLeft": "eyeBlinkLeft", "blinkRight": "eyeBlinkRight"}

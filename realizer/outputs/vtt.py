@@ -13,8 +13,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_vtt"]
-
 LEAST = 0.001  # s; WebVTT wants every cue to end after it starts, and counts milliseconds
 KINDS = ("word", "phoneme", "sync")  # of cues that start together, in this order
 

@@ -12,8 +12,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_wav"]
-
 RATE = 22050  # Hz; the rate of espeak-ng's voices, so nothing is resampled
 
 

@@ -17,8 +17,6 @@ from realizer.outputs.output import Drawing, Output
 if TYPE_CHECKING:
     from realizer.realization import Realization
 
-__all__ = ["OUTPUTS", "encode_webp"]
-
 PACE = 25  # pictures a second at most: more than that is a film
 QUALITY, METHOD = 75, 4  # 160 kB a second at 512x512
 MOST = 2**24 - 1  # of what a number of three bytes can say

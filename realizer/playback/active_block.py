@@ -20,8 +20,6 @@ from realizer.playback.resources import claims
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Utterance
 
-__all__ = ["Playing", "Speaking", "Wait"]
-
 # Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
 HUSH = 0.12  # s
 # Times that differ by less are the same, solved again.

@@ -8,8 +8,6 @@ from bml_schema import Block
 from realizer.playback.active_block import Wait
 from realizer.playback.block_states import BlockEvent, State, next_state
 
-__all__ = ["Expected", "Fate"]
-
 
 @dataclass(eq=False)
 class Fate:

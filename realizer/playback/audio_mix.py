@@ -8,8 +8,6 @@ from realizer.animation.curves import gain_at
 from realizer.core.array_types import Float32, Int16
 from realizer.playback.active_block import Speaking
 
-__all__ = ["CUT", "heard", "resample"]
-
 # Cut-off speech fades this long, so that it does not click, and is over in 50 ms with a packet cut in two.
 CUT = 0.04  # s
 

@@ -9,8 +9,6 @@ from realizer.behaviours.kind import Act, Activate, Change, Interrupt
 from realizer.playback.active_block import Playing
 from realizer.playback.timeline import Course
 
-__all__ = ["ActFault", "perform"]
-
 # "At once" takes this long on a face, so that it does not jump, and in a sound, so that it does not click.
 AT_ONCE = {False: 0.1, True: 0.02}  # s
 

@@ -12,8 +12,6 @@ from realizer.playback.active_block import Playing, Wait
 from realizer.playback.resources import Claim
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["awaited", "before", "ended", "followers", "held", "instants", "stopped"]
-
 FOREVER = float("inf")
 
 

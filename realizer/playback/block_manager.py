@@ -27,8 +27,6 @@ from realizer.playback.timeline import Course
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 
-__all__ = ["Ensemble"]
-
 FOREVER = float("inf")
 # More than so many anticipators are forgotten, the oldest first, where no block is tied to them.
 ANTICIPATORS = 2_000

@@ -15,8 +15,6 @@ from realizer.scheduling import Member, schedule_together
 from realizer.scheduling.timing import Schedule, Timing, Warning
 from realizer.speech.utterance import WARP
 
-__all__ = ["Plan", "plan"]
-
 # s; a speech whose points differ by no more is not spoken again.
 SAME = 1e-6
 # s; shorter gaps of a speech say nothing about its rate.

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from enum import StrEnum
 from types import MappingProxyType
 
-__all__ = ["TRANSITIONS", "BlockEvent", "State", "TransitionError", "next_state"]
-
 
 class State(StrEnum):
     """The state of a block, in the words of BMLA."""

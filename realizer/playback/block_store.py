@@ -10,8 +10,6 @@ import numpy as np
 from realizer.playback.active_block import Playing
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["ANTICIPATORS", "Cast"]
-
 # Schedules of blocks that have ended, kept for references to their sync points.
 PAST = 50  # 2 kB each
 PAST_POINTS = 50_000  # of all of them; the last one is kept in any case

@@ -9,8 +9,6 @@ from realizer.playback.active_block import Playing
 from realizer.playback.block_states import State
 from realizer.playback.feedback_events import Event, Phase, events
 
-__all__ = ["Calendar"]
-
 # Entries of blocks that were dropped or moved may wait beside those that count, as many and so many more.
 SPARE = 16
 

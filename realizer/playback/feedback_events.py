@@ -19,8 +19,6 @@ from bml_schema import (
 from realizer.playback.block_states import State
 from realizer.scheduling.timing import Schedule, Warning
 
-__all__ = ["Event", "Phase", "Reports"]
-
 
 class Phase(IntEnum):
     """What an event is, in the order of report at one instant."""

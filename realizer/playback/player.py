@@ -33,8 +33,6 @@ from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Recording, Say, Utterance
 from realizer.tables.cooccurrence import chosen
 
-__all__ = ["Player", "Speaking"]
-
 # Frames up to this long before `now` can still be asked for.
 HISTORY = 1.0  # s
 # What goes with speech comes no farther from it.

@@ -7,8 +7,6 @@ from dataclasses import replace
 
 from bml_schema import Behaviour, Block, Constraint, Required, Speech, Sync, Synchronize, SyncRef
 
-__all__ = ["abroad", "redirected", "references"]
-
 
 def abroad(block: Block) -> tuple[SyncRef, ...]:
     """Those into other blocks."""

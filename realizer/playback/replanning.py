@@ -13,8 +13,6 @@ from realizer.playback.block_store import ANTICIPATORS
 from realizer.playback.references import abroad, references
 from realizer.scheduling import Member
 
-__all__ = ["anticipated", "lead", "member", "touched"]
-
 FOREVER = float("inf")
 
 

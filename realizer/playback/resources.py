@@ -9,8 +9,6 @@ from bml_schema import Block
 from realizer.behaviours.kind import Kind, World
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["Claim", "Loss", "claims", "losses"]
-
 # s; two claims that share less than this do not disturb each other.
 TOUCH = 1e-3
 # Where one behaviour may pass into the next: two clash only if one lies within the other. A gaze does not

@@ -6,8 +6,6 @@ import re
 
 from realizer.behaviours.kind import Position
 
-__all__ = ["parse_scene"]
-
 
 def parse_scene(text: str) -> dict[str, Position]:
     """A scene from JSON `{"cup": [x, y, z], ...}` or lines `cup x y z`; metres, origin between the eyes.

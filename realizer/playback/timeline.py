@@ -23,8 +23,6 @@ from realizer.playback.resources import claims, losses
 from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule, Warning
 
-__all__ = ["Course"]
-
 FOREVER = float("inf")
 
 

@@ -14,23 +14,6 @@ import numpy as np
 from realizer.core.array_types import Float32, Float64, Int16, Int32
 from realizer.core.errors import RealizerError
 
-__all__ = [
-    "FINAL",
-    "FORGET",
-    "PAYLOADS",
-    "VERSION",
-    "ClipPiece",
-    "FrameKind",
-    "WireError",
-    "WireFrame",
-    "json_frame",
-    "pack",
-    "pack_clip",
-    "pack_frames",
-    "unpack",
-    "unpack_clip",
-]
-
 VERSION = 1
 # u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
 # for a Float32Array or an Int32Array over the message.

@@ -11,8 +11,6 @@ from realizer.core.array_types import UInt8
 from realizer.core.errors import RenderError
 from realizer.render.light import Light
 
-__all__ = ["TRANSPARENT", "backdrop", "channels", "colour_of", "over"]
-
 TRANSPARENT = "transparent"
 BACKGROUND = "REALIZER_BACKGROUND"
 

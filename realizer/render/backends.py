@@ -12,8 +12,6 @@ from realizer.face.model import Face
 from realizer.render.cameras import Camera
 from realizer.render.light import Light
 
-__all__ = ["WAYS", "Drawer", "open_canvas"]
-
 WAYS = ("auto", "gl", "onboard")
 # Files that Linux shows where a graphics card may be used. Without one, OpenGL is drawn by the processor too,
 # half as fast as we do.

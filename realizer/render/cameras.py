@@ -13,8 +13,6 @@ from realizer.core.array_types import Float32, Float64
 from realizer.core.errors import RenderError
 from realizer.face.model import Face
 
-__all__ = ["PRESETS", "Camera", "Framing", "camera_for", "camera_names"]
-
 
 @dataclass(frozen=True, slots=True)
 class Framing:

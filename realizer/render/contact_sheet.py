@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
-__all__ = ["Cell", "Group", "album", "sheet"]
-
 PAPER, INK, FAINT = (24, 26, 29), (235, 236, 238), (150, 156, 163)
 GAP = 6  # pixels between pictures
 WIDE = 2700  # pixels; about as wide as an album becomes

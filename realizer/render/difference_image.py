@@ -8,8 +8,6 @@ import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
 
-__all__ = ["FULL", "difference", "faint", "flatten", "ramp"]
-
 PAPER = np.array([24, 26, 29], np.float32)
 # Paul 2010, 4.4.2: the neutral face without its background, blurred, at 25 % below the differences.
 STRENGTH = 0.25

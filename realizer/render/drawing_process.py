@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from realizer.render.process_messages import Message, Open
 
-__all__ = ["DRAW", "Child", "asked", "available"]
-
 DRAW = "REALIZER_DRAW"  # the variable that names a way of drawing
 PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes about 10
 

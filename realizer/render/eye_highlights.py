@@ -10,8 +10,6 @@ from realizer.core.array_types import Float32, Int32
 from realizer.face.model import Face
 from realizer.render.light import Light, unit
 
-__all__ = ["Glints"]
-
 EYES = ("left_eye", "right_eye")
 ROUND = 10  # corners
 LIFT = 1.004  # of the eye's radius: above its surface, below the lids

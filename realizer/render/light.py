@@ -14,8 +14,6 @@ from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear, srgb
 from realizer.core.errors import RenderError, TableError
 
-__all__ = ["Lamp", "Light", "Shader", "preset", "presets"]
-
 LIGHT = "REALIZER_LIGHT"
 LAMPS = ("key", "fill", "rim")
 Triple = tuple[float, float, float]

@@ -15,8 +15,6 @@ from realizer.render.cameras import Camera
 from realizer.render.light import Light
 from realizer.render.shaded_mesh import Figure
 
-__all__ = ["Canvas"]
-
 NO_LIBRARY = "pictures need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from realizer.face.model import Face, Fapu
 
-__all__ = ["triangle"]
-
 
 def triangle() -> Face:
     """A face of three vertices from chin to hairline that knows no FAP."""

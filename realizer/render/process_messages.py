@@ -14,8 +14,6 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.face.model import Face
 
-__all__ = ["Draw", "Encode", "Failed", "Open", "Pixels"]
-
 
 @dataclass(frozen=True)
 class Open:

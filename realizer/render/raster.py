@@ -14,8 +14,6 @@ import numpy as np
 from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.core.errors import RenderError
 
-__all__ = ["Raster", "ready"]
-
 NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-realizer[render]'"
 # Where in a pixel its samples stand, a row of samples each: in the middle, or on a turned grid, no two in
 # one column, as graphics cards place four.

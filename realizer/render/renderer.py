@@ -16,8 +16,6 @@ from realizer.core.errors import RenderError
 from realizer.face.model import Face
 from realizer.render.drawing_process import DRAW, Child
 
-__all__ = ["Renderer"]
-
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it
 

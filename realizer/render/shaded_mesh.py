@@ -11,8 +11,6 @@ from realizer.render.eye_highlights import Glints
 from realizer.render.light import Light, Shader
 from realizer.render.wrinkles import Wrinkles
 
-__all__ = ["Figure"]
-
 
 class Figure:
     """The head and what the renderer adds to it, lit: whoever draws triangles gets the same picture of it.

@@ -12,8 +12,6 @@ from realizer.render.light import Light
 from realizer.render.raster import Raster
 from realizer.render.shaded_mesh import Figure
 
-__all__ = ["OnboardCanvas"]
-
 
 class OnboardCanvas:
     """A head drawn by the processor: the same points, colours, camera and backdrop as by OpenGL."""

@@ -7,8 +7,6 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.face.model import Face
 
-__all__ = ["on_skin"]
-
 
 def on_skin(
     face: Face, places: Float64, right: Float64, towards: Float64, longest: float

@@ -17,8 +17,6 @@ from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.model import Face
 from realizer.render.surface_points import on_skin
 
-__all__ = ["Wrinkles"]
-
 STEP = 0.03  # of ES0, along a furrow
 LIFT = 0.006  # of ES0, above the skin: 0.4 mm, or the strip sinks where the skin is curved
 COARSE = 0.18  # of ES0: where triangles are longer than that, the skin cannot move as a furrow does

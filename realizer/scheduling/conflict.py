@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 
-__all__ = ["Clash", "Gap", "Link", "Web"]
-
 
 @dataclass(frozen=True, slots=True)
 class Gap:

@@ -15,8 +15,6 @@ from realizer.scheduling.model import LOOSE, TIGHT, Index, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 from realizer.scheduling.rigid_clusters import Shapes
 
-__all__ = ["squeeze"]
-
 
 @dataclass(slots=True, eq=False)
 class _Squeeze:

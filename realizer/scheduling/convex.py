@@ -12,8 +12,6 @@ from realizer.scheduling.model import LOOSE, TIGHT, Index
 from realizer.scheduling.rigid_clusters import settle
 from realizer.scheduling.union_find import Ties
 
-__all__ = ["Quadratic", "kept", "optimum", "settled"]
-
 # Guesses at which inequalities bind before the interior point is asked; it is hardly ever.
 GUESSES = 12
 # Rounds of mending, after the interior point, which inequalities bind; one is the rule.

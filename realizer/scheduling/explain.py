@@ -8,8 +8,6 @@ from realizer.scheduling.conflict import Clash, Gap
 from realizer.scheduling.problem import Part, Relation
 from realizer.scheduling.timing import Clause, Warning
 
-__all__ = ["IMPOSSIBLE", "choose", "clauses", "fault_warning", "in_words", "refusal", "warning_of"]
-
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
 # Nobody reads on; `Warning.clash` has them all.
 MOST_CLAUSES = 30

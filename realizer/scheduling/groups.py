@@ -10,8 +10,6 @@ from realizer.scheduling.model import Model
 from realizer.scheduling.problem import Relation
 from realizer.scheduling.rigid_clusters import Shapes
 
-__all__ = ["Group", "groups_of", "slides"]
-
 
 @dataclass(frozen=True, slots=True)
 class Group:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["components", "raise_levels"]
-
 Edge = tuple[int, int, float]
 
 

@@ -11,8 +11,6 @@ from realizer.scheduling.conflict import Clash, Link, Web
 from realizer.scheduling.model import LOOSE, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 
-__all__ = ["shortest"]
-
 # Steps tried for one clash, some tens of milliseconds; enough for any that a person would read to the end.
 MOST_STEPS = 50_000
 

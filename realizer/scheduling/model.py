@@ -13,8 +13,6 @@ from realizer.scheduling.conflict import Clash, Web
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.union_find import Ties
 
-__all__ = ["LOOSE", "TIGHT", "Index", "Model", "model_of"]
-
 Index: TypeAlias = npt.NDArray[np.intp]
 
 # Two ways to the same point may differ by this much: sums of decimal fractions and of spoken lengths do.

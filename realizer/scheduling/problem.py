@@ -14,8 +14,6 @@ from realizer.scheduling.timing import Timing
 if TYPE_CHECKING:
     from bml_schema import Behaviour, Block, Constraint, SyncRef
 
-__all__ = ["ORIGIN", "Member", "Part", "Problem", "Relation", "problem_of"]
-
 # The point that stands for the block's start; it is at 0 and every number is tied to it.
 ORIGIN = 0
 

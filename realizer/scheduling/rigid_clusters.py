@@ -15,8 +15,6 @@ from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
 from realizer.scheduling.union_find import Ties
 
-__all__ = ["Shapes", "hang", "settle", "shapes_of", "warm_up"]
-
 # Lengths that meet as closely as this count as fitting exactly.
 FITS = 1e-9  # s
 # From this many unknowns on a sparse factorisation is as fast; and OpenBLAS starts threads for a dense one of

@@ -14,8 +14,6 @@ from realizer.scheduling.timing import Schedule, Timing, Warning
 if TYPE_CHECKING:
     from bml_schema import Block, SyncRef
 
-__all__ = ["schedule_block", "schedule_together"]
-
 
 def schedule_block(
     block: Block,

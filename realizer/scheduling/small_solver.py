@@ -19,8 +19,6 @@ from realizer.scheduling.rigid_clusters import FITS, SPARSE_FROM, hang
 from realizer.scheduling.timing import Lists
 from realizer.scheduling.union_find import Ties
 
-__all__ = ["direct"]
-
 NEVER = float("-inf")
 # A NamedTuple is made in a third of the time without its own `__new__`, which is Python.
 made = tuple.__new__

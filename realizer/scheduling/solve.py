@@ -22,8 +22,6 @@ from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.rigid_clusters import Shapes, shapes_of
 from realizer.scheduling.small_solver import direct
 
-__all__ = ["Solution", "solve"]
-
 # Points up to which plain floats are quicker than arrays.
 FEW = 128
 

@@ -11,8 +11,6 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 
-__all__ = ["Clause", "Schedule", "Timing", "Warning"]
-
 
 class Lists(NamedTuple):
     """The numbers of a Timing of k points as plain floats.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["Ties"]
-
 
 class Ties:
     """n points; those tied together move as one. The smallest number of a class is its root.

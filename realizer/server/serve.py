@@ -25,8 +25,6 @@ from realizer.server.transports.websocket.server import WebSocketDoor, lines
 from realizer.server.transports.xface.player import XfacePlayerDoor
 from realizer.server.transports.xface.server import XfaceDoor
 
-__all__ = ["Server", "run", "serve", "work"]
-
 # How often the drain looks whether everything has ended.
 DRAIN_STEP = 0.05  # s
 

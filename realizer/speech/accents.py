@@ -13,8 +13,6 @@ import numpy as np
 from realizer import tables
 from realizer.speech.utterance import Utterance
 
-__all__ = ["Accent", "Phrase", "phrases", "prosody_facts"]
-
 FILE = "prosody.toml"
 PRIMARY = 1
 

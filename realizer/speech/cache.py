@@ -8,8 +8,6 @@ from collections.abc import Callable
 
 from realizer.speech.utterance import Say, Utterance
 
-__all__ = ["MOST", "Kept"]
-
 MOST = 64  # utterances
 MOST_SAMPLES = 30_000_000  # about 60 MB
 

@@ -10,8 +10,6 @@ import numpy as np
 from realizer.speech.utterance import WARP, Say, Utterance, Voice
 from realizer.speech.volume import with_volumes
 
-__all__ = ["fitted", "near", "stretched"]
-
 # A voice is asked again at another rate so often; its rate has steps, and pauses do not stretch evenly.
 TRIES = 9
 # What is left is made up for by playing it faster or slower by so little (a tenth of a semitone) that nobody

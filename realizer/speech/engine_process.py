@@ -17,8 +17,6 @@ from typing import IO, Any
 
 from realizer.core.errors import VoiceError
 
-__all__ = ["RUN", "Engine", "EngineProcess"]
-
 RUN = Path(__file__).with_name("engine_worker.py")
 LOOKS = 20  # at a request, in the time it may take
 

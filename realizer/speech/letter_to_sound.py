@@ -11,8 +11,6 @@ from typing import Any, Literal
 
 from realizer import tables
 
-__all__ = ["letters_to_phonemes", "syllable_facts", "units"]
-
 GENERIC = "any"
 LONGEST_GROUP = 6  # letters
 

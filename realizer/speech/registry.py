@@ -9,8 +9,6 @@ from realizer.speech.letter_to_sound import GENERIC, syllable_facts
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Voice
 
-__all__ = ["VoiceInfo", "find_voice", "voices"]
-
 
 @dataclass(frozen=True, slots=True)
 class VoiceInfo:

@@ -12,8 +12,6 @@ from realizer.speech.ssml import Mark, read_script
 from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
 from realizer.speech.words import Item, Pause, Spelled, items
 
-__all__ = ["SilentVoice", "without_sound"]
-
 SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
 VOWELS = "aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ"
 

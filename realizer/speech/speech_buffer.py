@@ -12,8 +12,6 @@ from realizer.speech.hibari.times import Sound
 from realizer.speech.utterance import Phoneme
 from realizer.speech.words import PlacedMark
 
-__all__ = ["Track", "cut"]
-
 FADE = 0.004  # s, where a sound is cut
 
 

@@ -13,8 +13,6 @@ from realizer.core.errors import VoiceError
 from realizer.speech.ssml_prosody import understood
 from realizer.speech.utterance import MOST_TEXT, Say
 
-__all__ = ["Break", "Mark", "Script", "Tag", "read_script"]
-
 LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice's
 LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
 

@@ -8,8 +8,6 @@ from typing import Protocol
 
 from realizer.core.array_types import Int16
 
-__all__ = ["MOST_TEXT", "STRETCH", "WARP", "Phoneme", "Recording", "Say", "Utterance", "Voice", "Word"]
-
 # A voice can speak so much faster or slower and still be understood, as parts of its usual length; ours.
 STRETCH = (0.6, 1.8)
 # And a sound can be played so much faster or slower, here more and there less, without asking the voice.

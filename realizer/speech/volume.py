@@ -9,8 +9,6 @@ from realizer.speech.ssml import read_script
 from realizer.speech.utterance import Say, Utterance
 from realizer.speech.words import Spelled, items
 
-__all__ = ["with_volumes"]
-
 
 def with_volumes(say: Say, utterance: Utterance) -> Utterance:
     """The utterance, each phoneme with the volume of the <prosody> elements around its word.

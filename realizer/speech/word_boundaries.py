@@ -6,8 +6,6 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-__all__ = ["bare", "cuts", "is_vowel"]
-
 VOWELS = set("aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ")
 MOST_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
 SKIP, UNLIKE, ALIKE, HINT = 0.7, 1.2, 0.4, -0.5  # costs of the alignment, ours

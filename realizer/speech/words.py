@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from realizer.speech.ssml import Break, Mark, Script
 from realizer.speech.ssml_prosody import PLAIN, Prosody
 
-__all__ = ["Item", "Pause", "PlacedMark", "Spelled", "items", "words_in"]
-
 # Ideographs and kana are words of their own (there are no blanks between words to go by).
 SINGLE = r"[\u3040-\u30ff\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
 # Letters with their marks, joined by apostrophes, hyphens or dots between letters; numbers with their signs.

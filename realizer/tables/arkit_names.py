@@ -10,8 +10,6 @@ from typing import Literal
 
 from realizer.tables import read_csv, text_of
 
-__all__ = ["Shape", "canonical", "nearest", "shapes"]
-
 SIDES = {"left": "Left", "l": "Left", "right": "Right", "r": "Right"}
 LEAST = 6  # letters; a shorter tail of a name says nothing
 

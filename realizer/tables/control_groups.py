@@ -8,8 +8,6 @@ from functools import cache
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["Region", "au_regions", "fap_regions"]
-
 FILE = "regions.toml"
 
 

@@ -14,8 +14,6 @@ from typing import Any, Literal, get_args
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["Rule", "Rules", "Unit", "chosen", "parse_rule", "read_rules", "rules"]
-
 FILE = "cooccurrence.toml"
 Kind = Literal["domination", "exclusion", "inclusion", "opposition"]
 SIGNS: Mapping[str, str] = {"domination": "<", "exclusion": "@", "inclusion": "@", "opposition": "@"}

@@ -9,8 +9,6 @@ from functools import cache
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["EmotionModel", "emotion_model"]
-
 FILE = "emotion_model.toml"
 
 

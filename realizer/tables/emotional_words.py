@@ -10,8 +10,6 @@ from pathlib import Path
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["CATEGORIES", "WordList", "read_words", "word_list", "words_of"]
-
 # The eight of Wojdel's appendix D.2, the approval of her 6.5, and what turns the word after it around.
 CATEGORIES = (
     "praise", "pleasure", "curiosity", "assent", "sorrow", "fright", "irritation", "disapproval", "approval",

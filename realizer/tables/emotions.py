@@ -11,8 +11,6 @@ from realizer.core.errors import TableError
 from realizer.tables.lexemes import face_lexemes, read_aus
 from realizer.tables.wheel_words import ring
 
-__all__ = ["Archetype", "EmotionFace", "archetypes", "emotion_faces"]
-
 FILE = "emotions.toml"
 
 

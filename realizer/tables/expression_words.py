@@ -8,8 +8,6 @@ from functools import cache
 
 from realizer import tables
 
-__all__ = ["ExpressionWords", "expression_words"]
-
 FILE = "expression_words.csv"
 
 

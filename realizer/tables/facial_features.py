@@ -8,8 +8,6 @@ from functools import cache
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["FacialFeature", "facial_features"]
-
 FILE = "facial_features.csv"
 
 

@@ -13,8 +13,6 @@ from realizer.core.errors import TableError
 from realizer.tables.emotional_words import CATEGORIES
 from realizer.tables.templates import templates
 
-__all__ = ["By", "Company", "Knowledge", "Mood", "Placing", "Role", "knowledge"]
-
 FILE = "knowledge.toml"
 Role = Literal["speaker", "listener"]
 By = Literal["before", "after", "around", "with"]

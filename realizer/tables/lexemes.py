@@ -11,8 +11,6 @@ from typing import Any
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["FaceLexeme", "HeadLexeme", "face_lexemes", "head_lexemes"]
-
 FILE = "lexemes.toml"
 SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
 

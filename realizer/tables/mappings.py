@@ -22,8 +22,6 @@ from typing import Literal, TypeAlias, cast
 from realizer.core.errors import TableError
 from realizer.tables import AuToFap, action_units, au_to_fap, by_number, faps, nearest, read_csv
 
-__all__ = ["FORMS", "Units", "as_text", "own_file", "read_mapping", "write_mapping"]
-
 Side: TypeAlias = Literal["L", "R", ""]
 Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]
 Line: TypeAlias = tuple[int, AuToFap]

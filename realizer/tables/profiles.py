@@ -9,16 +9,6 @@ from functools import cache
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = [
-    "OwnRange",
-    "PublishedRange",
-    "Statistic",
-    "own_ranges",
-    "published_ranges",
-    "statistics",
-    "vocabularies",
-]
-
 VOCABULARIES = "vocabularies.toml"
 
 

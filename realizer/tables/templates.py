@@ -11,8 +11,6 @@ from realizer.core.errors import TableError
 from realizer.tables.lexemes import read_aus
 from realizer.tables.timing import gaps
 
-__all__ = ["Template", "apex", "templates"]
-
 FILE = "templates.toml"
 FRAME = 1 / 25  # s; she labelled films of 25 frames a second
 

@@ -10,8 +10,6 @@ from typing import Any
 from realizer import tables
 from realizer.core.errors import TableError
 
-__all__ = ["Gap", "Gaps", "gaps"]
-
 FILE = "timing.toml"
 GAP_KEYS = {"name", "preferred", "least", "stiffness", "source"}
 

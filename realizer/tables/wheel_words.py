@@ -9,8 +9,6 @@ from typing import Literal
 
 from realizer import tables
 
-__all__ = ["OwnWord", "Place", "WhissellWord", "own_words", "ring", "whissell_words"]
-
 
 @dataclass(frozen=True, slots=True)
 class WhissellWord:

@@ -12,7 +12,7 @@ import pytest
 from bml_schema import BMLError
 from realizer import realize, schedule
 from realizer.examples import examples
-from realizer.playback.player import Speaking
+from realizer.playback.active_block import Speaking
 from realizer.playback.scene_file import parse_scene
 from realizer.realization import Realization
 from realizer.speech.silent import SilentVoice

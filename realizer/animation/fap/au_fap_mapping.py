@@ -10,8 +10,6 @@ from realizer.animation.fap.piecewise_matrix import Demand
 from realizer.tables import AuToFap
 from realizer.tables.mappings import Units
 
-__all__ = ["FapMapping", "standard"]
-
 
 @dataclass(frozen=True, eq=False)
 class FapMapping:

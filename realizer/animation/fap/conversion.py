@@ -14,8 +14,6 @@ from realizer.animation.fap.piecewise_matrix import LOWERS, RAISES, Asking, Dema
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.core.array_types import Float32, Index
 
-__all__ = ["to_fap"]
-
 # Columns (FAP - 1) of upper and lower lid, by side; 1024 is the whole aperture (IRISD0).
 LIDS = ((18, 20), (19, 21))
 APERTURE = 1024.0

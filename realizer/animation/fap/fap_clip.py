@@ -11,8 +11,6 @@ from realizer.animation.frames import FAPFrames
 from realizer.core.array_types import Bool, Int32
 from realizer.core.units import frame_count
 
-__all__ = ["FAPClip"]
-
 
 @dataclass(frozen=True, eq=False)
 class FAPClip:

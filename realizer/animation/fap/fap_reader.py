@@ -16,8 +16,6 @@ from realizer.core.array_types import Bool
 from realizer.core.errors import RealizerError
 from realizer.tables import faps
 
-__all__ = ["read_fap"]
-
 FPS = 25.0  # where there is no header: the rate of Xface and Greta
 MASK = 68
 COLUMNS = (MASK, 69)  # Greta writes a null FAP 0 first

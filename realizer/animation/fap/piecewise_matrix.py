@@ -14,8 +14,6 @@ from realizer.animation.group_reduce import Rounds
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables import AuToFap
 
-__all__ = ["LOWERS", "RAISES", "Asking", "Demand"]
-
 # What a polyline counts among, of its FAP: those that raise it, those that lower it, those that add up.
 RAISES, LOWERS, TURNS = range(3)
 

@@ -20,8 +20,6 @@ from realizer.animation.idle.rng import uniform
 from realizer.core.array_types import Float64
 from realizer.speech.accents import prosody_facts
 
-__all__ = ["Blinks", "Fewer", "PhraseEnd", "blinks_between"]
-
 # s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
 BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
 # s: a lid closes faster than it opens; 0.05 s shut is at least one frame at 25 fps. 0.3 s in all.

@@ -20,8 +20,6 @@ from realizer.animation.idle.blinks import Blinks, PhraseEnd, blinks_between
 from realizer.animation.idle.rng import uniform
 from realizer.core.array_types import Float64, Index
 
-__all__ = ["Idle", "Motion", "idle_face"]
-
 # Small head motion, ours: a new pose every 1.9 s, up to so many degrees each way. AUs: (negative, positive).
 SWAY_PERIOD = 1.9  # s
 SWAY = {(52, 51): 1.6, (53, 54): 1.1, (55, 56): 1.0}

@@ -22,8 +22,6 @@ from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance
 
-__all__ = ["AFTERMATH", "Asked", "Talk", "phrase_ends", "prosody_channels"]
-
 # A block is of interest for so long after it has ended: then it moves no blink that can still be seen. s
 AFTERMATH = 2.0
 

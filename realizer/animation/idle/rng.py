@@ -9,8 +9,6 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Float64
 
-__all__ = ["uniform"]
-
 
 def uniform(seed: int, kind: int | Sequence[int], k: npt.NDArray[np.int64]) -> Float64:
     """Numbers in [0, 1) that depend on (seed, kind, k) alone; the mixing step of SplitMix64.

@@ -8,8 +8,6 @@ from realizer.animation.lips.dominance import Track
 from realizer.animation.lips.visemes import coarticulation
 from realizer.core.array_types import Bool, Float64
 
-__all__ = ["BILABIAL", "LABIODENTAL", "held", "lips_taken"]
-
 BILABIAL, LABIODENTAL = 1, 2  # visemes
 
 

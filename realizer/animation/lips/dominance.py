@@ -17,8 +17,6 @@ from realizer.animation.lips.visemes import SHAPE, VISEMES, coarticulation, shap
 from realizer.core.array_types import Bool, Float64
 from realizer.speech.utterance import Phoneme
 
-__all__ = ["CLASSES", "Track", "dominances", "key_times", "track_of"]
-
 CLASSES = {"jaw": ("jaw",), "lips": ("upper", "lower"), "shape": SHAPE[3:7], "tongue": SHAPE[7:]}
 STRESS = {0: "none", 1: "primary", 2: "secondary"}
 

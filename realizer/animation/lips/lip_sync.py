@@ -17,8 +17,6 @@ from realizer.animation.lips.visemes import SHAPE, coarticulation, shape_table
 from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
 
-__all__ = ["lip_channels"]
-
 OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # what opens further when speech is loud
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from realizer.animation.lips.visemes import SHAPE, coarticulation
 from realizer.core.array_types import Float64
 
-__all__ = ["mouth_faps"]
-
 
 def mouth_faps(mouth: Float64) -> dict[int, Float64]:
     """FAP -> (n,) its values, in its FAPU; all FAPs that speech moves.

@@ -15,8 +15,6 @@ from realizer.animation.lips.visemes import VISEMES
 from realizer.core.array_types import Float64, Int32
 from realizer.speech.utterance import Phoneme
 
-__all__ = ["OculusViseme", "fap_1", "oculus_visemes", "oculus_weights", "viseme_weights"]
-
 BLEND = 63  # the first viseme alone
 
 

@@ -13,16 +13,6 @@ import numpy as np
 from realizer import tables
 from realizer.core.array_types import Float64
 
-__all__ = [
-    "LipShape",
-    "PhonemeFeatures",
-    "Sound",
-    "coarticulation",
-    "lip_shapes",
-    "phoneme_features",
-    "sounds",
-]
-
 VISEMES = 15  # 0 none, 1..14: ISO/IEC 14496-2
 ROUNDED = 14  # the viseme of a rounded mouth
 BILABIAL = 1

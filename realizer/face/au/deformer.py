@@ -18,8 +18,6 @@ from realizer.face.basis import FAPS, JAW_SIN
 from realizer.face.model import Face
 from realizer.tables import action_units, faps
 
-__all__ = ["Moves", "columns", "moves_of"]
-
 JAW = ("lower_teeth", "tongue")
 CLOSE = 43  # the unit that closes the eyes
 LIDS = (5, 6, 7, 9, CLOSE)  # what moves the lids

@@ -14,8 +14,6 @@ from realizer.face.au.functions import ANGLE, GAUSSIAN, LOWER
 from realizer.face.au.model import HeadTurn, Model, Motion, Mouth, UnitModel
 from realizer.tables import read_toml
 
-__all__ = ["read_model", "write_model"]
-
 HEAD = """\
 # source: {source}
 # units: metres; m, B, alpha and beta in centimetres from the motion's origin, angles in radians

@@ -12,8 +12,6 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 
-__all__ = ["angle", "cubic_terms", "density", "direction", "heading", "height"]
-
 GAUSSIAN = 10  # parameters of a Gaussian: height, centre (3), the six of the lower triangular root of B
 ANGLE = 19  # parameters of an angle: A1 (6), A2 (3), A3 (6), A4 (3), c
 # A symmetric 3 x 3 matrix is written xx, yy, zz, xy, xz, yz; the last three count for both of their places.

@@ -11,8 +11,6 @@ from realizer.core.array_types import Float64
 from realizer.face.au.model import Model, turned
 from realizer.face.au.units import units
 
-__all__ = ["OPENING", "Thing", "additive", "mix", "opened", "successive"]
-
 # The units that open the mouth, the widest first. Each holds the narrower ones.
 OPENING = (27, 26, 25)
 

@@ -10,8 +10,6 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.face.au.functions import heading, height
 
-__all__ = ["HeadTurn", "Model", "Motion", "Mouth", "UnitModel", "half", "rotation", "turned"]
-
 CENTIMETRE = 0.01  # m; the unit of the functions' coordinates, in which their parameters are near 1
 BENT = 0.008  # m before and behind the line between the lips; beyond it the mouth's plane is level
 SIDES = 0.008  # m; the halves of an action unit shown on one side fade into each other over twice this

@@ -9,8 +9,6 @@ from realizer.core.errors import FaceError
 from realizer.face.au.model import Mouth
 from realizer.face.model import Face
 
-__all__ = ["fit_mouth", "halves", "shares"]
-
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 REACH = 0.012  # m from the line between the lips: what lies further off is above or below anyway

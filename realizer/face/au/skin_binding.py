@@ -9,8 +9,6 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.face.model import Face
 
-__all__ = ["grown", "roots", "skin"]
-
 # Whatever else a face is built from moves with the head alone, or grows on the skin.
 MOVED, GROWN = ("skin", "hair"), ("brows", "lashes")
 NEAR = 0.0015  # m; what is nearer to the skin than this grows there

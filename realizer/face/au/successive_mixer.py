@@ -12,8 +12,6 @@ from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import grown, skin
 from realizer.face.model import Face
 
-__all__ = ["LEAST", "Succession"]
-
 LEAST = 1e-5  # m; what a unit moves less is left out of it
 # Times what a unit moves the neutral face by: further it moves nothing. Off the skin, where its functions
 # were not fitted, they may grow without bounds.

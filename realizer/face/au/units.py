@@ -9,8 +9,6 @@ from typing import Literal
 
 from realizer.tables import read_csv
 
-__all__ = ["Unit", "units"]
-
 
 @dataclass(frozen=True, slots=True)
 class Unit:

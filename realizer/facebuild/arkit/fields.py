@@ -20,8 +20,6 @@ from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth
 from realizer.tables import faps
 
-__all__ = ["Grown", "shape_fields"]
-
 FLOOR = 0.35  # of the most on its line: a point that a shape hardly moves does not blow its field up
 TRUE = 0.25  # of its largest move: what a shape has to move a point along a FAP's way to serve it
 BLOWN = 0.1  # the same for cheeks: they go forwards more than aside

@@ -33,8 +33,6 @@ from realizer.facebuild.person.skin_colours import occlusion
 from realizer.facebuild.submesh import vertex_normals
 from realizer.tables.arkit_names import canonical, nearest, shapes
 
-__all__ = ["Report", "import_head", "look_at"]
-
 # Where surfaces shine: skin, hair, wet things. A file's roughness is for other lights.
 GLOSS = {
     "skin": 0.16, "brows": 0.05, "lashes": 0.0, "left_eye": 1.0, "right_eye": 1.0, "upper_teeth": 0.75,

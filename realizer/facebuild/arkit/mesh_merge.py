@@ -12,8 +12,6 @@ from realizer.core.array_types import Bool, Float64, Int32
 from realizer.facebuild.arkit.scene import Piece
 from realizer.tables.arkit_names import canonical
 
-__all__ = ["Surface", "joined"]
-
 SAME = 2e-6  # of the size of all; vertices nearer than that, that move alike, are one
 
 

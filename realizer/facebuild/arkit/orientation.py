@@ -12,8 +12,6 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.mesh_merge import Surface
 
-__all__ = ["Pose", "pose_of", "stood"]
-
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
 EYES = (0.048, 0.078)  # m between the eyes of people from six years on
 USUAL = 0.062  # m

@@ -15,8 +15,6 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.mesh_merge import Surface, components
 from realizer.tables import read_csv
 
-__all__ = ["Sorted", "sort_parts"]
-
 ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
 BALL = (0.006, 0.022)  # m, radii of eyeballs
 EYEBALL = 0.012  # m, the radius of people's eyes

@@ -14,8 +14,6 @@ from realizer.facebuild.arkit.part_classifier import behind
 from realizer.facebuild.mpeg4.landmarks import find_points
 from realizer.facebuild.submesh import vertex_normals
 
-__all__ = ["points_of"]
-
 PUPILS = {"left_eye": "3.5", "right_eye": "3.6"}
 SPHERE = np.concatenate([np.eye(3), -np.eye(3), np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1)
                                                           for z in (-1, 1)]) / np.sqrt(3)])  # fmt: skip

@@ -13,8 +13,6 @@ from realizer.core.colours import srgb
 from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.gltf import Gltf
 
-__all__ = ["Piece", "read_pieces"]
-
 TRIANGLES, STRIP, FAN = 4, 5, 6
 THIN = 0.35  # alpha; what lets more through is glass: a cornea, a tear line
 

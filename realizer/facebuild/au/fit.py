@@ -18,8 +18,6 @@ from realizer.facebuild.au.measure import Measured
 from realizer.facebuild.au.solve import STILL, Fit, Found
 from realizer.tables import action_units
 
-__all__ = ["FORMS", "Row", "fit_models", "table", "table_text"]
-
 FORMS = ("published", "extended")  # one or two Gaussians; up to four
 MOVES = 0.01  # of the largest move: what moves less does not count as displaced
 NEAR = 0.01  # m around what is displaced; further off, one point in FAR shows whether anything leaks

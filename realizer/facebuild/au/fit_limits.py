@@ -18,8 +18,6 @@ from realizer.face.au.mouth import shares
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import Measured
 
-__all__ = ["FURTHEST", "Watched", "furthest", "overshoot", "runaways", "watched"]
-
 PARTS = ("skin", "lashes", "brows", "hair")  # what units move
 FURTHEST = 1.3  # times d_max: further no vertex goes
 FREE = 1.1  # times d_max; up to here a fit pays nothing,

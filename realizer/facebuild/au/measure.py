@@ -15,8 +15,6 @@ from realizer.face.au.units import units
 from realizer.face.npz_file import read_arrays
 from realizer.tables import read_csv
 
-__all__ = ["Measured", "read_measured", "read_shapes", "write_shapes"]
-
 FINE = 1e-5  # m; the shapes are stored in whole multiples of it
 ARRAYS = {"at": 2, "seen": 1, "upper": 1, "au": 1, "moves": 3}
 FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided

@@ -21,8 +21,6 @@ from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-__all__ = ["measure_shapes"]
-
 OPEN = 0.3  # baked light: what gets less lies inside the head, or is a lip's inner side
 COLLAR = -0.16  # m; below it no face moves
 EVEN = np.array([-1.0, 1.0, 1.0])

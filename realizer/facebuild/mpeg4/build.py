@@ -25,8 +25,6 @@ from realizer.facebuild.mpeg4.parameters import FILE, read_setup, write_setup
 from realizer.facebuild.mpeg4.zones import Setup, synchronised
 from realizer.tables import faps
 
-__all__ = ["apply_zones", "copy_with_zones", "setup_of"]
-
 FILES = ("face.toml", "mesh.npz", "features.csv", "fields.npz", "recipe.toml", "LICENSE.md", FILE)
 
 DRESSED = ("brows", "lashes")  # parts that lie on the skin and go along with it

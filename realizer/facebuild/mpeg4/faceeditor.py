@@ -22,8 +22,6 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-__all__ = ["fitted", "read_faceeditor", "write_faceeditor"]
-
 ROOT = "faceeditor-parameters"
 CHILDREN = ("fp-positions", "keep-syncs", "deformers", "vertex-masks")
 PLACE = ("x", "y", "z")

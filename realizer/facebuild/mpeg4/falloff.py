@@ -8,8 +8,6 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 
-__all__ = ["cosine", "ease", "linear", "smooth_curve"]
-
 LEAST_POWER = 1e-3  # an ease of -100 is the limit where nothing moves
 SAMPLES = 2001
 

@@ -6,8 +6,6 @@ from functools import cache
 
 from realizer.tables import au_to_fap, faps
 
-__all__ = ["borne", "company", "usual"]
-
 # Where no action unit asks for a FAP: what faces reach, in its own unit.
 REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "angle_unit": 20000.0}
 EYEBALLS_OUT = 30.0  # ES: 2 mm

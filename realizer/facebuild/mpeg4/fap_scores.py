@@ -15,8 +15,6 @@ from realizer.facebuild.mpeg4.fap_limits import ROLLED, company, usual
 from realizer.facebuild.mpeg4.measure import Measure, error_of, flips_of, mirror_of, others_of, rough_of
 from realizer.tables import Fap, faps, read_csv
 
-__all__ = ["PEERS", "Truth", "face_truth", "mean_score"]
-
 # What Paul 2010 (tables 4.5) gives other faces, those FAPs counted 0 that they lack.
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 

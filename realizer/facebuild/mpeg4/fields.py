@@ -21,8 +21,6 @@ from realizer.facebuild.mpeg4.measure import WAYS
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 from realizer.tables import faps, read_csv
 
-__all__ = ["zone_fields"]
-
 NEAREST = 1e-9  # in radii: at a feature point the share is its own
 POWER = 1.2  # of the distance: 1 bends sharply at a point, 2 makes a step half-way to the next
 

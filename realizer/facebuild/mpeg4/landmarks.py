@@ -21,8 +21,6 @@ from realizer.facebuild.mpeg4.rigid import balls
 from realizer.facebuild.submesh import vertex_normals
 from realizer.tables import read_csv
 
-__all__ = ["find_points"]
-
 NEAR = 0.22  # eye distances; a point farther than this from all evidence is a guess
 OFF = 0.06  # eye distances; so is one that had to go this far to the skin
 TEETH = {"9.8": ("upper_teeth", 1), "9.10": ("upper_teeth", -1), "9.11": ("lower_teeth", 1),

@@ -13,8 +13,6 @@ from realizer.core.array_types import Int32
 from realizer.core.errors import FaceError
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 
-__all__ = ["FILE", "read_setup", "write_setup"]
-
 FILE = "mpeg4.toml"
 HEAD = """\
 # The zones of the MPEG-4 deformer (Paul 2010, 4.3.3). `realizer faces zones NAME` makes fields.npz from them.

@@ -13,8 +13,6 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.mpeg4 import falloff
 from realizer.tables import faps
 
-__all__ = ["FALLOFFS", "Setup", "Zone", "synchronised"]
-
 Falloff = Literal["ease", "smooth", "cosine", "linear"]
 FALLOFFS: tuple[Falloff, ...] = ("ease", "smooth", "cosine", "linear")
 Triple = tuple[float, float, float]

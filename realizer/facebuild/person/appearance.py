@@ -8,8 +8,6 @@ from typing import Any
 
 from realizer.core.errors import FaceError
 
-__all__ = ["Look", "look_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Look:

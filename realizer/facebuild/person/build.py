@@ -17,8 +17,6 @@ from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
 
-__all__ = ["build_face"]
-
 
 def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     """Build a face folder.

@@ -14,8 +14,6 @@ from realizer.facebuild.parts import Part, grid, smooth
 from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Patch
 
-__all__ = ["Style", "style_of"]
-
 SEED = 11  # of the locks: the same head, the same hair
 FALLS = 6  # rows of what hangs down
 CLEAR = 0.005  # m that hanging hair keeps off skin

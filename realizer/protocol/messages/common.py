@@ -6,22 +6,6 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 
-__all__ = [
-    "MAX_CONTROL",
-    "MAX_FPS",
-    "PICTURES",
-    "PROTOCOL",
-    "STREAMS",
-    "WHOLE",
-    "Encoding",
-    "Message",
-    "Picture",
-    "Reply",
-    "Seconds",
-    "Stream",
-    "Whole",
-]
-
 # Version of the protocol that `hello` and `welcome` name.
 PROTOCOL = 1
 

@@ -27,8 +27,6 @@ from realizer.protocol.messages.speech import SpeechMessage
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-__all__ = ["SUPPORTED", "Control", "parse_control"]
-
 Control = (
     Hello
     | Subscribe

@@ -8,25 +8,6 @@ from pydantic import Field
 
 from realizer.protocol.messages.common import PROTOCOL, Reply, Seconds
 
-__all__ = [
-    "BlockState",
-    "Capabilities",
-    "Changed",
-    "CharacterState",
-    "ErrorCode",
-    "ErrorMessage",
-    "FrameMessage",
-    "Gap",
-    "LayerState",
-    "Limits",
-    "Pong",
-    "ScheduleMessage",
-    "StateMessage",
-    "Subscribed",
-    "VoiceState",
-    "Welcome",
-]
-
 
 class Capabilities(Reply):
     """What there is to ask for."""

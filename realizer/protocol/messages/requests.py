@@ -17,20 +17,6 @@ from realizer.protocol.messages.common import (
     Whole,
 )
 
-__all__ = [
-    "Anticipate",
-    "CharacterMessage",
-    "Feeling",
-    "Hello",
-    "Ping",
-    "SceneMessage",
-    "SetMessage",
-    "StateQuery",
-    "Stop",
-    "Subscribe",
-    "Unsubscribe",
-]
-
 FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
 Side = Annotated[int, Field(ge=16), WHOLE]
 Numbered = Annotated[int, Field(ge=0), WHOLE]

@@ -8,8 +8,6 @@ from pydantic import AliasChoices, ConfigDict, Field, field_validator, model_val
 
 from realizer.protocol.messages.common import Message
 
-__all__ = ["MAX_APPEND", "SpeechMessage", "Timed"]
-
 # Longest text of one `speech` message; a speech may have any number of them.
 MAX_APPEND = 20_000  # characters
 

@@ -12,8 +12,6 @@ from realizer.core.settings import Settings, raises
 from realizer.playback.references import abroad
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["MAX_CHARACTERS", "beyond", "memory", "too_large", "too_long", "too_many_pixels", "used_up"]
-
 MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
 
 # The index of a character is one byte on the wire; sixteen faces in one session are a crowd.

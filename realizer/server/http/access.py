@@ -17,8 +17,6 @@ from realizer.server.documents.limits import used_up
 from realizer.server.http.jwt_tokens import Pass, PassError, Passes
 from realizer.server.runtime.session_registry import HubError
 
-__all__ = ["Guard", "Pace"]
-
 # Names of this machine for itself.
 LOOPBACK = {"localhost", "127.0.0.1", "::1"}
 # A client that brings its token in `hello` must have said it by then.

@@ -13,8 +13,6 @@ from urllib.parse import parse_qs, unquote
 from realizer.core.errors import FaceError, RealizerError
 from realizer.core.settings import Settings
 
-__all__ = ["TEXT", "Answer", "Site"]
-
 JSON = "application/json; charset=utf-8"
 TEXT = "text/plain; charset=utf-8"
 NOT_BUILT = """The page was not bundled when this package was built.

@@ -9,8 +9,6 @@ from typing import Any
 
 from realizer.core.errors import RealizerError
 
-__all__ = ["Pass", "PassError", "Passes"]
-
 LEEWAY = 10.0  # s; clocks of machines differ
 BITS = 2048  # of RSA; shorter keys are broken
 # Elliptic curve -> the one algorithm that signs with it (RFC 7518, 3.4).

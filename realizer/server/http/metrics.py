@@ -7,8 +7,6 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-__all__ = ["MEDIA_TYPE", "Histogram", "Metrics", "summed"]
-
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 # Upper ends in seconds: a frame is late by less than a millisecond, or by several frames.
 LATENESS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)

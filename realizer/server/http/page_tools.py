@@ -13,8 +13,6 @@ from realizer.core.settings import Settings
 if TYPE_CHECKING:
     from realizer.checking.finding import Finding
 
-__all__ = ["DeskError", "faults", "feeling", "pose"]
-
 # A text of this length is checked in a tenth of a second; longer ones have `realizer check`.
 MOST_TEXT = 50_000  # characters
 MOST_FINDINGS = 100

@@ -10,8 +10,6 @@ from bml_schema import CORE, EXTENSIONS, Block, Constraint, Required
 from bml_schema.node_schema import local, shape_of
 from realizer.behaviours.registry import VOCABULARY
 
-__all__ = ["vocabulary"]
-
 PREFIXES = {
     CORE: "",
     EXTENSIONS: "",

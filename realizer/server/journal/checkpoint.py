@@ -12,8 +12,6 @@ from realizer.server.journal.serialization import character_of, plain_character,
 if TYPE_CHECKING:
     from realizer.server.session.session import Session
 
-__all__ = ["checkpoint", "restore"]
-
 VERSION = 1
 STATE, CLIP = "state", "clip:"
 # Of what was told, a checkpoint has the last so many messages and characters: minutes of talk. Who comes back

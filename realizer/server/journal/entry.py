@@ -10,8 +10,6 @@ from typing import Literal, Protocol, get_args
 
 from realizer.core.errors import RealizerError
 
-__all__ = ["KEPT", "Entry", "Journal", "JournalError", "Kept", "Kind", "Log", "Lost", "Recorder"]
-
 # Sessions whose process died and that nobody came back to are forgotten after so long.
 KEPT = 7 * 24 * 3600  # s
 

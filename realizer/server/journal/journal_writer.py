@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 
 from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Kind, Lost, Recorder
 
-__all__ = ["Notes"]
-
 log = logging.getLogger(__name__)
 
 # A checkpoint is due after so many entries, which are done again in about half a second, or so many bytes.

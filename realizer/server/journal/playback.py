@@ -20,8 +20,6 @@ from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.session import Session
 from realizer.server.speech.speech_streams import OPEN
 
-__all__ = ["played", "told"]
-
 
 def told(record: Record, **changed: Any) -> list[str]:
     """The feedback of a session that is played again, XML texts with their `seq`; as `played`."""

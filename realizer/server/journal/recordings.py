@@ -17,8 +17,6 @@ from realizer.behaviours.kind import Position
 from realizer.core.settings import Settings
 from realizer.server.journal.entry import Entry, JournalError, Kept
 
-__all__ = ["FolderJournal", "Record", "head", "read_record"]
-
 SUFFIX = ".jsonl"
 SHOWN_RECORDS = 20  # of those one can choose from
 ROUNDING = 1e-6  # s; of times that went from one clock to another

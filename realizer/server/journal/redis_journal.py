@@ -11,8 +11,6 @@ from typing import Any
 
 from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
 
-__all__ = ["SharedJournal"]
-
 PATIENCE = 1.0  # s for an answer
 # Everybody waits for it meanwhile: who has not answered in that time is not asked again before so long.
 PAUSE = 4.0  # s

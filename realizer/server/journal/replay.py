@@ -11,8 +11,6 @@ from realizer.server.session.effects import Effect, Speak
 from realizer.server.session.session import Session
 from realizer.speech.utterance import Utterance
 
-__all__ = ["caught_up", "replay", "restored"]
-
 
 def replay(
     session: Session,

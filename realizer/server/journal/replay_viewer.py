@@ -14,8 +14,6 @@ from realizer.realization import Performance, Worn
 from realizer.server.session.session import Session
 from realizer.server.streams.frame_windows import EPSILON, Window, first_at
 
-__all__ = ["Viewer"]
-
 
 class Viewer:
     """Who looks at all faces of a session while time passes, and remembers what was to be seen.

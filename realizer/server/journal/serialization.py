@@ -13,8 +13,6 @@ from realizer.animation.idle.blinks import Fewer
 from realizer.playback.character import Character, Shift
 from realizer.scheduling.timing import Schedule
 
-__all__ = ["character_of", "plain_character", "plain_schedule", "schedule_of"]
-
 # Python writes a float so that it is read again to the last bit.
 CHANNELS = {"channel": Channel, "fewer": Fewer}
 

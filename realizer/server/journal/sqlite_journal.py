@@ -12,8 +12,6 @@ from time import time
 
 from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
 
-__all__ = ["LocalJournal"]
-
 TABLES = """
 CREATE TABLE IF NOT EXISTS sessions (id TEXT PRIMARY KEY, owner TEXT NOT NULL, epoch REAL NOT NULL);
 CREATE TABLE IF NOT EXISTS entries (n INTEGER PRIMARY KEY, session TEXT NOT NULL, line TEXT NOT NULL);

@@ -25,8 +25,6 @@ from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
 from realizer.server.transports.transport import Client
 
-__all__ = ["Shell"]
-
 log = logging.getLogger(__name__)
 
 # How often sessions that nobody visits are looked for.

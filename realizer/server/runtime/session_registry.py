@@ -15,8 +15,6 @@ from realizer.server.documents.limits import used_up
 from realizer.server.session.effects import Close, Effect, Move, Send
 from realizer.server.session.session import Session
 
-__all__ = ["ANYBODY", "Hub", "HubError", "Visitor"]
-
 SESSION_ID = re.compile(r"[A-Za-z0-9._~-]{1,64}")
 
 

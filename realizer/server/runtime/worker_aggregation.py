@@ -12,8 +12,6 @@ from collections.abc import Awaitable, Callable, Mapping
 
 from realizer.server.http.metrics import summed
 
-__all__ = ["gathered", "is_for_all"]
-
 log = logging.getLogger(__name__)
 
 # A worker that has not answered by then is left out.

@@ -25,8 +25,6 @@ from realizer.core.logs import write_words
 from realizer.core.settings import Settings
 from realizer.server.runtime.worker_aggregation import gathered, is_for_all
 
-__all__ = ["WorkerError", "Workers", "handed", "worker_of"]
-
 log = logging.getLogger(__name__)
 
 # A request's first line must have come by then, and be no longer.

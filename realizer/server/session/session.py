@@ -32,8 +32,6 @@ from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
 
-__all__ = ["Session"]
-
 log = logging.getLogger(__name__)
 
 

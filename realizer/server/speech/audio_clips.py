@@ -19,8 +19,6 @@ from realizer.protocol.wire import ClipPiece
 from realizer.speech.recorded.viseme_names import sound_of
 from realizer.speech.utterance import Phoneme, Recording, Word
 
-__all__ = ["ClipError", "Clips"]
-
 MOST_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest go
 MOST_CLIPS = 1000  # of a session
 MOST_TIMES = 20_000  # words, or phonemes, of one clip

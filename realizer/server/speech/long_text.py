@@ -15,8 +15,6 @@ from realizer.server.speech.sentence_splitter import TAG, Clauses, whole
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 
-__all__ = ["Growing", "shortened"]
-
 # Characters up to which a text is said in one: espeak needs 15 ms for so many.
 SHORT = 160
 # And of which a part is made, from the second one on. Each is planned by itself while frames are due.

@@ -8,8 +8,6 @@ from typing import Any
 
 from realizer import tables
 
-__all__ = ["TAG", "Clauses", "whole"]
-
 # A tag; groups: "/" of an end, name, attributes, "/" of one without an inside.
 TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
 BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # a tag of which more is to come

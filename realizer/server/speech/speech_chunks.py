@@ -15,8 +15,6 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import TAG
 from realizer.speech.ssml import EMPTY, SPOKEN
 
-__all__ = ["Piece", "clip_block", "text_block"]
-
 ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 # A tag of which the rest never came.
 BROKEN = re.compile(r"</?(?:[\w.-]+:)?([A-Za-z][\w.-]+)(?:\s[^<>]*)?$")

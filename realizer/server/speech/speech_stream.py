@@ -10,8 +10,6 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import Clauses, whole
 from realizer.server.speech.speech_chunks import Piece, clip_block, text_block
 
-__all__ = ["Turn"]
-
 
 @dataclass(frozen=True, slots=True)
 class _Clip:

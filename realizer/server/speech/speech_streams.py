@@ -12,8 +12,6 @@ from realizer.protocol.messages.speech import SpeechMessage
 from realizer.server.speech.speech_chunks import Piece
 from realizer.server.speech.speech_stream import Turn
 
-__all__ = ["SpeechError", "Speeches"]
-
 # An open speech ends so much later than now, as long as nobody knows when.
 OPEN = 1e6  # s
 # Its block ends so much behind its last piece, so that what is told of that one comes first.

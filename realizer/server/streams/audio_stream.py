@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from realizer.core.array_types import Float32
+from realizer.playback.active_block import Speaking
 from realizer.playback.audio_mix import CUT, heard
-from realizer.playback.player import Player, Speaking
+from realizer.playback.player import Player
 
 # A sound packet, and how far ahead of its time it is sent.
 PACKET = 0.02  # s

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from realizer.charts.chart_data import line_of
 from realizer.charts.timeline import BlockLine
 from realizer.playback.active_block import Playing
-from realizer.playback.block_store import Cast
 from realizer.playback.block_states import State
+from realizer.playback.block_store import Cast
 from realizer.playback.references import references
 from realizer.scheduling.timing import Schedule
 

@@ -23,8 +23,6 @@ from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.document_framing import Assembler, Fault
 from realizer.server.transports.tcp_listener import Listener, session_of
 
-__all__ = ["AsapDoor"]
-
 log = logging.getLogger(__name__)
 
 READ = 64 * 1024  # bytes

@@ -13,8 +13,6 @@ from typing import Any
 from realizer.core.errors import RealizerError
 from realizer.server.transports.message_format import Message
 
-__all__ = ["Link", "check_installed"]
-
 HEARTBEAT = 10_000  # ms, both ways: what else would tell that the broker's machine is gone
 REASON = 0.1  # s between the loss of a connection and its telling, so that the reason is known by then
 # Messages that have come in and are not handled: so a session keeps step, and the broker waits with more.

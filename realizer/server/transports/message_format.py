@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-__all__ = ["Action", "Dialect", "Leave", "Message", "ToSession"]
-
 
 @dataclass(frozen=True, slots=True)
 class Message:

@@ -13,8 +13,6 @@ from realizer.core.settings import Settings
 from realizer.server.transports.message_format import Action, Dialect, Message, ToSession
 from realizer.server.transports.vhmsg import Vhmsg
 
-__all__ = ["DIALECTS", "AsapJson", "AsapXml"]
-
 
 class AsapXml:
     """Documents and feedback as they are, one a message: Asap over ActiveMQ."""

@@ -20,8 +20,6 @@ from realizer.server.transports.broker import Link, check_installed
 from realizer.server.transports.message_format import Dialect, Leave, Message, ToSession
 from realizer.server.transports.message_formats import DIALECTS
 
-__all__ = ["StompDoor"]
-
 log = logging.getLogger(__name__)
 
 FIRST_RETRY = 0.2  # s

@@ -11,8 +11,6 @@ from collections.abc import Awaitable, Callable
 
 from realizer.core.settings import raises
 
-__all__ = ["Listener", "session_of"]
-
 log = logging.getLogger(__name__)
 
 LONGEST_NAME = 64  # characters of a session's name

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-__all__ = ["Client", "Door"]
-
 
 class Client(Protocol):
     """The way out to one connection. Called inside the event loop; never blocks."""

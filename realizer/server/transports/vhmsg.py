@@ -14,8 +14,6 @@ from realizer.core.settings import raises
 from realizer.server.transports.document_framing import Assembler
 from realizer.server.transports.message_format import Action, Leave, Message, ToSession
 
-__all__ = ["Vhmsg"]
-
 # What we are called where components of a VHMSG system say who they are.
 COMPONENT = "renderer"
 NAME = "bml-realizer"

@@ -19,8 +19,6 @@ from realizer.speech.align.recording import mono, to_aligner
 from realizer.speech.align.uniform_align import even
 from realizer.speech.utterance import Say, Utterance, Voice
 
-__all__ = ["Aligner", "align", "aligned"]
-
 Aligner = Literal["pocketsphinx", "espeak"]
 
 # The cost (`Spans`) of a probability of 1/2, and how fast it falls: between right texts and wrong ones, as

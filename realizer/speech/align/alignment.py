@@ -11,8 +11,6 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Phoneme, Utterance, Word
 
-__all__ = ["AlignError", "Alignment", "laid_out", "likely", "moved"]
-
 LEAST_PAUSE = 0.02  # s; shorter ones are of the sound before
 
 

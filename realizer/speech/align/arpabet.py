@@ -8,8 +8,6 @@ from functools import cache
 
 from realizer import tables
 
-__all__ = ["to_arpabet", "to_ipa"]
-
 STRIPPED = str.maketrans("", "", "ːˑˈˌ̩̯̃̍͡ʲʰˀ_-~|")
 
 

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float64
 
-__all__ = ["Heard", "Index", "States", "matched", "quiet", "unlike", "usual"]
-
 Index = npt.NDArray[np.intp]
 
 # In units of the usual difference of a frame and a state; found by trial on human and on synthetic speech.

@@ -12,8 +12,6 @@ from realizer.speech.align import features as f
 from realizer.speech.align.dtw import Heard, Index, States, matched, quiet, usual
 from realizer.speech.utterance import Utterance
 
-__all__ = ["Spans", "by_sound"]
-
 COARSE, FINE = 320, 80  # samples between frames: 20 and 5 ms
 FAR, NEAR = 30.0, 0.4  # s to each side that the way is looked for in: of the diagonal, and of the coarse way
 SLOWEST, FASTEST = 0.4, 2.5  # of the reference, which is brought to the speed of the recording first

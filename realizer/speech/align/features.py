@@ -9,8 +9,6 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64
 
-__all__ = ["RATE", "cepstra", "energies", "loudness", "normalised", "resampled", "sounding"]
-
 RATE = 16_000  # Hz; all that matters of speech lies below half of it
 WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as recognisers of speech take it
 BANDS, LOWEST, HIGHEST = 26, 100.0, 7000.0  # of the mel scale, Hz

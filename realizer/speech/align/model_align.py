@@ -10,8 +10,6 @@ from realizer.speech.align.alignment import Alignment, laid_out, likely
 from realizer.speech.align.arpabet import to_arpabet, to_ipa
 from realizer.speech.utterance import Phoneme, Utterance
 
-__all__ = ["by_model"]
-
 # The score (`Said`) of a probability of 1/2, and how fast it falls: between right texts and wrong ones, as
 # measured on human and espeak-ng's speech.
 SCORE, SCORE_OF_WORD = (-35.0, 4.0), (-45.0, 8.0)

@@ -9,8 +9,6 @@ from realizer.core.array_types import Float32
 from realizer.speech.align.alignment import AlignError
 from realizer.speech.align.features import resampled
 
-__all__ = ["mono", "to_aligner"]
-
 RATES = (1000, 384_000)  # Hz
 CHANNELS = 64
 LEAST, MOST = 0.05, 1800.0  # s

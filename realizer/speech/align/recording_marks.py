@@ -12,8 +12,6 @@ from realizer.speech.align.aligner import Aligner, aligned
 from realizer.speech.align.recording import mono
 from realizer.speech.utterance import Recording, Say, Utterance
 
-__all__ = ["played", "recorded"]
-
 KEPT = 8  # recordings; a document is looked at more than once before it plays
 
 

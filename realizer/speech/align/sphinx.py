@@ -13,8 +13,6 @@ import numpy as np
 
 from realizer.core.array_types import Float32
 
-__all__ = ["Said", "by_model", "missing"]
-
 INSTALL = "no aligner of English: pip install 'bml-realizer[align]'"
 FRAME = 0.01  # s
 

@@ -11,8 +11,6 @@ from realizer.speech.align import features
 from realizer.speech.align.alignment import Alignment, moved
 from realizer.speech.utterance import Utterance
 
-__all__ = ["even"]
-
 HOP = 160  # samples
 INSTALL = "no aligner, words are spread evenly: pip install 'bml-realizer[speech,align]'"
 

@@ -13,8 +13,6 @@ from realizer.speech.ssml import Break, Mark, Part, Script, Tag, write_tag
 from realizer.speech.ssml_prosody import PLAIN
 from realizer.speech.words import PlacedMark, words_in
 
-__all__ = ["Document", "write_document"]
-
 # Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
 OCTAVES = 0.72
 MOST_PITCH = 198.0  # %; its setting ends there

@@ -12,8 +12,6 @@ from realizer.speech.espeak.protocol import END, MARK, PHONEME, WORD, Event
 from realizer.speech.utterance import Phoneme, Word
 from realizer.speech.word_boundaries import bare, cuts, is_vowel
 
-__all__ = ["Timeline", "timeline"]
-
 STRESS = {"ˈ": 1, "ˌ": 2}
 SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
 LEAST_CLOSURE = 0.01  # s

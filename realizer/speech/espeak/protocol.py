@@ -10,8 +10,6 @@ import numpy as np
 
 from realizer.core.array_types import Int16
 
-__all__ = ["END", "MARK", "PHONEME", "WORD", "Event", "read_answer"]
-
 WORD, MARK, END, PHONEME = 1, 3, 5, 7
 
 Event = tuple[int, int, int, str]

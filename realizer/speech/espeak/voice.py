@@ -17,8 +17,6 @@ from realizer.speech.espeak.protocol import read_answer
 from realizer.speech.ssml import Break, read_script
 from realizer.speech.utterance import STRETCH, Say, Utterance
 
-__all__ = ["EspeakVoice", "choose_voice", "missing"]
-
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
 SLOWEST, FASTEST = 80, 450  # words a minute; what it accepts
 KEPT_WORDS = 4096

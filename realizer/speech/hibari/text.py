@@ -8,8 +8,6 @@ from realizer.speech.ssml import Break, Mark, Script
 from realizer.speech.ssml_prosody import PLAIN, Prosody
 from realizer.speech.words import PlacedMark, words_in
 
-__all__ = ["Run", "runs"]
-
 
 @dataclass(frozen=True, slots=True)
 class Run:

@@ -14,8 +14,6 @@ from realizer.core.array_types import Int16
 from realizer.speech.word_boundaries import bare, cuts, is_vowel
 from realizer.speech.words import words_in
 
-__all__ = ["Lengths", "Sound", "Token", "ending_in_silence", "guessed", "places", "sounds", "written"]
-
 Role = Literal["sound", "primary", "secondary", "long", "pause", "joint"]
 # What a reader makes of a text: written word, phonemes in hibari's signs, whether a blank follows.
 Token = tuple[str, str, bool]

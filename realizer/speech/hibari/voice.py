@@ -32,8 +32,6 @@ from realizer.speech.speech_buffer import Track, cut
 from realizer.speech.ssml import Break, read_script
 from realizer.speech.utterance import STRETCH, Say, Utterance, Word
 
-__all__ = ["HibariVoice", "missing", "missing_voice"]
-
 INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
 SHOWN = 3  # words that a warning names
 

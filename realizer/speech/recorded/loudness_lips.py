@@ -11,8 +11,6 @@ from realizer import tables
 from realizer.core.array_types import Int16
 from realizer.speech.utterance import Phoneme
 
-__all__ = ["by_loudness"]
-
 
 def by_loudness(pcm: Int16, rate: int) -> tuple[Phoneme, ...]:
     """Vowels as open as the sound is loud, by the root mean square of windows (`envelope.toml`).

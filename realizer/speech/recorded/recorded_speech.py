@@ -11,8 +11,6 @@ from realizer.core.array_types import Float64
 from realizer.speech.recorded.loudness_lips import by_loudness
 from realizer.speech.utterance import Phoneme, Recording, Say, Utterance, Word
 
-__all__ = ["played"]
-
 # Words of a voice touch where those of a recording may lie apart: what ends with a word ends so much before
 # the next one begins.
 EDGE = 1e-4  # s

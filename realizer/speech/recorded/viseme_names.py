@@ -8,8 +8,6 @@ from functools import cache
 
 from realizer import tables
 
-__all__ = ["sound_of", "viseme_sets"]
-
 
 @dataclass(frozen=True, slots=True)
 class GivenViseme:

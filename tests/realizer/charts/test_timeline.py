@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Link, Point, Spoken
+from realizer.charts.links import Link
+from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Point, Spoken
 from realizer.scheduling.timing import Warning
 
 GAP = Gap("start", "end", 1.5, 1.0, 0.25, 4.0)

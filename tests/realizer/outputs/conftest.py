@@ -15,7 +15,7 @@ import pytest
 from bml_schema import BlockProgress
 from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.playback.player import Speaking
+from realizer.playback.active_block import Speaking
 from realizer.realization import Performance, Realization
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Phoneme, Utterance, Word

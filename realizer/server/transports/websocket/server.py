@@ -40,8 +40,6 @@ from realizer.server.transports.websocket.request import (
 )
 from realizer.server.transports.websocket.writer import GOODBYE, WebSocketClient
 
-__all__ = ["WebSocketDoor", "lines"]
-
 log = logging.getLogger(__name__)
 
 # How often a client is asked whether it is there, and how long it has for the answer.

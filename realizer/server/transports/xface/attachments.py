@@ -19,8 +19,6 @@ from realizer.core.settings import Settings, raises
 from realizer.server.documents.limits import too_large
 from realizer.server.transports.xface.wire import Task
 
-__all__ = ["Brought", "Empty", "Script", "prepare"]
-
 ROOM = 2**10  # bytes of a document that are not its keys
 
 

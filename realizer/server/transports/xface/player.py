@@ -12,8 +12,6 @@ from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.xface.player_link import PlayerLink, State
 
-__all__ = ["XfacePlayerDoor"]
-
 log = logging.getLogger(__name__)
 
 FIRST_RETRY = 0.2  # s

@@ -13,8 +13,6 @@ from realizer.animation.frames import FAPFrames
 from realizer.outputs.fap_text import encode
 from realizer.server.transports.xface.wire import Status, Task, pack_task, read_notes
 
-__all__ = ["PlayerLink", "State"]
-
 log = logging.getLogger(__name__)
 
 # s; a player that says nothing of a task for so long has lost it, and is sent the next one.

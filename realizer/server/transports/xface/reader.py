@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 from realizer.server.transports.xface.wire import Task
 
-__all__ = ["Content", "Fault", "TaskReader"]
-
 UNREAD = Task("")
 
 

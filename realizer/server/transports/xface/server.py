@@ -18,8 +18,6 @@ from realizer.server.transports.xface.reader import Content, Fault, TaskReader
 from realizer.server.transports.xface.tasks import ERROR, Answer, Desk
 from realizer.server.transports.xface.wire import Task
 
-__all__ = ["XfaceDoor"]
-
 log = logging.getLogger(__name__)
 
 READ = 64 * 1024  # bytes

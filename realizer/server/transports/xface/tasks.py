@@ -18,8 +18,6 @@ from realizer.server.transports.xface.attachments import Brought, Empty, Script
 from realizer.server.transports.xface.wire import Status, Task, pack_note
 from realizer.tables import faps
 
-__all__ = ["Desk"]
-
 log = logging.getLogger(__name__)
 
 Answer = bytes | ToSession | Leave

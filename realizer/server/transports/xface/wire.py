@@ -6,8 +6,6 @@ import re
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["Note", "Status", "Task", "pack_note", "pack_task", "read_notes"]
-
 
 class Status(IntEnum):
     """What a note says of a task; of the eight that there are, those that are ever sent."""
