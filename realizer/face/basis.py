@@ -26,7 +26,7 @@ ARRAYS = {
     "row": 1,  # which FAP (its number) or extra row (69..73 are JAW_COS.. + 1), ascending
     "start": 1,  # where the row's part of vertex and move begins; one more than rows
     "vertex": 1,
-    "move": 2,  # metres for each metre (radian) that the feature point is asked to move
+    "move": 2,  # metres for each metre (radian) of FAP at the feature point
     "head": 1,  # 0..255: how far each vertex turns with the head
     "jaw_pivot": 1,
     "head_pivot": 1,
@@ -107,7 +107,7 @@ def basis_from(
 def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
     """The stored form of fields: row number -> (n, 3) becomes row, start, vertex, move.
 
-    Moves below the threshold (of what the feature point is asked to move) are left out: nobody sees them.
+    Movements below the threshold (relative to the feature point's) are left out, because they are invisible.
     """
     numbers, starts, vertices, moves = [], [0], [], []
     for number in sorted(rows):
@@ -128,7 +128,7 @@ def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
 
 
 def unpack(stored: Mapping[str, Any], n_vertices: int) -> dict[int, Any]:
-    """What `pack` stored: row number -> (n_vertices, 3)."""
+    """Return what `pack` stored: row number -> (n_vertices, 3)."""
     rows = {}
     for k, number in enumerate(stored["row"].tolist()):
         part = slice(int(stored["start"][k]), int(stored["start"][k + 1]))

@@ -14,7 +14,7 @@ from realizer.tables import faps
 # FAP of the inner contour -> the same move of the outer one.
 CONTOURS = {4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60}
 AXES = {"up": 1, "down": 1, "left": 0, "right": 0}
-# Of the red's width between the contours: what is left of it when it is squeezed is 0.35, stretched 1.65.
+# The lip between the contours keeps 0.35 of its width when squeezed, and reaches 1.65 when stretched.
 GIVES = 0.65
 LEAST = 0.05  # of the mouth's width: where both contours lie at one height they still shear that far
 
@@ -50,7 +50,7 @@ def together(contours: Contours, rows: Float32) -> Float32:
     """The rows with what one contour drags of the other.
 
     A lip is one body: where one contour would leave the other by more than the lip gives way, the one that
-    is asked for less follows. What is asked for alone is reached exactly.
+    smaller request follows. A request for one contour alone is reached exactly.
 
     Args:
         rows: (n, 68) FAPU.

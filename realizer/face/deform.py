@@ -15,7 +15,7 @@ from realizer.face.model import Face
 
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
 LIDS = slice(18, 22)  # columns: upper left and right, lower left and right
-CHUNK = 16  # frames at once: what a cache holds
+CHUNK = 16  # frames at once, so that they fit a cache
 MOST_TURN = 0.42  # rad, 24 degrees
 # Rotated by these, the parts are driven apart from the product. Eyeballs too, but they have no rows in it;
 # eyes that are no balls have rows, and no vertices that turn.
@@ -30,7 +30,7 @@ def deform(face: Face, poses: Any) -> Float32:
 
     Args:
         poses: (n, len(face.takes)): FAP values in FAPU, column = FAP - 1 (FAPs 1 and 2 are not looked at),
-            then intensities 0..1 of what the face's model takes. `animation.pose` makes them. Or (n, 68)
+            then intensities 0..1 of the model's inputs. `animation.pose` makes them. Or (n, 68)
             FAPs alone.
 
     Returns:
@@ -82,7 +82,7 @@ def whole(poses: Any, takes: tuple[str, ...]) -> Float32:
 
 
 def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
-    """How the jaw stands when the chin (2.1) has sunk by `opening` metres: radians turned, metres slid down.
+    """Return the jaw's pose when the chin (2.1) has sunk by `opening` metres: rotation in rad, slide in m.
 
     A jaw turns about its joint, and where it opens far the joint slides: what the turn cannot reach, the
     slide does.
@@ -98,7 +98,7 @@ def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
 
 
 def _weights(basis: Any, rows: Float32) -> Float32:
-    """(n, 73): what the rows of the basis are multiplied by."""
+    """Return the factors (n, 73) of the rows of the basis."""
     weights = np.zeros((len(rows), ROWS), np.float32)
     weights[:, 2:FAPS] = together(basis["contours"], rows)[:, 2:]
     weights[:, DRIVEN] = 0

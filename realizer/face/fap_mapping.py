@@ -11,10 +11,10 @@ from realizer.tables.mappings import own_file, read_mapping
 
 
 def mapping_of(face: str = "default", file: Path | None = None) -> FapMapping:
-    """What action units ask of FAPs: an action unit is as the file says, else as the face, else as the table.
+    """Return the mapping of action units to FAPs: rows of the file, then of the face, then of the table.
 
     Args:
-        face: name of a face folder; its `au_to_fap.csv` or `au_to_fap.txt` says what it has of its own.
+        face: name of a face folder; its `au_to_fap.csv` or `au_to_fap.txt` holds its own rows.
         file: a user's own mapping, in either form.
 
     Raises:

@@ -17,7 +17,7 @@ def to_glb(face: Face) -> bytes:
     """The face's rest mesh as GLB.
 
     One primitive with POSITION, NORMAL, COLOR_0 (linear, as glTF asks), _OCCLUSION and _GLOSS. The mesh's
-    `extras` hold what a client of streamed vertices needs: scale and offset, parts (name -> first and last
+    `extras` hold what a client needs for streamed vertices: scale and offset, parts (name -> first and last
     + 1 vertex, first and last + 1 triangle), FAPU in metres, source and licence.
     """
     # glTF wants unit normals; a vertex without a triangle gets one that points forward.

@@ -40,7 +40,7 @@ class GlbFile:
         return self._accessor(accessor, raw, bounds)
 
     def add_sparse(self, array: Any, *, bounds: bool = False) -> int:
-        """The same for an array of which most rows are zero: only the others are stored."""
+        """Add an array of mostly zero rows; only the other rows are stored."""
         raw = _little(array)
         rows = np.flatnonzero(raw.reshape(len(raw), -1).any(axis=1))
         accessor = _shape(raw)

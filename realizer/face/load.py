@@ -24,7 +24,7 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.au.model import Model
 
-DEFAULT = "ada"  # what the name "default" means
+DEFAULT = "ada"  # the face that the name "default" stands for
 VARIABLE = "REALIZER_FACES"
 DEFORMER = "REALIZER_DEFORMER"
 DEFORMERS = ("mpeg4", "au")
@@ -33,13 +33,13 @@ MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}
 
 
 def face_name(name: str) -> str:
-    """The name of the folder that a name stands for: "default" is one of them."""
+    """Return the folder name of a face name; "default" is a valid name."""
     return DEFAULT if name == "default" else name
 
 
 @dataclass(frozen=True, slots=True)
 class FaceInfo:
-    """A face folder: its name, where it lies, and what its face.toml says."""
+    """A face folder: its name, path and the contents of face.toml."""
 
     name: str
     path: Path
@@ -57,11 +57,11 @@ def load_face(
         name: a folder with faces in it, or "default".
         directory: where to look first; else what REALIZER_FACES names, `faces` beside the package, and the
             faces that came with the package.
-        deformer: "mpeg4" (FAPs alone move it) or "au" (its model of action units, FAPs the rest); None is
-            what REALIZER_DEFORMER says, or its face.toml, or "mpeg4".
+        deformer: "mpeg4" (only FAPs move it) or "au" (its model of action units; FAPs for the rest); None
+            selects REALIZER_DEFORMER, then face.toml, then "mpeg4".
 
     Raises:
-        FaceError: no such face, or a folder that cannot be used; the text says which file and what to change.
+        FaceError: no such face, or an unusable folder; the text says which file and what to change.
     """
     folder, chosen = folder_of(name, directory), _asked(deformer)
     try:
@@ -78,7 +78,7 @@ def takes(
 
 
 def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
-    """Every face that `load_face` would find, by name; not those whose face.toml cannot be read."""
+    """Return all faces that `load_face` can find, by name, except those with an unreadable face.toml."""
     found = []
     for name, folder in face_folders(directory).items():
         try:
@@ -119,7 +119,7 @@ def folder_of(name: str, directory: Path | str | None = None) -> Path:
 
 
 def read_head(folder: Path) -> dict[str, Any]:
-    """What face.toml says.
+    """Read and check face.toml.
 
     Raises:
         FaceError: no such file, not TOML, or a key is missing.
@@ -163,7 +163,7 @@ def _places(directory: Path | str | None) -> Iterator[Path]:
 
 
 def _asked(deformer: str | None) -> str | None:
-    """What is asked for in spite of a face.toml."""
+    """Return the deformer that overrides face.toml, or None."""
     chosen = deformer or os.environ.get(DEFORMER) or None
     if chosen not in (None, *DEFORMERS):
         where = "deformer" if deformer else DEFORMER

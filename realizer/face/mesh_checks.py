@@ -55,7 +55,7 @@ def range_faults(parts: Mapping[str, Any], n: int | None) -> list[str]:
 
 
 def surface_faults(vertices: Float64, triangles: Int32, parts: Parts, mouth: Any) -> list[str]:
-    """Open edges where there must be none, and triangles that look the wrong way.
+    """Return faults: open edges where there must be none, and flipped triangles.
 
     Args:
         vertices: (n, 3) metres; triangles: (m, 3).
@@ -72,7 +72,7 @@ def surface_faults(vertices: Float64, triangles: Int32, parts: Parts, mouth: Any
 
 
 def _turned(triangles: Int32) -> list[str]:
-    """Triangles whose neighbours all go round the other way."""
+    """Return the triangles whose neighbours are all wound the other way."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     owner = np.tile(np.arange(len(triangles)), 3)
     _, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)

@@ -51,8 +51,8 @@ class Face:
         fapu: measured from the feature points.
         basis: what `face.deform` needs (displacement fields, rigid parts), made when the face is built.
         cameras: extra camera presets by name.
-        takes: what the columns of a pose stand for, a row that `face.deform` makes vertices of: the 68 FAPs,
-            then what the model takes (`au.columns`).
+        takes: the columns of a pose, a row from which `face.deform` makes vertices: the 68 FAPs,
+            then the inputs of the model (`au.columns`).
         model: the action units that are moved by functions of the place; None: FAPs move all there is.
     """
 

@@ -23,7 +23,7 @@ def read_arrays(path: Path, wanted: dict[str, int]) -> dict[str, Any]:
     """
     again = "copy or build the face again"
     try:
-        # Opened by zipfile: numpy takes what is no archive for a pickle or a single array.
+        # Opened by zipfile, because numpy reads a file that is no archive as a pickle or a single array.
         with zipfile.ZipFile(path) as archive:
             broken = archive.testzip()
         if broken:

@@ -41,7 +41,7 @@ def face_scale(face: Face) -> tuple[float, Float32]:
 
 
 def quantise(face: Face, vertices: Any) -> Int16:
-    """Vertices (n, n_vertices, 3) metres as int16 by `face_scale`; what lies outside is clipped."""
+    """Return vertices (n, n_vertices, 3) in metres as int16 by `face_scale`; outliers are clipped."""
     scale, offset = face_scale(face)
     steps = (np.asarray(vertices, np.float32) - offset) * np.float32(1 / scale)
     np.rint(steps, out=steps)

@@ -25,7 +25,7 @@ PARTS = (
     *NEEDED, "upper_teeth", "lower_teeth", "tongue", "brows", "lashes", "hair", "beard", "shirt", "other",
 )  # fmt: skip
 KEYS = ("name", "source", "licence", "says", "parts", "cameras", "deformer")
-TONGUE = range(43, 48)  # FAPs that move nothing where there is none
+TONGUE = range(43, 48)  # FAPs that may move nothing if there is no tongue
 
 Read = TypeVar("Read")
 

@@ -98,7 +98,7 @@ class _Surface:
         return out
 
     def _best(self, v: int) -> tuple[float, int, int] | None:
-        """What pulling v into its best neighbour costs (1 is its tolerance), v, and that neighbour."""
+        """Return the cost of collapsing v into its best neighbour (1 is the limit), v, and that neighbour."""
         near = list(self.rim.get(v) or self._near(v))
         if len(near) < 2:
             return None
@@ -141,7 +141,7 @@ class _Surface:
         return True
 
     def _both(self, v: int, u: int) -> list[tuple[int, int]] | None:
-        """The pull and its mirror image; None where one is not allowed or they would meet."""
+        """Return the collapse and its mirror image, or None if one is not allowed or they would meet."""
         tv, tu = self.twin[v], self.twin[u]
         if tv < 0 or tu < 0:
             return [(v, u)]
@@ -149,7 +149,7 @@ class _Surface:
             return [(v, u)] if tu == u else None
         if tv == u or not self.free[tv] or not self.around[tv] or tu not in self._near(tv):
             return None
-        # Pulls whose triangles meet could fold together.
+        # Collapses whose triangles meet could fold together.
         if self.around[v] & self.around[tv] or not self._allowed(tv, tu):
             return None
         return [(v, u), (tv, tu)]

@@ -16,7 +16,7 @@ from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, borne, company
 from realizer.tables import faps
 
 ROUNDS = 60
-PASSES = 2  # neighbours that were mended change what a field has to fit
+PASSES = 2  # repaired neighbours change the limits of a field
 STILL = 1e-4
 SHARE = 0.5  # of the way to the mean of the triangles that turn over, each round
 
@@ -44,7 +44,7 @@ def untangled(
     """The fields, softened alike around the triangles that they turn over, until they turn none over.
 
     Args:
-        fields: (g, n, 3) metres for each metre that is asked; at: (n, 3) metres; triangles: (m, 3).
+        fields: (g, n, 3) metres per metre of FAP; at: (n, 3) metres; triangles: (m, 3).
         plays: (g,) metres (signed) by which the fields are played, each with what moves along then,
             (n, 3), and the cosine of the turn that counts.
         fixed: vertices that keep their move.
@@ -68,7 +68,7 @@ def untangled(
             np.add.at(pulled, corners.ravel(), np.repeat(field[corners].mean(axis=1), 3, axis=0))
             step[k] = SHARE * (pulled[loose] / count[loose, None] - field[loose])
         if np.abs(step).max(initial=0.0) < STILL:
-            break  # what is left comes from what moves along
+            break  # the remaining flips come from coupled movement
         out[:, loose] += step
     return out
 
@@ -90,7 +90,7 @@ def without_flips(
     Args:
         fields: row number (`basis`) -> (n, 3); at: (n, 3) metres; triangles: (m, 3).
         points: feature point -> vertex; pivot: (3,), where the jaw turns.
-        twin: (n,) each vertex's mirror image, itself where it has none.
+        twin: (n,) each vertex's mirror image, or the vertex itself.
     """
     out = {number: np.array(field, np.float64) for number, field in fields.items()}
     contours = contours_of(
@@ -151,7 +151,7 @@ def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, f
 
 
 def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
-    """(73,): what the rows are multiplied by under FAP values (68,)."""
+    """Return the factors (73,) of the rows for FAP values (68,)."""
     out = np.zeros(ROWS)
     out[:FAPS] = values * [fapu.metres(row.unit) for row in faps()]
     turn, slid = jaw_pose({"chin": chin}, out[OPEN_JAW - 1])

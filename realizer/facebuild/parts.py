@@ -75,7 +75,7 @@ def eyeball(name: str, centre: Float64, radius: float, look: dict[str, list[floa
     Args:
         radius: metres.
         look: sRGB colours: pupil, iris_inner, iris_middle, iris_outer, ring, white, corner.
-        inward: +1 where the nose lies at +x, -1 at -x: the white reddens there.
+        inward: +1 if the nose is at +x, -1 at -x: the white reddens there.
     """
     # Radii in mm on the flat of the eye, then angles: close together where the colour jumps.
     flat = [PUPIL - 0.05, PUPIL + 0.18, 3.0, 4.3, 5.5, 6.0, IRIS, IRIS + 0.5, 9.0]
@@ -133,7 +133,7 @@ UPPER = (8.4, 6.8, 7.6, 7.0, 6.6, 9.5)  # mm: widths of the teeth of one side, f
 LOWER = (5.4, 5.9, 6.7, 7.0, 7.0, 10.0)
 # Of the light, how much reaches a tooth from the gum at the tongue to the gum at the lips.
 SHADES = (0.55, 0.78, 0.75, 1, 1, 0.8, 0.55, 0.4)
-SHINES = (0.1, 0.15, 0.35, 1, 1, 1, 1, 1)  # likewise of what shines
+SHINES = (0.1, 0.15, 0.35, 1, 1, 1, 1, 1)  # gloss by ring
 IN_LIP = (
     0.62  # of the light, how much is left for the lower teeth: the upper ones and the lips stand before it
 )

@@ -42,11 +42,11 @@ class Patch:
         return np.asarray(self.mix @ base) + self.offset
 
     def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Patch:
-        """The patch whose vertices are mixes of this one's."""
+        """Return the patch whose vertices are mixes of this one's."""
         return Patch((mix @ self.mix).tocsr(), np.asarray(mix @ self.offset), triangles.astype(np.int32))
 
     def kept(self, keep: Any) -> Patch:
-        """The triangles that are kept (m,), with the vertices that they use."""
+        """Return the triangles that are kept (m,), with the vertices that they use."""
         used, inverse = np.unique(self.triangles[keep], return_inverse=True)
         pick = sp.eye_array(len(self), format="csr")[used]
         return self.mixed(sp.csr_matrix(pick), inverse.reshape(-1, 3))
@@ -56,8 +56,8 @@ class Patch:
         return replace(self, offset=self.offset + offset)
 
     def clipped(self, height: Float64) -> tuple[Patch, sp.csr_matrix]:
-        """What lies where `height` (n,) is above zero, cut along the line of zeros, and how it was mixed."""
-        # A cut that passes within a hair of a vertex leaves slivers: let it pass through the vertex.
+        """Return the surface where `height` (n,) is above zero, cut along its zeros, and its mixes."""
+        # A cut very close to a vertex would leave slivers: move it through the vertex.
         height = np.where(np.abs(height) < 1e-6, 1e-6, height)
         inside = height > 0
         rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
@@ -133,7 +133,7 @@ class Patch:
         """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed.
 
         Args:
-            flat: new vertices stay on the old triangles: for what lies on another surface.
+            flat: new vertices stay on the old triangles, for surfaces that lie on another one.
         """
         ends: dict[tuple[int, int], list[int]] = {}
         for a, b, c in self.triangles.tolist():

@@ -28,12 +28,12 @@ LID_POINTS = {"L": ("3.1", "3.3"), "R": ("3.2", "3.4")}
 
 
 def columns(model: Model) -> tuple[str, ...]:
-    """What a pose holds beside the FAPs: units that move the face, by side; the lips; how units are mixed.
+    """The columns of a pose beside the FAPs: units that move the face, by side; lips; mixing order.
 
     "1L", "1R", ... "17", ...; units that differ in time alone (blink and wink are closed eyes) have columns
     of their own, the strongest shows. "lips" is how far speech has the lips: FAPs move them then.
     "successive" is how far units follow one another, 0 where they are added up; they do by "rank 1",
-    "rank 2", ..., the highest first, and units of one rank as they are numbered.
+    "rank 2", ..., the highest first; units of one rank are applied by number.
     """
     names = (name for _, names in _units(model) for name in names)
     return (*names, LIPS, SUCCESSIVE, *(f"{RANK}{au}" for au in _orderly(model)))
@@ -107,7 +107,7 @@ class Moves:
     def intensities(self, pose: Float32) -> Float32:
         """(n, units) of the (n, columns) part of poses that follows the FAPs, opened as far as the widest.
 
-        Full intensity is `ActionUnit.strength`: what was measured shows some units mildly.
+        Full intensity is `ActionUnit.strength`, because some units were measured at mild intensity.
         """
         shown = np.stack([pose[:, read].max(axis=1) for read in self._read], axis=1) * self._strengths
         shown[:, self._opening] = opened(self._gaps, shown[:, self._opening].T).T
@@ -163,7 +163,7 @@ class Moves:
         return Succession(self._face, self._model)
 
     def _turn_jaw(self, angle: float, vertices: Float32) -> None:
-        """The jaw bone: teeth and tongue turn with what is on them (what is an object's own comes first)."""
+        """Turn the jaw; teeth and tongue follow it (an object's own rotation comes first)."""
         centre = np.array(self._model.jaw, np.float32)
         turn = rotation((1, 0, 0), angle).T.astype(np.float32)
         for part in JAW:
@@ -174,7 +174,7 @@ class Moves:
 
 @lru_cache(maxsize=16)
 def moves_of(face: Face) -> Moves | None:
-    """What moves a face beside the FAPs; None where they move all there is."""
+    """Return the model's movement of a face beside the FAPs, or None if FAPs move all of it."""
     return None if face.model is None else Moves(face, face.model)
 
 
@@ -194,7 +194,7 @@ def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Fl
 
 
 def _meeting(face: Face, moves: Float64, side: str) -> float:
-    """What to multiply moves that close an eye with, so that its lids meet and do not pass each other.
+    """Return factors for moves that close an eye, so that its lids meet and do not cross.
 
     A lid that hangs lower at rest than on the face that was measured has less far to go.
     """

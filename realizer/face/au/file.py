@@ -178,7 +178,7 @@ def _motion(at: _Reader, key: str, table: dict[str, Any]) -> Motion:
         lowest, ways = np.linalg.eigh(matrix)
         if lowest[0] < -1e-4 * max(float(lowest[-1]), 1e-9):
             raise FaceError(f"{at.path}: {place}.B: wanted a matrix whose Gaussian falls off, got {row['B']}")
-        # Any root will do; the triangular one is what the density takes.
+        # Any square root is valid; the density uses the triangular one.
         root = np.linalg.qr((ways * np.sqrt(np.maximum(lowest, 0))).T)[1].T
         gaussians[k, 4:] = [root[place] for place in LOWER]
     return Motion(at.numbers(table, f"{key}.origin", 3), gaussians, angles[0], angles[1])

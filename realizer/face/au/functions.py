@@ -62,7 +62,7 @@ def _bell(one: Float64, at: Float64) -> tuple[Float64, Float64, Float64, Float64
     for value, place in zip(one[4:], LOWER, strict=True):
         root[place] = value
     away = at - one[1:4]
-    # A bell is nought 40 widths out: what is further would only overflow.
+    # A Gaussian is zero 40 widths away; farther values would only overflow.
     turned = np.clip(away @ root, -40, 40)
     return root, away, turned, np.exp(-np.einsum("ij,ij->i", turned, turned) / 2)
 

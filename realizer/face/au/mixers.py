@@ -14,7 +14,7 @@ from realizer.face.au.units import units
 # The units that open the mouth, the widest first. Each holds the narrower ones.
 OPENING = (27, 26, 25)
 
-# What a face is built from. "fixed" moves with the head alone: upper teeth, clothes.
+# The parts of a face. "fixed" moves with the head alone: upper teeth, clothes.
 Thing = Literal["face", "left eye", "right eye", "jaw", "fixed"]
 
 
@@ -41,7 +41,7 @@ def successive(
     Args:
         at: (n, 3) metres.
         values: action unit -> intensity 0..1, in this order.
-        upper: (n,) how far each belongs to the upper half of the face; None: as it lies, at every step.
+        upper: (n,) share of each vertex in the upper half of the face; None: by its position, at every step.
     """
     for au, value in values.items():
         at = at + value * model.displacement(au, at, upper=upper)
@@ -49,7 +49,7 @@ def successive(
 
 
 def opened(gaps: Any, values: Any) -> Any:
-    """How much of each unit is left so that the mouth opens as far as the widest alone would open it.
+    """Return the share of each unit at which the mouth opens as far as the widest one alone opens it.
 
     A stretched mouth is a dropped jaw and parted lips already (27@26, 27@25, 26@25 in her appendix C): added
     up they would open it twice.

@@ -49,7 +49,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Mouth:
-    """Where the upper half of the face ends: her plane through the corners of the mouth, bent along the lips.
+    """The plane that ends the upper half of the face: through the corners of the mouth, bent along the lips.
 
     Attributes:
         x: (k,) metres from the middle, from 0 to the corner.
@@ -65,7 +65,7 @@ class Mouth:
         """(n,) metres that points (n, 3) lie above it."""
         across = np.abs(at[:, 0])
         y, z, slope = (np.interp(across, self.x, line) for line in (self.y, self.z, self.slope))
-        # Deep in the mouth, and on the cheeks' bulge, the plane goes on level.
+        # Deep in the mouth and on the bulge of the cheeks, the plane continues level.
         return np.asarray(at[:, 1] - y - slope * np.clip(at[:, 2] - z, -BENT, BENT))
 
     def upper(self, at: Float64) -> Float64:
@@ -92,7 +92,7 @@ class UnitModel:
         """(n, 3) metres that points (n, 3) of the face are moved with full intensity.
 
         Args:
-            upper: (n,) how far each belongs to the upper half, where a mesh's topology tells.
+            upper: (n,) share in the upper half, if the mesh's topology shows it.
         """
         if "whole" in self.motions:
             return self.motions["whole"](at)
@@ -129,7 +129,7 @@ class Model:
 
     Attributes:
         form: "published" (one or two Gaussians) or "extended" (up to four).
-        source, licence: of what it was fitted to.
+        source, licence: of the data that the model was fitted to.
         units: number -> displacement unit.
         degrees: number -> degrees that a unit of turning turns with full intensity.
         eyes: (3,) metres, centres of the left and the right eyeball; jaw: (3,) metres, the jaw's joint.

@@ -11,7 +11,7 @@ from realizer.face.model import Face
 
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
-REACH = 0.012  # m from the line between the lips: what lies further off is above or below anyway
+REACH = 0.012  # m from the line between the lips; farther points are clearly above or below
 KNOTS = 7
 SOFT = (4e-4, 1e-4)  # m over which a vertex may stand on the wrong side: first much, then little
 DEEP = 0.020  # m behind the lips; further back there is no telling the halves of the mouth apart
@@ -33,7 +33,7 @@ def halves(face: Face) -> tuple[Int32, Bool]:
     triangles = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
     a, b = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).T
     long = np.linalg.norm(at[a] - at[b], axis=1) + 1e-9
-    # An edge of two triangles would count twice in a sum: the first of each is kept.
+    # An edge of two triangles must count once: keep its first occurrence.
     _, once = np.unique(np.minimum(a, b).astype(np.int64) * len(at) + np.maximum(a, b), return_index=True)
     graph = coo_matrix((long[once], (a[once], b[once])), (len(at),) * 2).tocsr()
     seeds = [[face.feature_points[name] - first for name in names] for names in (UPPER, LOWER)]

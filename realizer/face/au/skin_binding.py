@@ -9,10 +9,10 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.face.model import Face
 
-# Whatever else a face is built from moves with the head alone, or grows on the skin.
+# All other parts of a face move with the head alone, or grow on the skin.
 MOVED, GROWN = ("skin", "hair"), ("brows", "lashes")
-NEAR = 0.0015  # m; what is nearer to the skin than this grows there
-AROUND = 16  # triangles looked at, those whose middles are nearest
+NEAR = 0.0015  # m; closer parts grow on the skin
+AROUND = 16  # number of nearest triangles to look at
 
 
 def skin(face: Face) -> Bool:
@@ -32,7 +32,7 @@ def grown(face: Face) -> list[tuple[int, int, Int32, Float64]]:
 def roots(face: Face, part: str) -> tuple[Int32, Float64]:
     """Three vertices of skin for each vertex of the part, (n, 3), and their shares, (n, 3).
 
-    What stands off, a lash's tip, goes with the part's vertex on the skin that is nearest along the part.
+    What stands off, such as a lash's tip, follows the nearest vertex of the part that is on the skin.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
@@ -54,7 +54,7 @@ def roots(face: Face, part: str) -> tuple[Int32, Float64]:
     each = np.arange(len(at))
     hit, place, off = near[each, best], places[each, best], off[each, best]
     share = np.clip(shares(corners[hit], place), 0, 1)
-    # What is nowhere near the skin has its own nearest place there, all the same.
+    # Parts far from the skin are bound to their nearest place on it as well.
     mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
     a, b = np.concatenate([mine[:, [0, 1]], mine[:, [1, 2]], mine[:, [2, 0]]]).T
     grown = np.flatnonzero(off < NEAR)

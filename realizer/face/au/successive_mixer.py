@@ -12,7 +12,7 @@ from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import grown, skin
 from realizer.face.model import Face
 
-LEAST = 1e-5  # m; what a unit moves less is left out of it
+LEAST = 1e-5  # m; smaller movements of a unit are ignored
 # Times what a unit moves the neutral face by: further it moves nothing. Off the skin, where its functions
 # were not fitted, they may grow without bounds.
 FURTHEST = 1.3
@@ -22,7 +22,7 @@ class Succession:
     """The successive mixer (Wojdel 2005, 5.1): each unit moves the places where those before it left them.
 
     A place that none of them has moved is moved as on the neutral face, and how is known beforehand; only
-    where units overlap are their functions evaluated again, at every call.
+    Where units overlap, their functions are evaluated again at every call.
     """
 
     def __init__(self, face: Face, model: Model) -> None:
@@ -70,7 +70,7 @@ class Succession:
 
 
 def _amount(at: Float64, left: float, right: float) -> Float64 | float:
-    """How much of a unit shows at each place: (n, 1), or of both sides alike one number."""
+    """Return the weight of a unit at each place: (n, 1), or one number if both sides are alike."""
     if left == right:
         return left
     return (left * half(at, "L") + right * half(at, "R"))[:, None]

@@ -11,7 +11,7 @@ from realizer.face.model import Face
 from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.au.measure import Measured
 
-OPEN = 0.3  # baked light: what gets less lies inside the head, or is a lip's inner side
+OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 
 
 def measured_units(face: Face, surface: Surface) -> dict[int, Measured]:
@@ -34,7 +34,7 @@ def measured_units(face: Face, surface: Surface) -> dict[int, Measured]:
 
 
 def _mixed(surface: Surface, mixture: dict[str, float]) -> Float64 | None:
-    """The sum of weighted shapes, both sides of each; None where one is missing."""
+    """Return the sum of weighted shapes of both sides, or None if a shape is missing."""
     out = np.zeros_like(surface.vertices)
     for name, weight in mixture.items():
         sides = (name,) if name in surface.moves else (f"{name}Left", f"{name}Right")

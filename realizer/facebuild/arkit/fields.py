@@ -21,7 +21,7 @@ from realizer.facebuild.parts import smooth
 from realizer.tables import faps
 
 FLOOR = 0.35  # of the most on its line: a point that a shape hardly moves does not blow its field up
-TRUE = 0.25  # of its largest move: what a shape has to move a point along a FAP's way to serve it
+TRUE = 0.25  # the least share of its largest move by which a shape must move a point along a FAP's direction
 BLOWN = 0.1  # the same for cheeks: they go forwards more than aside
 # FAP -> its point, its station along the lips (0 right corner .. 4 left), and 1 on the outer contour.
 UPPER = {
@@ -63,7 +63,7 @@ class Grown:
         self.held = np.asarray(smooth(mouth.away, reach, 0.0015))
 
     def move(self, *names: str) -> Float64 | None:
-        """The sum of shapes; None where one is missing."""
+        """Return the sum of shapes, or None if one is missing."""
         if any(name not in self.moves for name in names):
             return None
         return np.asarray(np.sum([self.moves[name] for name in names], axis=0))
@@ -76,7 +76,7 @@ class Grown:
     def without(
         self, move: Float64, fields: Mapping[int, Float64 | None], others: tuple[int, ...]
     ) -> Float64:
-        """A shape less what other FAPs do of it, as their feature points tell."""
+        """Return a shape without the movement of other FAPs, measured at their feature points."""
         for fap in others:
             row = faps()[fap - 1]
             field = fields.get(fap)
@@ -87,7 +87,7 @@ class Grown:
         return move
 
     def exact(self, fap: int, field: Float64, least: float = TRUE) -> Float64 | None:
-        """The field with 1 along the FAP's way at its point; None where it goes another way."""
+        """Return the field scaled to 1 along the FAP at its point, or None if it points elsewhere."""
         row = faps()[fap - 1]
         here = field[self.vertex[row.feature_point]]
         along = float(here @ np.array(WAYS[row.direction]))
@@ -116,7 +116,7 @@ def _upper_lip(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Fl
 
 
 def _lower_lip(grown: Grown) -> dict[int, Float64 | None]:
-    """The lower lip's FAPs: what is the lip's of an opening mouth; the rest is FAP 3's."""
+    """Return the fields of the lower lip: its share of an opening mouth; the rest belongs to FAP 3."""
     move = grown.move("jawOpen")
     if move is None:
         return {}
@@ -243,7 +243,7 @@ def _chin(grown: Grown) -> dict[int, Float64 | None]:
 
 
 def _lids(grown: Grown) -> dict[int, Float64 | None]:
-    """FAPs 19 to 22 from the blink: at every place across the eye the lids together close what is open."""
+    """Return FAPs 19 to 22 from the blink; both lids together close the opening at every place."""
     out: dict[int, Float64 | None] = {}
     for side, top, bottom in ((1, 19, 21), (-1, 20, 22)):
         move = grown.move(f"eyeBlink{WORDS[side]}")

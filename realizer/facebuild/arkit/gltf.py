@@ -1,6 +1,6 @@
 """A reader of GLB and glTF 2.0 files.
 
-Read here and by no library: trimesh leaves morph targets out and pygltflib hands raw bytes, so what a head
+Our own reader: trimesh leaves morph targets out, and pygltflib returns raw bytes, so what a head
 needs (sparse, normalised and strided accessors) would have to be written anyway.
 """
 
@@ -23,7 +23,7 @@ from realizer.core.errors import FaceError
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-# What a file may ask of its reader; the rest changes how surfaces look, or hides the numbers.
+# Required extensions that this reader supports; they change only how surfaces look.
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
 PACKED = {
     "KHR_draco_mesh_compression": "Draco compression",
@@ -36,7 +36,7 @@ class Gltf:
     """A glTF 2.0 file.
 
     Attributes:
-        path: where it came from.
+        path: the file that was read.
         json: the document.
     """
 
@@ -99,12 +99,12 @@ class Gltf:
         return text
 
     def list(self, name: str) -> list[dict[str, Any]]:
-        """One of the document's lists, such as "meshes"; empty where there is none."""
+        """Return one of the document's lists, such as "meshes", or an empty list."""
         found = self.json.get(name, [])
         return found if isinstance(found, list) else []
 
     def item(self, name: str, index: Any) -> dict[str, Any]:
-        """One of the document's things by its index.
+        """Return one of the document's objects by its index.
 
         Raises:
             FaceError: it is not there.
@@ -147,7 +147,7 @@ class Gltf:
         return np.asarray(out)
 
     def _strided(self, view: Any, start: int, kind: str, count: int, width: int, where: str) -> Any:
-        """(count, width) of a buffer view, owned; zeros where there is none."""
+        """Return (count, width) values of a buffer view as a copy, or zeros if there is no view."""
         dtype = np.dtype(kind)
         if view is None:
             return np.zeros((count, width), dtype)
@@ -206,7 +206,7 @@ class Gltf:
             ) from None
 
     def pixels(self, image: Any) -> Any:
-        """(height, width, 4) uint8 sRGB of an image; None where it is of a kind that is not read."""
+        """Return (height, width, 4) uint8 sRGB of an image, or None if its format is not supported."""
         from PIL import Image, UnidentifiedImageError
 
         found = self.item("images", image)

@@ -33,7 +33,7 @@ from realizer.facebuild.person.skin_colours import occlusion
 from realizer.facebuild.submesh import vertex_normals
 from realizer.tables.arkit_names import canonical, nearest, shapes
 
-# Where surfaces shine: skin, hair, wet things. A file's roughness is for other lights.
+# Gloss of surfaces: skin, hair, wet parts. A file's roughness is meant for other lights.
 GLOSS = {
     "skin": 0.16, "brows": 0.05, "lashes": 0.0, "left_eye": 1.0, "right_eye": 1.0, "upper_teeth": 0.75,
     "lower_teeth": 0.75, "tongue": 0.35, "hair": 0.10, "beard": 0.08, "shirt": 0.0, "other": 0.1,
@@ -46,11 +46,11 @@ LINED = ("brows", "lashes", *INSIDE)  # cast no shadow: thin, or behind closed l
 
 @dataclass(frozen=True)
 class Report:
-    """What an import found.
+    """The report of an import.
 
     Attributes:
-        found: what was made of the file; missing: what it lacks, and what does not work without it.
-        unsure: what to look at.
+        found: parts and features that were recognised; missing: those that were not, with the consequences.
+        unsure: guesses to check by eye.
     """
 
     found: tuple[str, ...]
@@ -75,7 +75,7 @@ class _Head:
 
 
 def look_at(path: Path) -> Report:
-    """What `import_head` would find, without writing anything.
+    """Return what `import_head` would report, without writing anything.
 
     Raises:
         FaceError: the file cannot be read, or has no shapes of a face.
@@ -326,7 +326,7 @@ def _jaw(
 
 
 def _dressed(at: Float64, ranges: dict[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
-    """A row with a field of the skin on it; brows and lashes go along, other parts keep what they have."""
+    """Return a row with a field on the skin; brows and lashes follow it, other parts keep their own."""
     from scipy.spatial import cKDTree
 
     first, last = ranges["skin"]

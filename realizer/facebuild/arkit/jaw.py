@@ -11,7 +11,7 @@ FAR = 0.7  # distances between the eyes; a joint farther than that from where jo
 
 
 def joint_of(at: Float64, move: Float64, usual: Float64, eyes: float) -> tuple[Float64, bool]:
-    """Where a jaw turns about, (3,) metres, told by what a shape of the opening jaw moves most.
+    """Return the axis of the jaw (3,) in metres, found from what a jaw-opening shape moves most.
 
     A turn about +x by a moves y and z by A (p - c), A = [[cos a - 1, -sin a], [sin a, cos a - 1]]: two
     numbers and a shift, which least squares find.
@@ -21,7 +21,7 @@ def joint_of(at: Float64, move: Float64, usual: Float64, eyes: float) -> tuple[F
         usual: (3,) the joint by proportions; eyes: metres between the eyes.
 
     Returns:
-        The joint, and whether the shape told it; else it is `usual`.
+        The joint, and whether it was found from the shape; if not, it is `usual`.
     """
     size = np.linalg.norm(move, axis=1)
     if size.max() < 1e-6:

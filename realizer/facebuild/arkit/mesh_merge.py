@@ -36,7 +36,7 @@ class Surface:
     moves: Mapping[str, Float64]
 
     def move(self, name: str) -> Float64:
-        """(n, 3) what a shape does; zeros where the head lacks it."""
+        """Return the displacement (n, 3) of a shape, or zeros if the head lacks it."""
         return self.moves.get(name, np.zeros_like(self.vertices))
 
     def chosen(self, vertices: Any) -> Surface:
@@ -103,7 +103,7 @@ def _welded(surface: Surface) -> Surface:
         textured=surface.textured[first],
         moves={name: move[first] for name, move in surface.moves.items()},
     )
-    # What no triangle has is nothing to see.
+    # Vertices without a triangle are invisible.
     return whole.chosen(np.unique(corners))
 
 
@@ -118,7 +118,7 @@ def components(triangles: Int32, n: int) -> Int32:
 
 
 def cut(surface: Surface, height: Float64) -> Surface:
-    """What lies where `height` (n,) is above zero, cut along the line of zeros."""
+    """Return the surface where `height` (n,) is above zero, cut along the line of zeros."""
     if (height > 0).all():
         return surface
     import scipy.sparse as sp

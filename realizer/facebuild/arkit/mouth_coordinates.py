@@ -23,7 +23,7 @@ BLUR = 12  # times; elsewhere the border between above and below is soft
 
 @dataclass(frozen=True, eq=False)
 class Mouth:
-    """Where each vertex of the skin stands with respect to the lips.
+    """The position of each vertex of the skin relative to the lips.
 
     Attributes:
         knots: (5, n) how much each station along the lips has to say, right corner to left; they add to 1.

@@ -15,23 +15,23 @@ from realizer.facebuild.arkit.mesh_merge import Surface
 UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001, "inches": 0.0254}
 EYES = (0.048, 0.078)  # m between the eyes of people from six years on
 USUAL = 0.062  # m
-SNAP = np.cos(np.radians(20))  # a head this near to the file's axes stands along them
+SNAP = np.cos(np.radians(20))  # a head this close to the file's axes is aligned with them
 UPPER = ("brow", "eye")
 LOWER = ("mouth",)
-# Where the blink is missing, the next shape of the eyes will do.
+# Without a blink, another shape of the eyes is used.
 AT_EYES = ("eyeBlink", "eyeSquint", "eyeWide", "cheekSquint", "browDown", "browOuterUp", "mouthSmile")
 
 
 @dataclass(frozen=True)
 class Pose:
-    """How a file's head is brought into the face folder's frame.
+    """The transformation of a file's head into the face folder's frame.
 
     Attributes:
         turn: (3, 3) rotation of the file's directions; scale: metres of the file's unit; middle: (3,) in
             the file's frame, between the eyes.
         unit: the name of the file's unit; "" where none fits.
         swapped: its left shapes move the character's right side.
-        words: what was found; unsure: what to look at.
+        words: how it was found; unsure: guesses to check by eye.
     """
 
     turn: Float64
@@ -44,7 +44,7 @@ class Pose:
 
 
 def pose_of(surface: Surface) -> Pose:
-    """Told from the shapes' left and right, their eyes and mouth, and the side that the face is on.
+    """Return the orientation, found from left and right shapes, eyes, mouth and the side of the face.
 
     Raises:
         FaceError: no shape moves anything that has a side.
@@ -128,7 +128,7 @@ def _turn(
     y = up - (up @ x) * x
     y /= np.linalg.norm(y)
     z = np.cross(x, y)
-    # A face is on the front of its head: what moves lies before the middle of what is level with it.
+    # The face is on the front of the head: moving vertices lie before the middle of their level.
     face = np.mean(list(centres.values()), axis=0)
     level = np.abs((surface.vertices - face) @ y) < 1.5 * float(np.linalg.norm(up))
     middle = (surface.vertices[level].min(axis=0) + surface.vertices[level].max(axis=0)) / 2
@@ -137,7 +137,7 @@ def _turn(
 
 
 def _snapped(turn: Float64) -> Float64 | None:
-    """The nearest of the 24 turns along the axes, or None where it is far."""
+    """Return the nearest of the 24 axis-aligned rotations, or None if it is far."""
     best = max(
         (
             np.array(

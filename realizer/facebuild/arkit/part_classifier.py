@@ -34,7 +34,7 @@ class Sorted:
     Attributes:
         parts: name -> (k,) vertices, in the order that the face folder keeps them.
         painted: the eyes are no balls of their own; they are part of the skin's mesh.
-        words: what was found; unsure: what to look at.
+        words: how parts were found; unsure: guesses to check by eye.
     """
 
     parts: dict[str, Any]
@@ -55,7 +55,7 @@ def _rules() -> tuple[_Rule, ...]:
 
 
 def part_of(names: tuple[str, ...]) -> str:
-    """What the names of a material, a mesh and a node say; "" where they say nothing.
+    """Return the part that the names of a material, a mesh and a node suggest, or "".
 
     A name that says skin is a last resort: whole heads are called so, with all that is in them.
     """
@@ -69,7 +69,7 @@ def part_of(names: tuple[str, ...]) -> str:
 
 
 def sort_parts(surface: Surface) -> Sorted:
-    """The parts of a head that stands upright in metres, its origin between the eyes.
+    """Return the parts of an upright head in metres with its origin between the eyes.
 
     Raises:
         FaceError: no skin that the shapes move, or no eyes.
@@ -87,7 +87,7 @@ def sort_parts(surface: Surface) -> Sorted:
     main = int(np.argmax(moved))
     for k in range(label.max() + 1):
         mine = np.flatnonzero(label == k)
-        # Where one piece of surface has several materials, the word of most of it counts.
+        # A piece with several materials takes the part of most of its surface.
         votes = np.bincount([names.index(said[p]) for p in surface.piece[mine]], minlength=len(names))
         part = names[int(np.argmax(votes))]
         if part in ("", "skin"):
@@ -119,7 +119,7 @@ def sort_parts(surface: Surface) -> Sorted:
 
 
 def _by_shape(surface: Surface, mine: Any, said: str) -> str:
-    """What a piece without a telling name is."""
+    """Return the part of a piece whose names say nothing."""
     at = surface.vertices[mine]
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     if is_ball(at) and abs(middle[1]) < AT_EYE and 0.015 < abs(middle[0]) < 0.055 and middle[2] > -0.05:
@@ -136,7 +136,7 @@ def _by_shape(surface: Surface, mine: Any, said: str) -> str:
 
 
 def is_ball(at: Float64) -> bool:
-    """Whether vertices (n, 3), metres, lie on the best part of a ball of an eye's size."""
+    """Return whether vertices (n, 3) in metres lie on most of a ball of an eye's size."""
     if len(at) < 12:
         return False
     centre, radius = ball_of(at)
@@ -158,7 +158,7 @@ def ball_of(at: Float64) -> tuple[Float64, float]:
 
 
 def _place(surface: Surface, word: str) -> Float64 | None:
-    """Where the shapes of that word move most."""
+    """Return the vertices that the shapes with that word move most."""
     moves = [move for name, move in surface.moves.items() if name.startswith(word) and move.any()]
     if not moves:
         return None
@@ -203,7 +203,7 @@ def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
         mean = np.bincount(labels, drop) / np.bincount(labels)
         lower: Bool = mean[labels] > 0.5 * drop.max()
         return mine[~lower], mine[lower], []
-    # The file's jaw is a bone or stands still: the names say, or else the height.
+    # The jaw of a file may be a bone, or fixed: names decide, then height.
     names = [" ".join(names).lower() for names in surface.names]
     low = np.array([bool(re.search(r"lower|bottom|_lo", name)) for name in names])[surface.piece[mine]]
     if low.any() and not low.all():

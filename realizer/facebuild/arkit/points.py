@@ -29,15 +29,15 @@ def points_of(
 ) -> tuple[dict[str, Point], tuple[str, ...]]:
     """The feature points, and those that are guesses.
 
-    The form tells most (`mpeg4.find_points`); where the lips meet and where the lids' edges are, the shapes
-    tell better: what is lifted with the upper lip is upper lip, however close the lower one lies.
+    The form decides most points (`mpeg4.find_points`); where the lips meet and at the edges of the lids the
+    shapes decide: what moves with the upper lip is upper lip, however close the lower one lies.
 
     Raises:
         FaceError: the eyes do not stand side by side.
     """
     at, parts = surface.vertices, dict(ranges)
     if painted:
-        # Eyes that are part of the skin are no balls to measure by: let there be some behind them.
+        # Eyes that are part of the skin cannot be measured as balls: assume balls behind them.
         for name in PUPILS:
             centre, radius = behind(surface.vertices[slice(*ranges[name])])
             parts[name] = (len(at), len(at) + len(SPHERE))
@@ -57,7 +57,7 @@ def points_of(
 
 
 def _size(surface: Surface, *names: str) -> Any:
-    """(n,) metres that shapes move a vertex; None where one is missing."""
+    """Return how far shapes move each vertex, (n,) metres, or None if a shape is missing."""
     if any(name not in surface.moves for name in names):
         return None
     return np.linalg.norm(np.sum([surface.moves[name] for name in names], axis=0), axis=1)
@@ -95,7 +95,7 @@ def _slit(skin: Surface, points: Mapping[str, Point], first: int) -> dict[str, i
 
 
 def _lids(skin: Surface, points: Mapping[str, Point], first: int) -> dict[str, int]:
-    """The lids' edges above and below the pupil: what a blink moves most, and what that meets."""
+    """Return the edges of the lids above and below the pupil, found from the blink."""
     out: dict[str, int] = {}
     ups = vertex_normals(skin.vertices, skin.triangles)
     for word, top, bottom, pupil in (("Left", "3.1", "3.3", "3.5"), ("Right", "3.2", "3.4", "3.6")):

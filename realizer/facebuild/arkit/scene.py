@@ -14,12 +14,12 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.gltf import Gltf
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-THIN = 0.35  # alpha; what lets more through is glass: a cornea, a tear line
+THIN = 0.35  # alpha below this is glass: a cornea, a tear line
 
 
 @dataclass(eq=False)
 class Piece:
-    """A primitive as it stands in the scene.
+    """A primitive in scene coordinates.
 
     Attributes:
         names: of its material, mesh and node, in that order; "" where one has none.
@@ -184,7 +184,7 @@ def _target_names(gltf: Gltf, mesh: dict[str, Any], primitive: dict[str, Any]) -
 def _skinned(
     gltf: Gltf, node: dict[str, Any], attributes: dict[str, Any], worlds: dict[int, Float64], n: int
 ) -> Any:
-    """(n, 4, 4) where the skeleton puts each vertex in the pose of the file; None without a skeleton."""
+    """Return the skinning matrix (n, 4, 4) of each vertex in the file's pose, or None without a skeleton."""
     if "skin" not in node or "JOINTS_0" not in attributes or "WEIGHTS_0" not in attributes:
         return None
     skin = gltf.item("skins", node["skin"])

@@ -20,10 +20,10 @@ from realizer.tables import action_units
 
 FORMS = ("published", "extended")  # one or two Gaussians; up to four
 MOVES = 0.01  # of the largest move: what moves less does not count as displaced
-NEAR = 0.01  # m around what is displaced; further off, one point in FAR shows whether anything leaks
+NEAR = 0.01  # m around displaced points; farther away, one point in FAR shows leaks
 FAR = 4
 THIN = 3  # one in so many of the points that do not count
-HIDDEN = 0.1  # weight of what nobody sees
+HIDDEN = 0.1  # weight of hidden points
 AWAY = 0.14  # m from the middle of the eyes down to where no face moves
 
 
@@ -58,8 +58,8 @@ def fit_models(
 
     Args:
         forms: of "published" (one or two Gaussians) and "extended" (up to four).
-        say: told of each action unit when it is done.
-        source: what was measured, for the models' heads.
+        say: called with each action unit when it is fitted.
+        source: the source of the measurements, for the models' headers.
 
     Returns:
         A model of each form.
@@ -147,13 +147,13 @@ def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
 
 
 def _fit_unit(one: Measured, mouth: Mouth, places: Watched, forms: Sequence[str]) -> dict[str, UnitModel]:
-    # Her units are even: what was measured on one side holds for the other, so all of it is laid on the left.
+    # Her units are symmetric: a measurement of one side holds for the other, so both are folded to the left.
     flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     at, moves = one.at * flip, one.moves * flip
     long = np.linalg.norm(moves, axis=1)
     size = _d_max(one)
     weight = np.where(one.seen, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
-    # A point in the middle stands for itself alone, any other for its twin too.
+    # A point in the middle counts once, any other one also for its mirror image.
     weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
     halves = {"whole": weight}
     if units()[one.au].split:
@@ -177,7 +177,7 @@ def _fit_motion(
         return dict.fromkeys(forms, Motion(np.zeros(3), bell, still, still))
     low, high = at[moved].min(axis=0) - NEAR, at[moved].max(axis=0) + NEAR
     near = here & ((at > low) & (at < high)).all(axis=1)
-    # What does not count in the table is there to keep the functions tame: a part of it does.
+    # Points outside the table keep the functions tame: a part of them is enough.
     tells = moved & (weight >= STILL)
     near = np.flatnonzero(near & ~tells)[::THIN]
     far = np.flatnonzero(here & (at[:, 1] > -AWAY) & ~((at > low) & (at < high)).all(axis=1))[::FAR]
@@ -222,7 +222,7 @@ def _jaw(face: Face) -> tuple[float, float, float]:
 
 
 def _jaw_degrees(face: Face, unit: UnitModel, mouth: Mouth, jaw: tuple[float, float, float]) -> float:
-    """How far the jaw bone turns so that the chin goes where the unit takes it."""
+    """Return the jaw's rotation that moves the chin as far as the unit moves it."""
     chin = np.asarray(face.points["2.1"], np.float64)
     there = chin + unit.displacement(chin[None], mouth)[0]
     arms = [place[1:] - np.array(jaw[1:]) for place in (chin, there)]

@@ -21,12 +21,12 @@ from realizer.facebuild.au.measure import Measured
 PARTS = ("skin", "lashes", "brows", "hair")  # what units move
 FURTHEST = 1.3  # times d_max: further no vertex goes
 FREE = 1.1  # times d_max; up to here a fit pays nothing,
-STEEP = 10.0  # and from here on this times what it overshoots, squared
+STEEP = 10.0  # and beyond it the excess squared, times this
 REACH = 1e-3  # share of a half that counts as belonging to it
 
 
 class Watched:
-    """Places of a face where a fit is held.
+    """The places of a face at which a fit is limited.
 
     Attributes:
         at: (n, 3) metres, all on the left (x >= 0).
@@ -68,7 +68,7 @@ def watched(face: Face, mouth: Mouth, between: bool = False) -> Watched:
 
 
 def furthest(unit: UnitModel, mouth: Mouth, places: Watched) -> tuple[float, Float64]:
-    """How far, in metres, a unit moves the place that it moves most, and which that is, (3,)."""
+    """Return the largest displacement of a unit in metres, and its place (3,)."""
     both = [unit.displacement(places.at, mouth, upper) for upper in (places.upper, places.plane)]
     long = np.maximum(*(np.linalg.norm(moves, axis=1) for moves in both))
     worst = int(np.argmax(long))
@@ -76,7 +76,7 @@ def furthest(unit: UnitModel, mouth: Mouth, places: Watched) -> tuple[float, Flo
 
 
 def overshoot(gaussians: Float64, at: Float64) -> tuple[Float64, Float64]:
-    """What a density costs by going too far: residuals (k,), and their derivatives (k, parameters).
+    """Return the cost of a density's excess: residuals (k,) and their derivatives (k, parameters).
 
     Args:
         gaussians: (g, 10), heights in d_max.

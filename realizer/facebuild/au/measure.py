@@ -28,7 +28,7 @@ class Measured:
         au: its number.
         at: (n, 3) metres, the landmarks on the neutral face.
         moves: (n, 3) metres, where each goes.
-        seen: (n,) whether one can see it: what is hidden counts little in a fit and not in its table.
+        seen: (n,) visibility: hidden points count little in a fit and are left out of its table.
         upper: (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
     """
 

@@ -21,11 +21,11 @@ from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-OPEN = 0.3  # baked light: what gets less lies inside the head, or is a lip's inner side
+OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 COLLAR = -0.16  # m; below it no face moves
 EVEN = np.array([-1.0, 1.0, 1.0])
-OFF = 5e-4  # m; the builder puts no vertex further off the base mesh, where it cuts and where it adds some
-AROUND = 32  # triangles looked at, those whose middles are nearest
+OFF = 5e-4  # m; added and cut vertices lie no farther than this off the base mesh
+AROUND = 32  # number of nearest triangles to look at
 
 
 def measure_shapes(
@@ -74,9 +74,9 @@ def measure_shapes(
 
 
 def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Float64]:
-    """Where vertices of the skin lie on the base mesh.
+    """Return the position of skin vertices on the base mesh.
 
-    Where lips or lids touch, a vertex belongs to the surface that looks the same way as it does.
+    Where lips or lids touch, a vertex belongs to the surface whose normal agrees with its own.
 
     Args:
         index: (n,) places in the skin.

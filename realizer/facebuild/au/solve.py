@@ -12,13 +12,13 @@ from realizer.core.array_types import Float64
 from realizer.face.au.functions import ANGLE, GAUSSIAN, angle, density, direction
 from realizer.facebuild.au.fit_limits import overshoot
 
-STILL = 0.35  # weight of a point that does not move: leaks count, but less than what is seen to move
+STILL = 0.35  # weight of points that do not move: leaks count, but less than visible movement
 SOFT = 0.004  # of the largest move; a miss below it counts by its square, so that the cost has a slope at 0
-# Pull towards the start: too weak to change a fit to many points, it keeps what they do not decide from
+# Regularisation towards the start: too weak to change a fit to many points, it decides what they leave open
 # running away; of few landmarks more is undecided.
 CALM, FEW = 1e-3, 5.0
-TINY = 1e-6  # of what is made least: what a step gains less is not worth taking
-# How often the weights of a sum of lengths are renewed: in the direction's cost, and in the joint one.
+TINY = 1e-6  # smallest worthwhile gain of a step, as a share of the cost
+# Number of reweighting rounds for sums of lengths, in the direction's cost and in the joint one.
 ROUNDS = (4, 8)
 
 
@@ -34,7 +34,7 @@ class Free:
 
 
 def mirrored_angles() -> tuple[Free, Free]:
-    """Alpha is a right angle plus what is odd in x, beta is even in x: both sides move as mirror images."""
+    """Mirror symmetric angles: alpha is a right angle plus an odd function of x, beta is even in x."""
     alpha = np.zeros((ANGLE, 7))
     start = np.zeros(ANGLE)
     for column, row in enumerate((0, 1, 2, 5, 12, 13, 15)):  # xx, yy, zz, yz times x; xy, xz; x
@@ -47,7 +47,7 @@ def mirrored_angles() -> tuple[Free, Free]:
 
 
 def mirrored_gaussians(layout: str) -> Free:
-    """`p` is a pair, one on each side; `c` lies in the middle: "pc" are three Gaussians."""
+    """Kinds of Gaussians: `p` is a pair, one a side; `c` is central: "pc" are three Gaussians."""
     blocks = []
     for kind in layout:
         if kind == "p":
@@ -72,7 +72,7 @@ WIDE = (0.6, 1.4)  # cm; how wide a Gaussian that is added begins
 
 @dataclass(frozen=True)
 class Found:
-    """What a fit found: a layout, free parameters of its Gaussians and of the angles; what it costs."""
+    """The result of a fit: layout, free parameters of its Gaussians and angles, and its cost."""
 
     layout: str
     bells: Float64
@@ -116,7 +116,7 @@ def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, ev
     damping, growth = 1e-3, 2.0
     for _ in range(evaluations):
         step = np.linalg.solve(square + np.diag(damping * scale), -slope)
-        # What is promised: half the fall of the square model.
+        # The predicted gain: half the decrease of the quadratic model.
         promised = float(step @ (damping * scale * step - slope))
         if promised <= TINY * cost:
             break
@@ -296,7 +296,7 @@ class Fit:
         )
 
     def _bells(self, layout: str) -> Iterator[float]:
-        """Where the Gaussians start: over the moves' centre of gravity, each next one narrower."""
+        """Return the starting Gaussians: centred on the moves, each narrower than the one before."""
         share = self.weight * self.length**2
         share = share / share.sum()
         middle = share @ self.at

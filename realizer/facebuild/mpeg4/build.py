@@ -37,12 +37,12 @@ SOFTENED = 1  # times
 def copy_with_zones(
     source: Path, folder: Path, parameters: Path | None = None, only: Collection[int] = ()
 ) -> tuple[Setup, tuple[str, ...]]:
-    """Another face of the same head, moved by zones; where it has no features.csv its points are found.
+    """Build another face of the same head, moved by zones; missing feature points are located.
 
     Args:
-        source: a face folder; folder: the new one, whose name is the face's.
+        source: a face folder; folder: the new one, whose name becomes the face's.
         parameters: a file of zones, TOML or FaceEditor's XML, which is moved and sized to the face's feature
-            points; None for what `setup_of` says.
+            points; None for the result of `setup_of`.
         only: as for `apply_zones`.
 
     Returns:
@@ -96,7 +96,7 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
 
     Args:
         folder: has face.toml, mesh.npz and features.csv; fields.npz too where only some FAPs are changed.
-        only: FAPs whose fields are replaced; the others keep theirs. Empty: everything is made anew, also
+        only: FAPs whose fields are replaced; the others stay. If empty, all fields are built anew, also
             the jaw, the tongue, the eyeballs, the pupils and the neck.
 
     Raises:
@@ -170,7 +170,7 @@ def _softened(
 ) -> dict[int, Float64]:
     """The fields with their kinks taken off: half a vertex's own move, half the mean of its neighbours'.
 
-    Feature points keep theirs, so that they still go as far as they are asked.
+    Feature points keep their full movement, so that they still follow their FAPs.
     """
     import scipy.sparse as sp
 

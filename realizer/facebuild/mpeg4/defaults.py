@@ -15,7 +15,7 @@ from realizer.core.errors import FaceError
 from realizer.facebuild.mpeg4.zones import Falloff, Setup, Triple, Zone
 from realizer.tables import faps, read_csv
 
-# What stands on one side of the slit between lips or lids, and what on the other.
+# The FAPs on one side of the slit between lips or lids, and those on the other.
 SLITS = {
     "upper_lip": (("8.1", "8.5", "8.6", "2.2", "2.6", "2.7"), ("8.2", "8.7", "8.8", "2.3", "2.8", "2.9")),
     "upper_lid_left": (("3.1", "3.13"), ("3.3", "3.9")),

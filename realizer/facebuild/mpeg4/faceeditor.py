@@ -96,7 +96,7 @@ def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
     """Write a FaceEditor file.
 
     Returns:
-        What the format cannot say, one sentence each.
+        What the format cannot express, a sentence each.
     """
     from xml.sax.saxutils import quoteattr
 

@@ -6,12 +6,12 @@ from functools import cache
 
 from realizer.tables import au_to_fap, faps
 
-# Where no action unit asks for a FAP: what faces reach, in its own unit.
+# Limits of FAPs that no action unit uses: what faces can reach, in the FAP's own unit.
 REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "angle_unit": 20000.0}
 EYEBALLS_OUT = 30.0  # ES: 2 mm
 PUPIL = 150.0  # IRISD: 1.5 mm wider or narrower; half an iris would shut a pupil
 OPEN_JAW = 3
-ROLLED = -0.5  # cosine of a third of a turn: as far as lips may roll where all of an action unit is asked for
+ROLLED = -0.5  # cosine of a third of a turn: how far lips may roll at full intensity
 ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what goes down with it: the lower lip and the corners
 
 
@@ -30,7 +30,7 @@ def usual(fap: int, sign: int) -> float:
 
 @cache
 def borne(fap: int, sign: int) -> float:
-    """The most that a face must bear of a FAP alone: what is usual, and no less than faces reach."""
+    """Return the largest value that a face must support: the usual maximum, at least what faces reach."""
     row = faps()[fap - 1]
     most = row.most if sign > 0 else -row.least
     return max(usual(fap, sign), min(_reached(fap), float(most)))
@@ -38,7 +38,7 @@ def borne(fap: int, sign: int) -> float:
 
 @cache
 def company(fap: int, sign: int) -> dict[int, float]:
-    """What the action unit that asks most of a FAP in a direction asks of all FAPs; empty where none does."""
+    """Return the FAPs of the action unit that uses one FAP most in a direction, or an empty mapping."""
     strongest = max(_units(), key=lambda au: sign * _units()[au].get(fap, 0.0))
     whole = _units()[strongest]
     return dict(whole) if sign * whole.get(fap, 0.0) > 0 else {}
@@ -58,7 +58,7 @@ def _asked(fap: int, sign: int, au: str) -> float:
 
 @cache
 def _units() -> dict[str, dict[int, float]]:
-    """Action unit -> FAP -> what it asks for at intensity 1, both sides."""
+    """Return action unit -> FAP -> value at intensity 1, both sides."""
     out: dict[str, dict[int, float]] = {}
     for row in au_to_fap():
         mine = out.setdefault(str(row.au), {})

@@ -15,7 +15,7 @@ from realizer.facebuild.mpeg4.fap_limits import ROLLED, company, usual
 from realizer.facebuild.mpeg4.measure import Measure, error_of, flips_of, mirror_of, others_of, rough_of
 from realizer.tables import Fap, faps, read_csv
 
-# What Paul 2010 (tables 4.5) gives other faces, those FAPs counted 0 that they lack.
+# The scores of other faces (Paul 2010, tables 4.5), with FAPs that they lack counted as 0.
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 
 HALF, TURN = 512.0, 20000.0  # FAPU, angle units: half a face distance is what Paul looked at
@@ -28,7 +28,7 @@ KNOWN = 0.75
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What one FAP does in one direction, as shares of what was asked.
+    """The measures of one FAP in one direction, as shares of the requested movement.
 
     Attributes:
         fap, name, sign, weight: which, +1 or -1, and how much it matters (Paul's w).
@@ -99,7 +99,7 @@ def _truth(measure: Measure, row: Fap, sign: int) -> Truth:
     half = TURN if row.unit == "angle_unit" else min(HALF, row.most if sign > 0 else -row.least)
     half = top if row.direction == "growing" else half
     value = sign * half
-    # Both what Paul looked at and what is usual have to be right.
+    # Both the range that Paul judged and the usual range must be right.
     asked = [value] + ([sign * top] if top < half else [])
     moves = [measure.moves({row.fap: v}) for v in asked]
     return Truth(

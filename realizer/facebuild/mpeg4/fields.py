@@ -86,7 +86,7 @@ def _shared(
     open_: Mapping[int, Float64],
     alone: Mapping[int, Float64],
 ) -> dict[int, Float64]:
-    """The influence of each zone after neighbours have shared what they both move."""
+    """Return the influence of each zone after overlapping neighbours have shared it."""
     links = [pair for pair in _pairs() if pair.one in setup.zones and pair.other in setup.zones]
     near: dict[int, set[int]] = {fap: set() for fap in setup.zones}
     for pair in links:
@@ -100,7 +100,7 @@ def _shared(
                 envelope = np.maximum(
                     envelope, _between(setup, pair, at) * open_[pair.one] * open_[pair.other]
                 )
-        # What is near a point belongs to it; zones farther than twice their radius have no say.
+        # Vertices near a point belong to its zone; zones farther than twice their radius have no influence.
         say = {
             fap: open_[fap]
             * np.clip(2 - distance[fap], 0, None) ** 2
@@ -114,7 +114,7 @@ def _shared(
 
 
 def _between(setup: Setup, pair: _Pair, at: Float64) -> Float64:
-    """Influence around the straight line between two neighbours' points, whose radii blend on the way."""
+    """Return the influence around the line between two neighbours' points, with interpolated radii."""
     one, other = setup.zones[pair.one], setup.zones[pair.other]
     a, b = _middle(setup, one), _middle(setup, other)
     along = b - a

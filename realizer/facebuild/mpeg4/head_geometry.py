@@ -32,7 +32,7 @@ class Head:
 
 
 def evidence(head: Head) -> dict[str, Float64]:
-    """Name of an anchor -> (3,) place; only what was found."""
+    """Return anchor name -> place (3,), for the anchors that were found."""
     found = _profile(head)
     for side, centre in (("l", head.left), ("r", head.right)):
         found |= {f"{side}_{name}": place for name, place in _opening(head, centre, side).items()}
@@ -78,7 +78,7 @@ def _profile(head: Head) -> dict[str, Float64]:
         return out
     tip = int(nose[np.argmax(front[nose])])
     out["tip"] = place(tip)
-    # Between the brows and the tip the bridge lies deepest.
+    # Between the brows and the tip, the bridge is the deepest point.
     bridge = np.flatnonzero((heights > heights[tip] + 0.1) & (heights < 0.4) & np.isfinite(front))
     if len(bridge):
         out["bridge"] = place(int(bridge[np.argmin(front[bridge])]))
@@ -104,7 +104,7 @@ def _profile(head: Head) -> dict[str, Float64]:
     first = heights[below[lower if chin is None else chin]] - (0.25 if chin is None else 0)
     under = [int(k) for k in below if first - 0.35 < heights[k] <= first]
     if under:
-        # Where the chin turns under: the farthest down and forwards.
+        # The chin's underside begins farthest down and forwards.
         out["under"] = place(max(under, key=lambda k: 0.5 * front[k] - 0.5 * heights[k]))
     return out
 
@@ -194,7 +194,7 @@ def _corners(head: Head, found: dict[str, Float64]) -> dict[str, Float64]:
     out = {}
     for name, sign in (("l_corner", 1), ("r_corner", -1)):
         mine = outer[at[outer, 0] * sign > 0] if len(outer) else outer
-        # Of those that touch, the mouth's edge lies in front.
+        # Of touching points, the edge of the mouth is in front.
         mine = mine[at[mine, 2] > slit[2] - 0.30] if len(mine) else mine
         if len(mine):
             ends = mine[np.argsort(-at[mine, 0] * sign)[:3]]

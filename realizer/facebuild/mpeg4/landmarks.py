@@ -26,7 +26,7 @@ OFF = 0.06  # eye distances; so is one that had to go this far to the skin
 TEETH = {"9.8": ("upper_teeth", 1), "9.10": ("upper_teeth", -1), "9.11": ("lower_teeth", 1),
          "9.9": ("lower_teeth", -1)}  # fmt: skip
 PUPILS = {"3.5": "left_eye", "3.6": "right_eye"}
-# The lips touch: on which side of the slit a point lies is told by where the skin looks.
+# The lips touch: the skin's normal shows on which side of the slit a point lies.
 FACING = {"2.2": -1, "2.6": -1, "2.7": -1, "2.3": 1, "2.8": 1, "2.9": 1}
 ROUND = ("10.", "11.")  # ears, hair and skull have few places of their own: always a guess
 CORNER_POINTS = {"2.4", "2.5", "8.3", "8.4"}

@@ -150,7 +150,7 @@ def _grown(face: Face, row: Fap, moves: Float64) -> float:
 
 
 def others_of(measure: Measure, row: Fap, asked: list[float], moves: list[Float64]) -> float:
-    """The largest move of points that must stay, of what was asked."""
+    """Return the largest movement of points that must not move, as a share of the requested one."""
     point = row.feature_point
     if row.name == "open_jaw":
         still: tuple[str, ...] = (*UPPER, *LOWER, *CORNERS)

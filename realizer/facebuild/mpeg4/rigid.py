@@ -18,17 +18,17 @@ LIP_POINTS = (
     "2.4", "2.8", "2.3", "2.9", "2.5", "2.7", "2.2", "2.6", "2.4",
     "8.3", "8.7", "8.2", "8.8", "8.4", "8.6", "8.1", "8.5", "8.3",
 )  # fmt: skip
-# The joint lies before and above the ear lobe: shares of the eyes' distance, behind and below them.
+# The joint lies above and in front of the ear lobe: shares of the distance between the eyes.
 JOINT = (0.0, -0.51, -0.87)
 # The head's turn fades out below the jaw, along a plane that tilts with it: shares of the eyes' distance.
 NECK_TILT, NECK_TOP, NECK_END = 0.30, -0.27, -1.55
-PUPIL = 0.0020  # m, where no dark vertices show where it ends
+PUPIL = 0.0020  # m, if no dark vertices show the pupil's edge
 OVER_BALL = 0.0022  # m; lids lie at most that far from the ball
 TONGUE_MOVES = ("lower_teeth", "tongue")
 
 
 def jaw_pivot(points: Mapping[str, Triple]) -> Float64:
-    """Where the jaw turns about, (3,) metres."""
+    """Return the axis of the jaw, (3,) metres."""
     left, right = np.array(points["3.5"]), np.array(points["3.6"])
     eyes = (left + right) / 2
     return np.asarray(
@@ -115,7 +115,7 @@ def _to_lips(at: Float64, place: Mapping[str, Float64]) -> tuple[Float64, Float6
 
 
 def tongue_rows(at: Float64, points: Mapping[str, Triple], parts: Parts) -> dict[int, Float64]:
-    """Rows of FAPs 43 to 46 and of the tongue's roll; empty where there is no tongue."""
+    """Return the rows of FAPs 43 to 46 and of the tongue's roll; empty without a tongue."""
     if "tongue" not in parts:
         return {}
     mine = slice(*parts["tongue"])
@@ -154,7 +154,7 @@ def balls(at: Float64, parts: Parts) -> list[tuple[Float64, float]]:
 def pupil_rows(
     at: Float64, colours: Any, parts: Parts, eyes: list[tuple[Float64, float]]
 ) -> dict[int, Float64]:
-    """Rows of FAPs 29 and 30: the black of the eye grows by a metre across for each metre asked."""
+    """Return the rows of FAPs 29 and 30: the pupil grows by a metre in diameter per metre of FAP."""
     out = {}
     for fap, name, (centre, _) in zip((29, 30), ("left_eye", "right_eye"), eyes, strict=True):
         mine = slice(*parts[name])

@@ -21,7 +21,7 @@ MIRROR = np.array([-1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """Where and how much a FAP's feature point takes its surroundings along (Paul 2010, 4.3.3).
+    """The zone of influence of a FAP's feature point (Paul 2010, 4.3.3).
 
     Attributes:
         fap: its number.
@@ -29,7 +29,7 @@ class Zone:
         size: metres, the radius; scale multiplies it along x, y and z.
         ease: -100..100, for "ease"; smooth_centre, smooth_side: 0..1, for "smooth".
         use_mask: only vertices of the FAP's mask move; invert_mask: only those outside it.
-        slide: metres forwards for each metre along the FAP's way: skin that slides over what is round.
+        slide: metres forwards per metre along the FAP's direction, for skin that slides over a curve.
         radial: 0..1, how much of the move goes away from `pivot` instead of the FAP's way.
         pivot: (x, y, z) metres, for radial.
     """
@@ -81,21 +81,21 @@ class Zone:
         return falloff.cosine(distance) if self.falloff == "cosine" else falloff.linear(distance)
 
     def mirrored(self, fap: int) -> Zone:
-        """The same zone for the FAP of the other side."""
+        """Return the mirrored zone, for the FAP of the other side."""
         x, y, z = self.pivot
         return replace(self, fap=fap, pivot=(-x if x else x, y, z))
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """All parameters of one head.
+    """The parameters of one head's deformer.
 
     Attributes:
         points: feature point -> (x, y, z) metres, the middles of the zones.
         zones: FAP -> zone; a FAP without one is not the deformer's.
         masks: FAP -> (k,) vertices that move, ascending.
-        synced: FAPs whose zone the other side shares.
-        joined: neighbours whose zones overlap share what they both move, so that equal FAPs make no w.
+        synced: FAPs that share their zone with the other side.
+        joined: whether overlapping neighbours share their influence, so that equal FAPs move a lip evenly.
         whole: FAPs that are listed without a zone: their part moves as a whole.
     """
 

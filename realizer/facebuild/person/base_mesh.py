@@ -18,7 +18,7 @@ UP, LEFT, FORWARD = np.array([0, 1.0, 0]), np.array([1.0, 0, 0]), np.array([0, 0
 
 
 class Ground:
-    """What all fields are made from.
+    """The data from which all fields are made.
 
     Attributes:
         at: (n, 3) metres, the base mesh with its identity.
@@ -41,7 +41,7 @@ class Ground:
         self.body[np.unique(quads)] = True
 
     def point(self, name: str) -> Float64:
-        """Where a feature point lies, (3,) metres."""
+        """Return the place of a feature point, (3,) metres."""
         return np.asarray(self.at[self.points[name]])
 
     def fapu(self) -> Fapu:

@@ -101,7 +101,7 @@ def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[
 
 
 def _spared(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
-    """What is hidden or plain goes; feature points, lips and the mouth behind them stay."""
+    """Decimate hidden and plain surface; feature points, lips and the mouth behind them stay."""
     if part.name not in ("skin", "tongue", "shirt") or part.patch is None:
         return part
     single = np.diff(part.patch.mix.indptr) == 1

@@ -11,7 +11,7 @@ from realizer.facebuild.decimate import thinned
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.submesh import Patch, vertex_normals
 
-COLLAR = 0.486  # of the face's height, hairline to chin: how far the collar lies below the chin in front
+COLLAR = 0.486  # of the face's height, hairline to chin: how far below the chin the collar is in front
 TILT = 0.42  # of the plane of the collar, which rises backwards
 
 
@@ -23,7 +23,7 @@ def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, poin
 
     Args:
         chin: (3,) metres; face: metres from hairline to chin.
-        low, point: metres, how much lower the collar lies, and how far its middle in front runs down.
+        low, point: metres by which the collar is lower, and by which its middle in front extends down.
     """
     front = np.maximum(1 - np.abs(at[:, 0]) / POINT, 0) * smooth(at[:, 2] - chin[2], -0.09, -0.05)
     collar = chin[1] - COLLAR * face - low - point * front
@@ -52,7 +52,7 @@ UNSEEN, EAR, BUST, CLOTH, DEEP_CLOTH = 0.003, 0.0006, 0.0005, 0.0008, 0.003
 
 
 def spared(part: Part, keep: Any, ear: Any, chin: float, floor: float) -> Part:
-    """Skin, shirt or tongue with fewer vertices, where it is hidden, or evenly bent and far from the face.
+    """Return skin, shirt or tongue with fewer vertices where hidden, or evenly curved and far from the face.
 
     Args:
         part: with baked occlusion.

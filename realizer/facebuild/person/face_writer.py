@@ -130,7 +130,7 @@ def _sliding(
     for k, (centre, size) in enumerate(balls):
         moves = np.abs(rows[19 + k][:, 1]) + np.abs(rows[21 + k][:, 1]) > 0.02
         away = np.linalg.norm(vertices - centre, axis=1)
-        # What lies deeper is the socket's lining, behind the lid's edge: it may stay there.
+        # Deeper vertices belong to the socket's lining behind the lid: they may stay.
         found = np.flatnonzero(moves & (away > size + 0.0001) & (vertices[:, 2] > centre[2] + 0.002))
         found = found[(found >= first) & (found < last)]
         index.append(found)

@@ -1,6 +1,6 @@
 """FAP displacement fields on the base mesh, made from identity and expression shapes.
 
-Every field is scaled so that its feature point moves one metre for each metre asked, in the FAP's direction.
+Every field is scaled so that its feature point moves one metre per metre of FAP, in the FAP's direction.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LOWEST = -0.16  # m; below it no FAP but the head's moves a thing
 
 
 def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:
-    """Row number (FAP number, or 70..73: `basis`) -> (n, 3) field on the base mesh; and what the lips are."""
+    """Return row number (FAP number, or 70..73: `basis`) -> field (n, 3) on the base mesh; and the lips."""
     lips = Lips(ground)
     fields = lip_fields(ground, lips)
     fields |= _jaw(ground, lips, jaw_pivot)
@@ -53,7 +53,7 @@ def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
-    # How far the chin drags each vertex of the skin: the CC0 shape of an opening jaw, measured by its fall.
+    # How far the chin drags each vertex of the skin, measured on the CC0 jaw-opening shape.
     shape = ground.shape("jawOpen")
     chin = ground.points["2.1"]
     drag = np.clip(np.linalg.norm(shape, axis=1) / np.linalg.norm(shape[chin]), 0, 1)

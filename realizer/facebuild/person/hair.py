@@ -70,7 +70,7 @@ def style_of(table: Mapping[str, Any]) -> Style:
 
 
 def scalp_of(skin: Patch, base: Float64, points: Mapping[str, Float64], style: Style) -> Scalp:
-    """Where hair of that style grows."""
+    """Return where hair of a style grows."""
     return Scalp(skin, base, points, style.line, style.rise)
 
 
@@ -81,7 +81,7 @@ def shadow(scalp: Scalp, style: Style, at: Float64) -> Float64:
 
 
 def hair(scalp: Scalp, style: Style, look: Mapping[str, Any]) -> list[Part]:
-    """The hair, a sheet that lies on the scalp and hangs down from it; and a bun.
+    """Return the hair: a sheet on the scalp that hangs down from it, and a bun.
 
     Args:
         look: sRGB colours hair and skin.
@@ -98,7 +98,7 @@ def hair(scalp: Scalp, style: Style, look: Mapping[str, Any]) -> list[Part]:
     drop = np.interp(degrees, *np.array(style.fall, float).T)
     rows = np.array(style.rows, float)
     long = edge * 0.09  # m, about, of a strand on the scalp
-    # Near the hairline rows keep their distance to it, whatever a strand's length.
+    # Near the hairline, rows keep their distance to it whatever the strand's length.
     share = 1 - (1 - rows[:, None] / rows[-1]) ** (rows[-1] / np.maximum(long * (1 - begin), 0.02))
     ways = np.stack([_ways(pole, turn, edge * (1 - s * (1 - begin))) for s in share])
     ground = scalp.skull(ways.reshape(-1, 3)).reshape(len(rows), n, 3)
@@ -137,7 +137,7 @@ def hair(scalp: Scalp, style: Style, look: Mapping[str, Any]) -> list[Part]:
     keep = grown & np.roll(grown, -1)
     sheet = _closed(len(rows), n, keep)
     if not begin.any():
-        # All strands begin at the pole: one vertex.
+        # All strands begin at one vertex, the pole.
         last = len(rows) * n - n
         sheet = np.where(sheet >= last, last, sheet)
         sheet = sheet[
@@ -185,7 +185,7 @@ def _sheet(
 
 
 def _closed(rows: int, columns: int, keep: Any) -> Any:
-    """Triangles of a closed sheet whose rows begin at the lower edge, between the columns that are kept."""
+    """Return the triangles of a closed sheet whose rows begin at the lower edge, for selected columns."""
     triangles = grid(rows, columns, closed=True)
     first = np.concatenate([np.tile(np.arange(columns), rows - 1)] * 2)
     return triangles[keep[first]][:, ::-1]
@@ -220,7 +220,7 @@ def _columns(scalp: Scalp, pole: Float64, count: int) -> tuple[Float64, Float64]
 
 
 def _beginnings(scalp: Scalp, style: Style, pole: Float64, turn: Float64, edge: Float64) -> Float64:
-    """Share of each strand's way from the pole that is bald: what lies above the style's top; 1 is all."""
+    """Return the bald share of each strand from the pole: the part above the style's top; 1 is all."""
     shares = np.linspace(0, 1, 60)
     at = np.stack([scalp.skull(_ways(pole, turn, edge * s)) for s in shares])
     bald = at[..., 1] > scalp.height(style.top, at.reshape(-1, 3)).reshape(at.shape[:2])
@@ -238,7 +238,7 @@ def _locks(rng: Any, n: int) -> Float64:
 
 
 def _fall(scalp: Scalp, style: Style, at: Float64, drop: Float64, rng: Any) -> tuple[Float64, Float64]:
-    """What hangs down from the lowest row, (rows, n, 3), and how bright it is (rows, n)."""
+    """Return the hanging part below the lowest row, (rows, n, 3), and its brightness (rows, n)."""
     steps = 4 * FALLS
     here, way = at[0].copy(), at[0] - at[1]
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)

@@ -17,7 +17,7 @@ DEEP, LINING = 6, 0.85  # rings of the lining that follow the edge, and how much
 
 
 class Lid:
-    """One eye's lids.
+    """The lids of one eye.
 
     Attributes:
         rings: base vertices around the eye, from the lid's edge outwards.
@@ -53,7 +53,7 @@ class Lid:
         self.x, self.high, self.low = x, high, low
 
     def followers(self, ground: Ground) -> tuple[dict[int, int], list[tuple[int, list[int], int]]]:
-        """What goes with each vertex of the edge.
+        """The vertices that follow each vertex of the edge.
 
         Returns:
             vertex of a ring -> the edge's vertex that it lies behind; and of the lids' lining, inwards:
@@ -125,14 +125,14 @@ def lid_fields(ground: Ground) -> dict[int, Float64]:
         # A ball that is pushed out takes the lids along; nothing else on the face does.
         ball = ground.ellipsoid(centre + FORWARD * 0.002, (0.027, 0.021, 0.034), 0.50)
         out[27 if side > 0 else 28] = ground.smoothed(ball, 2)[:, None] * FORWARD
-        # How much of the edge's way a vertex goes: by how far above (below) the edge it lies; the CC0 blink
+        # The share of the edge's movement by a vertex's distance above (below) the edge; the CC0 blink
         # says where the lid ends.
         for number, name, upper in ((numbers[0], names[0], True), (numbers[1], names[1], False)):
             row = lid.upper if upper else lid.lower
             edge = np.zeros(len(at))
             edge[row] = lid.gap_of(at, upper) / lid.aperture
-            # Near the corners the opening grows steeply: what lies beyond an edge's vertex goes with that
-            # vertex, not with whatever happens to lie at its own x.
+            # Near the corners the opening is steep: vertices beyond an edge vertex follow that vertex, not
+            # the one at their own x.
             led, mine = gap.copy(), above if upper else ~above
             for vertex, leader in ringed.items():
                 led[vertex] = edge[leader]

@@ -42,7 +42,7 @@ _STRETCH = _stretch()
 def hats(u: Any) -> Float64:
     """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; 1 at their own knot, 0 at the others.
 
-    Their sum being 1 everywhere is what keeps a lip whose FAPs are equal from bending into a w.
+    The weights sum to 1 everywhere, so a lip whose FAPs are equal does not bend into a w.
     """
     u = np.clip(np.asarray(u, float), -1, 1)
     # Half-way to an ellipse's angle: an open mouth is round at its corners, a smile still runs into them.
@@ -64,7 +64,7 @@ def hats(u: Any) -> Float64:
 
 
 class Lips:
-    """Where every vertex of the base mesh stands with respect to the lips.
+    """The position of every vertex of the base mesh relative to the lips.
 
     Attributes:
         u, w: (n,) coordinates; inherited from the nearest place of the lips outside and inside them.
@@ -115,7 +115,7 @@ class Lips:
         self.around[inside] = self.fade[inside]
 
     def _put_knots_at_points(self, ground: Ground) -> None:
-        """Stretch u so that the points between middle and corner lie at its half, whoever's lips they are."""
+        """Stretch u so that the points between middle and corner are at 0.5 on any lips."""
         for is_upper, names in ((True, ("2.6", "8.5")), (False, ("2.8", "8.7"))):
             inner, outer = (float(self.u[ground.points[name]]) for name in names)
             for ring in self.rings:
@@ -178,7 +178,7 @@ def close_lips(ground: Ground) -> Float64:
         for i in lips.rings[k]:
             x = ground.at[i, 0]
             high, low = (np.interp(x, ground.at[row, 0], ground.at[row, 1]) for row in (upper, lower))
-            # Some people's overlap: those are parted.
+            # Lips that overlap are parted.
             apart = high - low - APART
             at[i, 1] += share * apart / 2 * (-1 if lips.is_upper[i] else 1)
     return at
@@ -201,7 +201,7 @@ def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     def put(number: int, name: str, weight: Float64, way: Any, direction: Any) -> None:
         field = weight[:, None] * np.asarray(way)
         rough = ground.smoothed(field, 2)
-        # Only what lies off the lips is smoothed: the spline holds on them.
+        # Only vertices off the lips are smoothed: the spline holds on them.
         mixed = np.where((lips.away > 0.0005)[:, None], rough, field)
         out[number] = scaled(mixed, points[name], direction)
 
@@ -242,7 +242,7 @@ def _corners(
         smile, stretch = (
             np.where(ground.body[:, None], ground.shape(f"mouth{k}{word}"), 0) for k in ("Smile", "Stretch")
         )
-        # Two shapes, mixed so that the corner goes straight up, or straight out.
+        # Two shapes are mixed so that the corner moves straight up, or straight out.
         pull = np.array(
             [[smile[corner, 0] * side, stretch[corner, 0] * side], [smile[corner, 1], stretch[corner, 1]]]
         )
@@ -251,7 +251,7 @@ def _corners(
         up_shape = smile * mixes[0, 1] + stretch * mixes[1, 1]
         u = np.clip(lips.u * side, 0, 1)
         ramp = u**1.4
-        # Sliding outwards the lip follows the arch of the teeth: back as it goes out.
+        # A lip that slides outwards follows the arch of the teeth backwards.
         slope = np.interp(u, [0, 0.5, 1], [0, -0.30, -0.62])
         draw = np.stack([side * ramp, np.zeros_like(ramp), slope * ramp], 1)
         lift = np.stack([np.zeros_like(knot), knot, -0.12 * knot], 1)

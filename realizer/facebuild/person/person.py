@@ -17,13 +17,13 @@ from realizer.facebuild.person.lips import close_lips
 from realizer.tables import read_csv
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
-EYE_INSET = 0.00015  # m; the ball lies that much inside the socket's fit
+EYE_INSET = 0.00015  # m; how much deeper the ball lies than the socket's fit
 # Lengths of the bust, in faces (from the hairline 11.1 to the chin 2.1: 15 to 18 cm).
 FLOOR = 0.61  # the bust ends that far below the collarbones
 NECK_TOP, NECK_LENGTH = 0.092, 0.433  # below the chin the head's turn fades out, over that length,
 NECK_TILT = 0.30  # along a plane that falls with the jaw by that much
 NOD = np.array([0.0, -0.082, -0.012])  # the head nods about a point below and behind the head's joint
-CORNER = (0.007, 0.006, 0.009)  # m; half axes of what is smoothed at a corner of the mouth,
+CORNER = (0.007, 0.006, 0.009)  # m; half axes of the region smoothed at a corner of the mouth,
 RELAXED = 5  # and how many times
 ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of the data's arches
 
@@ -36,7 +36,7 @@ class Person:
         ground: its vertices (metres, origin between the eyes, lips closed), landmarks and expression shapes.
         balls: centre (3,) and radius of the left and the right eyeball.
         face: metres from hairline to chin.
-        jaw_pivot, head_pivot: (3,) what the jaw bone turns about, and the head.
+        jaw_pivot, head_pivot: (3,) the rotation centres of jaw and head.
         floor: y of the plane that the bust ends in.
         arch: half width and depth of the upper teeth's arch, metres.
     """

@@ -23,7 +23,7 @@ TABLES = ("targets", "colours", "hair", "look")
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """What makes a person.
+    """The recipe of a person.
 
     Attributes:
         says: a sentence about them, for lists of faces.
@@ -47,7 +47,7 @@ def read_recipe(path: Path, data: Path) -> Recipe:
         data: the folder of shape targets that its names are looked up in.
 
     Raises:
-        FaceError: no such file, not TOML, or faults: all at once, each with its key and what was wanted.
+        FaceError: the file is missing or not TOML, or has faults: all are listed, each with key and reason.
     """
     try:
         raw = tomllib.loads(path.read_text("utf-8"))

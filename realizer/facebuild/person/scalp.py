@@ -19,7 +19,7 @@ CROWN, CHIN, BACK = (
 EAR_ABOVE, EAR_BEHIND, EAR_TALL, EAR_WIDE, EAR_LEAN = 0.04, 0.066, 0.70, 0.45, 0.22
 EARS_FROM = 0.03  # m from the middle
 NEAR = 8  # vertices that a place on the skull is mixed from
-FLAP = 0.006  # m; what lies that much further out than its surroundings is an ear
+FLAP = 0.006  # m; what protrudes that far from its surroundings is an ear
 
 
 class Scalp:
@@ -91,14 +91,14 @@ class Scalp:
         return height * np.where(height > 0, self._above, self._below)
 
     def skull(self, ways: Float64) -> Float64:
-        """Where unit vectors (n, 3) from the middle leave the skull, ears left out: (n, 3) metres."""
+        """Return where unit vectors (n, 3) from the middle leave the skull, without ears: (n, 3) metres."""
         off, near = self._bone.query(ways, NEAR)
         share = 1 / (np.asarray(off) + 0.02) ** 2
         away = (self._away[near] * share).sum(axis=1) / share.sum(axis=1)
         return np.asarray(self.middle + ways * away[:, None])
 
     def lift(self, at: Float64) -> tuple[Float64, Float64]:
-        """How high places lie above the skin's tangent plane, (n,) metres, and its normal (n, 3)."""
+        """Return the height of places above the skin's tangent plane, (n,) metres, and its normal (n, 3)."""
         off, near = self._skin.query(at, 3)
         share = 1 / (np.asarray(off) + 1e-4)
         share /= share.sum(axis=1, keepdims=True)

@@ -133,7 +133,7 @@ def paint_mouth(
 
     Args:
         out: (n, 3) sRGB; gloss, light: (n,) 0..1.
-        share: (n,) 1 where there is only lining, 0 where there is none.
+        share: (n,) 1 for pure lining, 0 for none.
         deep: (n,) metres behind the lips.
         colours: sRGB colours mouth, tongue.
     """
@@ -152,10 +152,10 @@ def occlusion(
     vertices: Float64, normals: Float64, triangles: Int32, blockers: Int32 | None = None,
     directions: int = DIRECTIONS, cell: float = CELL,
 ) -> Float64:  # fmt: skip
-    """How much of the sky above it each vertex sees, 0..1, weighted by the cosine.
+    """Return the share of the sky that each vertex sees, 0..1, weighted by the cosine.
 
-    Depth pictures of the mesh from many directions take the place of rays: a vertex that lies deeper than
-    what the picture shows at its place is in shadow from there.
+    Depth pictures of the mesh from many directions replace rays: a vertex that lies deeper than the
+    picture at its place is in shadow from that direction.
 
     Args:
         vertices, normals: (n, 3).
