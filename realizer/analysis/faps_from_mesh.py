@@ -14,7 +14,7 @@ from realizer.face.deform import deform
 from realizer.face.model import Face
 
 PROBE = 60.0  # FAPU; far enough to be measured, near enough to be proportional
-ROUNDS = 4  # what turns or slides is not proportional; each round takes away most of what is left
+ROUNDS = 4  # rotations and slides are not linear; each round removes most of the remaining error
 
 
 def points_of(face: Face, vertices: Any) -> dict[str, Float32]:
@@ -35,7 +35,7 @@ def faps_from_mesh(face: Face, vertices: Any) -> tuple[Float32, Bool]:
 
 
 def faps_from_face(face: Face, points: Mapping[str, Any]) -> tuple[Float32, Bool]:
-    """The same of all of its feature points, name -> (n, 3) metres.
+    """Measure all feature points of the mesh, name -> (n, 3) metres.
 
     Points hang together in a face: what moves one moves its neighbours too. How much, is measured on the face
     itself, each FAP alone, and taken apart again; then the face is moved by what was found, and measured
@@ -59,7 +59,7 @@ def _at_rest(face: Face) -> dict[str, Float32]:
 
 @lru_cache(maxsize=8)
 def _apart(face: Face) -> Float64:
-    """(68, 68): what is read, times this, is what was asked of the face."""
+    """(68, 68): measured values, times this, are the face's FAPs."""
     _, seen = faps_from_points(points_of(face, face.vertices[None]), _at_rest(face), face.fapu)
     local = np.flatnonzero(seen)
     local = local[(local < 47) | (local > 49)]  # turns of the head are not proportional, and hang on nothing

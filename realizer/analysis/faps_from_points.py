@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 Points = Mapping[str, Any]  # name such as "2.1" -> (n, 3) or (3,) metres
 
-# Where the skin lies on the skull; corners of the eyes are next best, where a tracker sees nothing else.
+# Points on the skull; corners of the eyes are next best, if a tracker has no others.
 SKULL = ("11.1", "11.2", "11.3", "11.4", "11.5", "11.6")
 CORNERS = ("3.7", "3.8", "3.11", "3.12")
 HEAD = slice(47, 50)
 OUTER_LIPS = {4: 51, 5: 52}  # FAPs of the middle of the lips: the features are measured at 8.1 and 8.2
 CHIN, JAW, DEPRESS_CHIN, OPEN_JAW = "2.10", "2.1", 17, 2
-# Where the standard lets each FAP's point move: axis and sense of x to the character's left, y up, z forward.
+# Each FAP's direction in the standard: axis and sense of x to the character's left, y up, z forward.
 WAYS = {"left": (0, 1), "right": (0, -1), "up": (1, 1), "down": (1, -1), "forward": (2, 1)}
 
 
 def faps_from_points(points: Points, neutral: Points, fapu: Fapu) -> tuple[Float32, Bool]:
-    """The FAPs of a face whose feature points were tracked (Raouzaiou et al. 2002, figure 1).
+    """Return the FAPs of tracked feature points (Raouzaiou et al. 2002, figure 1).
 
     The head's turn is found first (FAPs 48 to 50) and taken away, wherever the head has gone; then each FAP
     is how far its own point has moved along its own axis, in its unit.
@@ -41,7 +41,7 @@ def faps_from_points(points: Points, neutral: Points, fapu: Fapu) -> tuple[Float
         fapu: of the same face.
 
     Returns:
-        (n, 68) FAP values, 0 where nothing tells of one, and (68,) which of them were observed all the time.
+        (n, 68) FAP values, 0 if unobserved, and (68,) which of them were observed all the time.
 
     Raises:
         ValueError: no points, some that have no neutral place, or that are not as many as each other.
@@ -54,7 +54,7 @@ def faps_from_points(points: Points, neutral: Points, fapu: Fapu) -> tuple[Float
         rotation, moved = turns
         values[:, HEAD] = _angles(rotation) / ANGLE_UNIT
         seen[HEAD] = True
-        # What remains is seen from the skull.
+        # The rest is relative to the skull.
         places = {name: np.einsum("nji,nj->ni", rotation, at - moved) for name, at in places.items()}
     for row in tables.faps():
         if row.feature_point in places and row.direction in WAYS and row.unit not in ("none", "angle_unit"):
@@ -96,7 +96,7 @@ def features_from_faps(frames: Any) -> Float64:
 
 
 def faps_from_features(features: Any) -> tuple[Float32, Bool]:
-    """What features (n, 15) tell of FAPs: (n, 68), and (68,) which FAPs that are.
+    """Return the FAPs that features (n, 15) determine: (n, 68), and (68,) which FAPs those are.
 
     A feature that is the sum of several FAPs gives each an equal part (3.2). What f1 and f2 say of a brow is
     better than f15, which is both together, and wins.
@@ -115,7 +115,7 @@ def faps_from_features(features: Any) -> tuple[Float32, Bool]:
 
 
 def as_features_see(profile: Profile) -> Profile:
-    """The profile that `faps_from_features` would tell of a face which shows this one.
+    """Return the profile that `faps_from_features` would find on a face which shows this one.
 
     Distances are taken between outer points of the lips, and lids are seen together: what a profile says of
     the outer lips stands for the inner ones, the opening of the mouth is theirs, and FAPs of one feature
@@ -171,7 +171,7 @@ def _checked(points: Points, neutral: Points) -> tuple[dict[str, Float64], dict[
 
 
 def _turns(places: Mapping[str, Float64], rest: Mapping[str, Float64]) -> tuple[Float64, Float64] | None:
-    """The rotation (n, 3, 3) and shift (n, 3) that take the resting skull to each frame; None without points.
+    """Return the rotation (n, 3, 3) and shift (n, 3) from the resting skull to each frame, or None.
 
     The best fit of points that go together (Kabsch 1976).
     """
@@ -188,7 +188,7 @@ def _turns(places: Mapping[str, Float64], rest: Mapping[str, Float64]) -> tuple[
     mirrored = np.linalg.det(u @ vt) < 0
     vt[mirrored, 2] *= -1
     rotation = np.einsum("nij,njk->nki", u, vt)
-    # Seen from the skull, a point is where it was: R^T (p - shift) = p0.
+    # In the skull's frame a point is at rest: R^T (p - shift) = p0.
     return rotation, centre - np.einsum("nij,j->ni", rotation, middle)
 
 

@@ -23,8 +23,8 @@ from realizer.render.light import presets
 HEIGHT = 96  # pixels that pictures are compared at, so that a brow counts wherever in its way it is
 FINE = 4  # times as high they are drawn, so that they are as smooth as one made smaller
 STEPS = (0.5, 1.0)  # intensities that are compared: weak and strong ones move other places
-LIGHT = "portrait"  # in which faces are told apart
-# The correlation of a picture with the neutral face: what is below it is not that face in front view.
+LIGHT = "portrait"  # the light of the reference pictures
+# Correlation with the neutral face: below it, a picture is not that face in front view.
 ALIKE = 0.8
 # A picture that differs from the neutral one by less (root mean square over the face, of white; what drawing
 # at another size leaves is 0.004) in a way that is like no expression (cosine) is neutral.
@@ -37,7 +37,7 @@ class UnknownPictureError(RealizerError):
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """Whose face it is, in which light, and what its expression looks like.
+    """A recognised picture: face, light and expression.
 
     Attributes:
         found: (expression, cosine 0..1 between what both change in the neutral face), the best first.
@@ -51,7 +51,7 @@ class Likeness:
 
 
 def read_picture(path: Path) -> UInt8:
-    """(h, w, 3) of a picture file, what is transparent in black.
+    """Return a picture file as (h, w, 3), with transparency on black.
 
     Raises:
         UnknownPictureError: no picture.
@@ -72,7 +72,7 @@ def by_picture(
 ) -> Likeness:
     """The expressions that change a face as the picture does.
 
-    The face and its light are those whose neutral picture is nearest; what the picture changes in it is
+    The face and its light are those whose neutral picture is nearest; the difference to it is
     compared with what each expression changes in it at full intensity, so that weak and strong ones count as
     alike.
 
@@ -90,7 +90,7 @@ def by_picture(
         raise UnknownPictureError(f"{_WANTED}, got one of {width}x{height} pixels")
     seen = _brightness(_resized(picture, size))
     names = [info.name for info in list_faces()] if faces is None else faces
-    # Whose face it is shows through expression and light; which light it is, on that face alone.
+    # The face shows through expression and light; the light is found on that face alone.
     name = max(names, key=lambda one: _alike(seen, *_neutral(one, LIGHT, size)))
     light = max(presets(), key=lambda one: _alike(seen, *_neutral(name, one, size)))
     if _alike(seen, *_neutral(name, light, size)) < ALIKE:

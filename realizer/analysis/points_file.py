@@ -59,7 +59,7 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
 
 
 def bridge(points: Mapping[str, Float64]) -> dict[str, Float64]:
-    """The same ways (n, 3) without NaN: over a gap a point goes straight, after its last place it stays."""
+    """Return the trajectories (n, 3) without NaN: linear over gaps, constant after the last value."""
     whole = {}
     for name, way in points.items():
         there = np.flatnonzero(~np.isnan(way).any(axis=1))

@@ -18,10 +18,10 @@ from realizer.tables.wheel_words import ring
 
 @dataclass(frozen=True)
 class Recognition:
-    """What a face shows.
+    """The result of a recognition.
 
     Attributes:
-        emotion: the one that is believed in most (eq. 11); None where nothing fits.
+        emotion: the one with the greatest belief (eq. 11); None if nothing fits.
         emotions: emotion -> belief 0..1 (eq. 9), all of them.
         profiles: name of a profile -> belief (eq. 8).
     """
@@ -86,7 +86,7 @@ class Recogniser:
             away = np.abs(values[:, None] - middle) / half
             membership = np.clip((self._base - away) / (self._base - self._core), 0.0, 1.0)
             np.maximum(best, np.where(judged, membership, 1.0).prod(axis=2), out=best)
-        # A profile none of whose FAPs was seen is nothing to believe in.
+        # A profile none of whose FAPs was observed cannot be believed.
         return best * judged.any(axis=1)
 
     def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
@@ -94,7 +94,7 @@ class Recogniser:
         return [self._best(row) for row in self.beliefs(frames, seen)]
 
     def recognise(self, frame: Any, seen: Bool | None = None) -> Recognition:
-        """What one FAP frame (68,) shows."""
+        """Recognise one FAP frame (68,)."""
         beliefs = self.beliefs(np.asarray(frame)[None], seen)[0]
         emotions: dict[str, float] = {}
         for emotion, belief in zip(self._emotions, beliefs, strict=True):
@@ -113,7 +113,7 @@ class Recogniser:
 
 
 def recogniser(profiles: str = "own", absent: bool = True) -> Recogniser:
-    """That of all profiles of a set: "own", "published" or "raw".
+    """Return the recogniser of all profiles of a set: "own", "published" or "raw".
 
     Where what is absent counts, the neutral face, at which all is, is one more that may be recognised. In
     the published sets an emotion has many profiles, weak and strong; in ours one, which counts at any

@@ -18,7 +18,7 @@ BEND = 28  # pieces of a curve
 
 
 def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine, places: Place) -> None:
-    """Draw what ties a block: curves into `picture`, which lies below the bars, ends into `marks`, above."""
+    """Draw the links of a block: curves into `picture`, below the bars; ends into `marks`, above."""
     start = block.start or 0.0
     for line in block.lines:
         _, _, top = places[block.block, line.id]
@@ -37,7 +37,7 @@ def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine,
 
 
 def _end_of(scale: Scale, link: Link, there: tuple[Line, float, float] | None) -> tuple[float, float] | None:
-    """Where the other point of a link stands, and the top of its row; None where it is not in the picture."""
+    """Return the position of a link's other point, and the top of its row, or None if it is not drawn."""
     if there is None:
         return None
     line, start, top = there
@@ -62,7 +62,7 @@ def _tie(
         marks.add(Path((end, (end[0] - 3.5, end[1] - up), (end[0] + 3.5, end[1] - up)), fill=LINK))
     if abs(link.offset) > 5e-4:
         words = f"{link.offset:+.2f}".rstrip("0").rstrip(".")
-        left = link.sync == "end"  # it stands over the bar then, not beside it
+        left = link.sync == "end"  # above the bar then, not beside it
         x, anchor = (here[0] - 6, "end") if left else (here[0] + 6, "start")
         marks.add(Text(x, here[1] + ABOVE - 3.5, words, SMALL, LINK, anchor, PAPER))
 
@@ -76,7 +76,7 @@ def _room(
     top: float,
     there: tuple[float, float] | None,
 ) -> None:
-    """What an order leaves: hatched from the point to where it binds, and a line to what it looks at."""
+    """Draw the slack of an order: hatched from the point to its bound, and a line to the other point."""
     if link.slack is None:
         _pin(marks, scale.x(time), top, link)
         return
@@ -110,7 +110,7 @@ def _room(
 
 
 def _pin(marks: Picture, x: float, top: float, link: Link) -> None:
-    """A point that is held at a time, or by something that is not in the picture."""
+    """Draw a point that is fixed at a time, or by something outside the picture."""
     y = top + ABOVE - 3
     inside = HELD if link.behaviour is None else PAPER
     marks.add(Path(((x, y), (x - 4, y - 7), (x + 4, y - 7)), HELD, 1.0, fill=inside, tip=_words(link)))

@@ -25,10 +25,10 @@ def lines_of(cast: Cast, schedules: Iterable[Schedule]) -> list[BlockLine]:
 
 
 def line_of(playing: Playing, schedule_of: Callable[[str], Schedule | None]) -> BlockLine:
-    """A block as it now stands.
+    """Return the chart of a block in its present state.
 
     Args:
-        schedule_of: block id -> its schedule, for what is tied to other blocks.
+        schedule_of: block id -> its schedule, for links to other blocks.
     """
     block, schedule = playing.block, playing.schedule
     known = math.isfinite(schedule.start)
@@ -97,7 +97,7 @@ def _gaps(names: tuple[str, ...], times: list[float], timing: Timing | None) -> 
 
 
 def _dropped(warning: Warning, block: Block, schedule: Schedule) -> Dropped | None:
-    """What a warning says is gone; None where it is about something that plays."""
+    """Return the dropped behaviour of a warning, or None if the warning is about something that plays."""
     prefix = f"{block.id}:"
     id = warning.id.removeprefix(prefix) if warning.id.startswith(prefix) else ""
     problem = next((p for p in block.problems if (p.id, p.type) == (warning.id, warning.type)), None)
@@ -114,14 +114,14 @@ def _dropped(warning: Warning, block: Block, schedule: Schedule) -> Dropped | No
 
 
 def _element(place: Place | None) -> str | None:
-    """The name of what stands there."""
+    """Return the name of an element."""
     if place is None:
         return None
     return place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None
 
 
 def _cut(playing: Playing, id: str) -> Dropped:
-    """What was ended before it began."""
+    """Return the behaviours that ended before they began."""
     place, state = playing.block.places.get(id), playing.state.value
     when = "" if playing.stopped is None else f" at {playing.stopped:.3f} s"
     # A block that waited is without it by now.

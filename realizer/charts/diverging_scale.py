@@ -10,14 +10,14 @@ INK = "#1f2430"
 FAINT = "#6b7280"
 GRID = "#e6e8ec"
 RIGID = "#d5dbe6"  # gaps that cannot give way
-LINK = "#0f766e"  # what is tied
-HELD = "#1f2430"  # a pin: held at a time
+LINK = "#0f766e"  # links
+HELD = "#1f2430"  # a pin: fixed at a time
 ROOM = "#7c6bb0"  # room before an order binds
 TIGHT = "#c2185b"  # an order that binds
-LOST = "#9aa0aa"  # what was dropped
+LOST = "#9aa0aa"  # dropped behaviours
 
 # (log3 of the stretch, colour): a third of the preferred length, the preferred length, three times it.
-# Blue to orange: told apart with every kind of colour vision, and in grey by how dark the ends are.
+# Blue to orange: distinct for every kind of colour vision, and in grey by the darkness of the ends.
 SCALE = (
     (-1.0, (33, 92, 168)),
     (-0.45, (128, 178, 226)),

@@ -23,7 +23,7 @@ class Link:
         kind: attribute, text (a <sync> inside speech), synchronize, before or after.
         block, behaviour, other: the other point; behaviour None is the start of the block, and the offset a
             time. A block of None is the own one.
-        slack: of before and after: seconds that the point could still move before this binds; None where it
+        slack: of before and after: seconds that the point could still move before this binds; None if it
             ties, or where the other point's time is not known.
         line, constraint, required: of what states it.
     """
@@ -41,12 +41,12 @@ class Link:
 
     @property
     def binds(self) -> bool:
-        """An order that holds the point where it is."""
+        """Whether an order fixes the point where it is."""
         return self.slack is not None and self.slack < BINDS
 
     @property
     def target(self) -> str | None:
-        """The other point as documents name it; None for the start of the block."""
+        """The other point as documents name it, or None for the start of the block."""
         if self.behaviour is None:
             return None
         return ":".join(filter(None, (self.block, self.behaviour, self.other)))
@@ -101,7 +101,7 @@ class _Links:
             if not self._is_own(here):
                 if not self._is_own(there):
                     continue
-                # Said of a number or of another block: the same, from this block's point of view.
+                # A relation to a number or another block, from this block's point of view.
                 kind, here, there = _MIRROR.get(kind, kind), there, here
             slack = None
             if kind in _MIRROR:
@@ -155,7 +155,7 @@ def _sync(ref: SyncRef) -> str:
 
 
 def _pairs(constraint: Constraint) -> Iterator[tuple[str, SyncRef, SyncRef]]:
-    """(kind, what is constrained, to what) for all that a constraint says."""
+    """Yield (kind, constrained point, other point) of a constraint."""
     for part in constraint.parts:
         match part:
             case Synchronize():

@@ -36,7 +36,7 @@ GROUPS = {
     "mood": ("emotion", "expression", "mood", "idle"),
     "body": ("gesture", "pointing", "posture", "postureShift", "locomotion"),
 }
-QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a picture of a plan need not tell
+QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a chart need not name
 
 
 def timeline(blocks: Sequence[BlockLine]) -> Picture:

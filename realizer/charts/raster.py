@@ -11,8 +11,8 @@ from realizer.core.errors import RealizerError
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw
 
-SMOOTH = 2  # and of what it is drawn as, for one of the PNG: Pillow's lines have stairs
-# Pixels that are drawn at once: more would take more memory than a picture is worth.
+SMOOTH = 2  # oversampling for PNG: Pillow's lines are aliased
+# Limit of pixels, because of memory.
 MOST = 64_000_000
 
 

@@ -49,12 +49,12 @@ def draw_line(
 
 
 def height_of(dropped: Dropped, scale: Scale) -> float:
-    """Of the row of what is not there."""
+    """Return the height of the row of dropped behaviours."""
     return 22.0 + 13.0 * max(1, len(_why(dropped, scale)))
 
 
 def draw_dropped(picture: Picture, scale: Scale, dropped: Dropped, top: float, height: float) -> None:
-    """Draw what is not there, and why."""
+    """Draw dropped behaviours, with the reasons."""
     where = "" if dropped.line is None else f", line {dropped.line}"
     _name(picture, dropped.id, f"{dropped.element or 'dropped'}{where}", top - 6, LOST, LOST)
     width = width_of(cut_inside(dropped.id, PLAIN, scale.left - NAME - 12), PLAIN)
@@ -67,7 +67,7 @@ def draw_dropped(picture: Picture, scale: Scale, dropped: Dropped, top: float, h
 
 
 def colour(gap: Gap) -> str:
-    """Grey where a gap cannot give way, otherwise by its stretch."""
+    """Return the colour of a gap: grey if it cannot stretch, otherwise by its stretch."""
     if gap.rigid or gap.preferred is None:
         return RIGID
     if gap.preferred == 0:
@@ -105,7 +105,7 @@ def _tip(line: Line, gap: Gap) -> str:
 
 
 def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) -> None:
-    """How long a gap is; of one that is not as preferred, in parts of its preferred length."""
+    """Return the text of a gap's length; if stretched, as a ratio to its preferred length."""
     ink = on(colour(gap))
     seconds = f"{gap.actual:.2f} s"
     stretched = gap.stretch is not None and not gap.rigid and abs(gap.stretch - 1) >= 0.005
@@ -150,12 +150,12 @@ def _names(
 
 
 def _shifts(wide: float, k: int, count: int) -> Iterable[float]:
-    """Where a name may stand, from its tick: in the middle, to the right, to the left."""
+    """Return possible places of a name, from its tick: in the middle, to the right, to the left."""
     first = (-2.0, -wide / 2) if k == 0 else (-wide + 2, -wide / 2) if k == count - 1 else (-wide / 2,)
     return (*first, -2.0, -wide + 2)
 
 
 def _why(dropped: Dropped, scale: Scale) -> Sequence[str]:
-    # The line of the document stands under the name.
+    # The line of the document is below the name.
     text = _AT.sub("", dropped.text)
     return fold(text, 10.5, scale.right - scale.left - 36, MOST_WHY)

@@ -38,7 +38,7 @@ class Scale:
         return (self.right - self.left) / (self.last - self.first)
 
     def x(self, time: float) -> float:
-        """Where a time stands; what is beyond the picture stands at its edge."""
+        """Return the position of a time, limited to the picture."""
         return min(max(self.left + (time - self.first) * self.second, self.left), self.right)
 
     def ticks(self) -> Iterator[tuple[float, str]]:
@@ -50,7 +50,7 @@ class Scale:
 
 
 def scale_of(blocks: Iterable[BlockLine]) -> Scale:
-    """A scale that has room for all blocks; one that was not started stands at 0."""
+    """Return a scale for all blocks; one that has not started begins at 0."""
     spans = [(block.start or 0.0, last_of(block)) for block in blocks]
     first = min((start for start, _ in spans), default=0.0)
     last = max((end for _, end in spans), default=0.0)

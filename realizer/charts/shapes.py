@@ -61,7 +61,7 @@ Shape = Box | Path | Text
 
 @dataclass(slots=True)
 class Picture:
-    """Shapes, the first at the bottom; `title` says what is seen."""
+    """Shapes, the first at the bottom; `title` describes them."""
 
     width: float
     height: float = 0.0
@@ -108,7 +108,7 @@ def font(size: float, plain: bool = True) -> FreeTypeFont | ImageFont:
 
 @lru_cache(4096)
 def width_of(text: str, size: float) -> float:
-    """How wide a line of text is, in pixels; an estimate where it is not ASCII."""
+    """Return the width of a line of text in pixels; an estimate for characters beyond ASCII."""
     if text.isascii():
         # As PNG draws it: letters stand on whole pixels, which a larger font would not show.
         return float(font(size * FINE).getlength(text)) / FINE

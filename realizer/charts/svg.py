@@ -10,7 +10,7 @@ FAMILY = "Aileron, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaV
 
 
 def svg(picture: Picture) -> str:
-    """One SVG document, which looks the same in every font: text takes the room that was measured for it."""
+    """Return one SVG document that looks the same in every font: text is fitted to its measured width."""
     width, height = _number(picture.width), _number(picture.height)
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}"'

@@ -33,7 +33,7 @@ class Spoken(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """What lies between two neighbouring sync points, in seconds.
+    """A gap between two neighbouring sync points, in seconds.
 
     Attributes:
         preferred, least, most, stiffness: as of the Timing; None in what was cut off, `most` also where there
@@ -51,7 +51,7 @@ class Gap(NamedTuple):
 
     @property
     def stretch(self) -> float | None:
-        """actual / preferred: 1 is as preferred; None where nothing is preferred, or a length of 0."""
+        """Return actual / preferred: 1 is as preferred; None if there is no preferred length, or it is 0."""
         return self.actual / self.preferred if self.preferred else None
 
     @property
@@ -82,8 +82,8 @@ class Line:
 
     Attributes:
         element: its name, such as "head".
-        line: where it stands in the document.
-        words: what is said, in order.
+        line: its line in the document.
+        words: the spoken words, in order.
     """
 
     id: str
@@ -113,10 +113,10 @@ class Line:
 
 
 class Dropped(NamedTuple):
-    """A behaviour that is not played, or a constraint that is not kept; `text` says why.
+    """A dropped behaviour, or a constraint that does not hold; `text` says why.
 
     Attributes:
-        id: of the behaviour; as warnings name it, where it is a constraint or something else.
+        id: of the behaviour; as warnings name it, if it is a constraint or something else.
         type: of the warning, or what became of the block (REVOKED, INTERRUPTED).
     """
 
@@ -135,9 +135,9 @@ class BlockLine:
     """One block.
 
     Attributes:
-        start, end: seconds on the session clock; None while that is not known.
+        start, end: seconds on the session clock; None while unknown.
         state: in the words of BMLA; FAILED for one that was refused.
-        cost: what the stretched gaps of its behaviours cost together.
+        cost: the total cost of the stretched gaps.
         warnings: all, of what plays nevertheless too.
     """
 
@@ -155,7 +155,7 @@ class BlockLine:
         return sum(gap.cost for line in self.lines for gap in line.gaps)
 
     def head(self) -> dict[str, Any]:
-        """What it is and what it does now, as plain data."""
+        """Return the behaviour and its state as plain data."""
         return {
             "block": self.block,
             "character": self.character,
@@ -165,7 +165,7 @@ class BlockLine:
         }
 
     def to_json(self) -> dict[str, Any]:
-        """All of it as plain data; an element of `blocks` in the stream `schedule`."""
+        """Return the block as plain data; an element of `blocks` in the stream `schedule`."""
         return {
             **self.head(),
             "cost": _seconds(self.cost),
@@ -175,7 +175,7 @@ class BlockLine:
         }
 
     def detail(self) -> dict[str, Any]:
-        """What `realizer schedule --json --detail` tells beside the times; gaps and links by behaviour."""
+        """Return the details of `realizer schedule --json --detail`; gaps and links by behaviour."""
         return {
             "state": self.state,
             "cost": self.cost,

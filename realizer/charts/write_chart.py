@@ -17,7 +17,7 @@ WRITERS: Mapping[str, Writer] = {".svg": lambda picture: svg(picture).encode(), 
 
 
 def writer_for(path: str | Path) -> Writer:
-    """What makes a picture's bytes.
+    """Return the encoder of a picture.
 
     Raises:
         ValueError: no or an unknown suffix; the text lists the known ones.

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from realizer.scheduling.timing import Schedule
 
 ADVICE = "ADVICE"
-# s; nobody plans a single face so far ahead, but 250 and more are often milliseconds.
+# s; a single face is hardly planned so far ahead, but 250 and more are often milliseconds.
 LONG = 250.0
-# s; one frame at 25 fps: what is shorter may be on none.
+# s; one frame at 25 fps: shorter motion may fall between frames.
 SHORT = 0.04
-# Of what they usually do, in standard deviations: faster than this is not a matter of style.
+# In standard deviations from the mean: faster than this is not a matter of style.
 FASTER = 2.0
 KNOWN_SPACES = frozenset({CORE, EXTENSIONS, BMLA, BMLT, OWN})
 
@@ -53,9 +53,9 @@ class _Advisor:
         self.file, self.source, self.block = file, source, block
 
     def attributes(self, node: Any, path: str, line: int | None) -> Iterator[Finding]:
-        """Attributes of BMLA and BMLT that nobody knows, and that are nearly a known one.
+        """Yield advice on unknown attributes of BMLA and BMLT that are nearly a known one.
 
-        They have more than are known here; what BML itself has not is a fault, and told as one.
+        Those languages have more than we know; unknown attributes of BML itself are faults.
         """
         known = shape_of(type(node)).attributes
         for name in node.foreign:
@@ -72,7 +72,7 @@ class _Advisor:
             yield self.finding(node, path, said, label, f'help: did you mean "{meant}"?')
 
     def children(self, node: Any, path: str, line: int) -> Iterator[Finding]:
-        """Elements inside a behaviour that nobody knows, and that are nearly one that is known there."""
+        """Yield advice on unknown child elements of a behaviour that are nearly a known one."""
         element = self.source.find(path, line=line, block=self.block.id)
         known = {local(tag): tag for tag in shape_of(type(node)).by_tag}
         if element is None or not known:
@@ -88,7 +88,7 @@ class _Advisor:
                 yield self.finding(node, path, said, label, f'help: did you mean "{prefix}:{meant}"?')
 
     def namespace(self, name: str) -> str:
-        """The namespace of an element name, as whoever declares its prefix first says."""
+        """Return the namespace of an element name, as first declared for its prefix."""
         declared = f"xmlns:{name.rpartition(':')[0]}"
         found = (self.source.value(e, declared) for e in self.source.elements if declared in e.attributes)
         return next(found, "")

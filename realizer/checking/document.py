@@ -26,7 +26,7 @@ class Checked:
     Attributes:
         findings: in order of their places.
         block, schedule: None where nothing could be read.
-        said: what the silent voice made of its speeches.
+        said: the silent voice's utterances of its speeches.
     """
 
     findings: tuple[Finding, ...]
@@ -65,7 +65,7 @@ def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tupl
     """The schedule of a block, and everything that is wrong with it, also where one fault ends it all.
 
     Args:
-        said: what the silent voice made of its speeches.
+        said: the silent voice's utterances of its speeches.
     """
     warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
     world = replace(player.world, utterances=dict(said))
@@ -76,7 +76,7 @@ def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tupl
         warnings += [told_of(block, node.id, fault.type, fault.text) for fault in faults]
         if any(fault.fatal for fault in faults):
             bad.add(node.id)
-    # What was told must not end the block before its constraints are looked at.
+    # Reported faults must not end the block before its constraints are checked.
     whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
     schedule = submitted(player, whole, SilentVoice())
     told = {(warning.id, warning.text) for warning in warnings}

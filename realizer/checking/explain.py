@@ -33,7 +33,7 @@ _MOST_LISTED = 12
 
 
 def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[str, type[Any]]) -> Finding:
-    """What a warning says, with its places.
+    """Return the finding of a warning, with its places.
 
     Args:
         file: as the user named it.
@@ -63,14 +63,14 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
 
 
 def near(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """The choice that a word was probably meant to be, whatever its case; None if there is none."""
+    """Return the choice that a word was probably meant to be, in any case, or None."""
     by_case = {choice.lower(): choice for choice in choices}
     found = difflib.get_close_matches(word.lower(), by_case, n=1, cutoff=cutoff)
     return by_case[found[0]] if found else None
 
 
 def attributes_of(text: str) -> list[str]:
-    """The names of the attributes that a warning tells of, as they are in its text without place."""
+    """Return the attribute names that a warning mentions, from its text without place."""
     lost = _LOST.fullmatch(text)
     names: list[str] = []
     for piece in _PIECE.split(lost[1] if lost else text):
@@ -80,7 +80,7 @@ def attributes_of(text: str) -> list[str]:
 
 
 class _Sentences:
-    """Explains what the parser and the kinds of behaviours say: sentences about one element each."""
+    """Explains the warnings of the parser and the behaviour kinds: sentences about one element each."""
 
     def __init__(self, draft: Draft, vocabulary: Mapping[str, type[Any]]) -> None:
         self.draft, self.vocabulary = draft, vocabulary
@@ -169,7 +169,7 @@ class _Sentences:
         return text
 
     def holder(self, name: str, element: Element) -> None:
-        """Who has what a behaviour wanted: "behaviour", or "block:behaviour" of an earlier block."""
+        """Return the holder of a resource: "behaviour", or "block:behaviour" of an earlier block."""
         block, _, id = name.rpartition(":")
         other = self.source.named(id, block=block or self.draft.block)
         if other is not None and other is not element:

@@ -24,7 +24,7 @@ _BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)
 
 
 def explain_clash(draft: Draft, warning: Warning, text: str) -> bool:
-    """Whether the scheduler says this; if so the draft has what it says.
+    """Add the explanation of a scheduling conflict; returns whether the warning is one.
 
     Args:
         text: of the warning, without its place.
@@ -40,12 +40,12 @@ def explain_clash(draft: Draft, warning: Warning, text: str) -> bool:
 
 
 def _clash(draft: Draft, clash: Iterable[Clause], text: str) -> None:
-    """Every line that has a part in it, and what the behaviours themselves need."""
+    """Add a label for every line that takes part, and the behaviours' own needs."""
     draft.path = draft.path or "/bml"
     for clause in clash:
         of_behaviour = ":" in clause.id
         stated = _STATED.fullmatch(clause.text)
-        # Of a behaviour's own points only equalities stand in the document; order lies in its nature.
+        # Of a behaviour's own points only equalities are in the document; their order is implied.
         if stated is None or clause.line is None or (of_behaviour and stated[2] != "="):
             draft.notes.append(f"note: {clause.text}")
             continue

@@ -9,7 +9,7 @@ from bml_schema.source import Spot
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """Words for a place; `primary` where the fault is, else for what it clashes with."""
+    """A labelled place; `primary` for the fault itself, else for what it conflicts with."""
 
     spot: Spot
     text: str = ""
@@ -24,9 +24,9 @@ class Finding:
         file: as the user named it.
         type: BML warning type, or "ADVICE".
         id: of the block, "block:behaviour", or a constraint's.
-        path: of the element, "" where there is none.
+        path: of the element, or "".
         text: all of it in one line.
-        head: the same where labels and notes tell the rest.
+        head: the text, if labels and notes say the rest.
         labels: the first primary one says the line and column of the whole.
         notes: sentences below the source, such as "help: did you mean ...?".
     """

@@ -16,10 +16,10 @@ class Draft:
     Attributes:
         source: the text.
         id: of the warning: a block, "block:behaviour", or a constraint.
-        line, path: where the warning says it is; None and "" where it does not.
+        line, path: from the warning; None and "" if it has none.
         head: the first line, "" while the whole text will do.
         labels, notes: as a finding has them.
-        element: where it is, None while that is not known.
+        element: its source, or None while unknown.
     """
 
     source: Source

@@ -21,19 +21,19 @@ def told_of(block: Block, id: str, type: str, text: str) -> Warning:
 
 
 def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Block | None]:
-    """The blocks of a text as they are without the attributes for which behaviours were dropped.
+    """Return the blocks of a text without the attributes for which behaviours were dropped.
 
     Args:
-        items: what was read of it.
+        items: the results of reading it.
 
     Returns:
-        One for each of them; None where there is nothing more to be seen.
+        One for each of them; None if there is nothing more to find.
     """
     problems = [p for item in items if isinstance(item, Block) for p in item.problems if p.dropped]
     spans = sorted(set(_spans(source, problems)))
     if not spans:
         return [None] * len(items)
-    # Blanks in their place, so that all else stays where it is.
+    # Replace them by blanks, so that positions stay.
     parts, last = [], 0
     for start, end in spans:
         parts += [source.text[last:start], re.sub(r"[^\n]", " ", source.text[start:end])]
@@ -45,7 +45,7 @@ def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Bl
 
 
 def hidden(block: Block, whole: Block, player: Player, world: World) -> Iterator[Warning]:
-    """What is wrong with the behaviours that a block has only without its faults.
+    """Return the faults of the behaviours that a block has only without its faults.
 
     Args:
         whole: the block as `without_faults` gave it.
@@ -59,7 +59,7 @@ def hidden(block: Block, whole: Block, player: Player, world: World) -> Iterator
 
 
 def _spans(source: Source, problems: Iterable[Problem]) -> Iterator[tuple[int, int]]:
-    """Offsets of the attributes that problems tell of, each from its name to its last quote."""
+    """Return the spans of attributes that problems mention, each from its name to its last quote."""
     for problem in problems:
         element = source.find(problem.path, line=problem.line, block=problem.id.partition(":")[0])
         if element is None:

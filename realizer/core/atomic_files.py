@@ -13,7 +13,7 @@ from pathlib import Path
 def replacing(path: str | Path) -> Iterator[Path]:
     """A new file beside `path` that takes its place when the block ends well, and vanishes when it fails.
 
-    What is there but is no plain file (a pipe, /dev/null) is written to as it is.
+    A path that exists but is no plain file (a pipe, /dev/null) is written to directly.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
@@ -25,13 +25,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
     draft = Path(name)
     try:
         yield draft
-        # mkstemp gives 0600; what is there keeps its mode, what is new gets the usual one.
+        # mkstemp gives 0600; an existing file keeps its mode, a new one gets the usual one.
         mode = path.stat().st_mode & 0o7777 if path.exists() else 0o666 & ~_umask()
         draft.chmod(mode)
         draft.replace(path)
     except BaseException as error:
         draft.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename is None:  # a write does not know where it writes
+        if isinstance(error, OSError) and error.filename is None:  # write errors carry no file name
             error.filename = str(path)
         raise
 
@@ -43,7 +43,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_text(path: str | Path, content: str) -> None:
-    """The whole content as UTF-8 with the line ends as they are, or nothing."""
+    """Write the whole content as UTF-8 with unchanged line ends, or nothing."""
     write_bytes(path, content.encode("utf-8"))
 
 

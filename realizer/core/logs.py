@@ -8,12 +8,12 @@ import sys
 from datetime import UTC, datetime
 from typing import TextIO
 
-# What every record has; the rest of its attributes was given by `extra`.
+# Attributes that every record has; the rest comes from `extra`.
 USUAL = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
 
 
 class JsonFormatter(logging.Formatter):
-    """One JSON object a line: time (UTC), level, logger, message, what `extra` gave, and a traceback."""
+    """A formatter of one JSON object a line: time (UTC), level, logger, message, `extra`, and a traceback."""
 
     def format(self, record: logging.LogRecord) -> str:
         time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
@@ -30,13 +30,13 @@ class JsonFormatter(logging.Formatter):
 
 
 def write_words(level: int, who: str = "") -> None:
-    """Let all logs from `level` on be lines for a reader, on standard error; `who` stands before each."""
+    """Log from `level` on as lines for people, on standard error; `who` precedes each."""
     logging.basicConfig(format=f"realizer: {who}%(message)s", stream=sys.stderr)
     logging.getLogger().setLevel(level)
 
 
 def write_json(stream: TextIO | None = None) -> None:
-    """Let all logs be JSON lines from now on, on standard error; those of the service from INFO on."""
+    """Log as JSON lines, on standard error; the service's own from INFO on."""
     handler = logging.StreamHandler(stream or sys.stderr)
     handler.setFormatter(JsonFormatter())
     root = logging.getLogger()

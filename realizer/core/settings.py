@@ -24,7 +24,7 @@ class SettingsError(RealizerError):
     """A setting with a wrong value; the text says which, what was wanted and what came.
 
     Attributes:
-        setting: its name; "" where it is none.
+        setting: its name, or "".
     """
 
     def __init__(self, text: str, setting: str = "") -> None:
@@ -49,7 +49,7 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
 
 
 def raises(name: str) -> str:
-    """What a refusal says of a limit: where a larger one is set."""
+    """Return the part of a message that says where a limit is set."""
     return f"({PREFIX}{name.upper()} sets it)"
 
 
@@ -150,7 +150,7 @@ def _token(value: Any) -> str | None:
 
 
 def _key(value: Any) -> str | None:
-    """A key itself, or what is in a file of it: a public one in PEM, or a secret that nobody guesses."""
+    """Return a key itself, or the content of its file: a public key in PEM, or a secret."""
     if value is None:
         return None
     wanted = f"a PEM file that is there, or a secret of at least {SECRET} characters"
@@ -165,7 +165,7 @@ def _key(value: Any) -> str | None:
     except UnicodeDecodeError:
         raise ValueError(wanted) from None
     text = text.strip()
-    # A file whose name was written wrong must not become a secret that can be guessed.
+    # A misspelt file name must not become a guessable secret.
     if "-----BEGIN" not in text and (len(text) < SECRET or text.endswith((".pem", ".key", ".pub"))):
         raise ValueError(wanted)
     return text
@@ -181,7 +181,7 @@ def _word_of(*words: str) -> Callable[[Any], str]:
 
 
 def _meant(name: str, known: Iterable[str]) -> str | None:
-    """The setting that somebody has written wrong; None where it is none of ours."""
+    """Return the setting that was probably meant, or None."""
     from difflib import get_close_matches
 
     return next(iter(get_close_matches(name, known, n=1, cutoff=0.8)), None)
@@ -199,7 +199,7 @@ def _setting(default: Any, read: Callable[[Any], Any], says: str, *, secret: boo
 # Not pydantic, which the messages of the service use: loading it takes longer than planning a document.
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a service can be told. `REALIZER_FPS=30` and `fps = 30` in a TOML file mean `--fps 30`.
+    """The settings of a service. `REALIZER_FPS=30` and `fps = 30` in a TOML file mean `--fps 30`.
 
     Raises:
         SettingsError: a value of the wrong kind or out of range.
@@ -356,7 +356,7 @@ class Settings:
         """Settings from all three sources.
 
         Args:
-            flags: what the command line said; None values are left out.
+            flags: values of the command line; None values are ignored.
             file: a TOML file; None for none.
             environment: variables; None for the process's own.
 
@@ -378,7 +378,7 @@ class Settings:
                 if setting in known:
                     values[setting], sources[setting] = value, name
                 elif meant := _meant(setting, known):
-                    # What was to be closed by it would stand open.
+                    # A misspelt protection would leave the service open.
                     raise SettingsError(f"variable {name}: wanted {PREFIX}{meant.upper()}?")
         if unknown := sorted(values.keys() - known):
             wanted = _meant(unknown[0], known) or f"one of {', '.join(sorted(known))}"

@@ -33,7 +33,7 @@ def archetypes(profiles: str = "own") -> Mapping[str, Mapping[int, Profile]]:
     else:
         for row in published_ranges():
             low, high = (row.raw_low, row.raw_high) if profiles == "raw" else (row.low, row.high)
-            # A range that is printed backwards is one all the same.
+            # A range that is printed backwards is reversed.
             ranges.setdefault((row.emotion, row.profile), {})[row.fap] = min(low, high), max(low, high)
     found: dict[str, dict[int, Profile]] = {}
     for (emotion, number), faps in ranges.items():

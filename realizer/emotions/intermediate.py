@@ -34,7 +34,7 @@ def between(one: Anchor, two: Anchor, angle: float, activation: float, name: str
     """The profile of an emotion between two archetypes, by the published rules (4.2, rules 1 to 6).
 
     The nearer archetype weighs more, as in the paper's own example (eq. 13); its eq. 5 and 6 have the weights
-    exchanged. The rules are not continuous: see `wheel` for what is.
+    exchanged. The rules are not continuous; `wheel` is.
 
     Args:
         one, two: counted in the sense of rising angles, over 0 if need be.

@@ -57,7 +57,7 @@ class Profile:
         """The profile of such a text; ranges that are written backwards are turned round.
 
         Raises:
-            ValueError: what is no range, or a FAP twice; with the place in the text.
+            ValueError: an invalid range, or a FAP twice; with the place in the text.
         """
         ranges: dict[int, tuple[float, float]] = {}
         place = 0
@@ -93,7 +93,7 @@ class Profile:
         """(68,) a place in each range, so that one expression does not look twice alike.
 
         Both sides of the face, and the inner and the outer point of a lip, go equally far into their ranges:
-        otherwise the face would be torn.
+        otherwise the face would tear.
         """
         chance = np.random.default_rng(seed)
         parts: dict[int, float] = {}
@@ -114,7 +114,7 @@ class Profile:
 
 
 def _one_of(fap: int) -> int:
-    """The FAP that stands for this one, its mirror image, and their inner points of the lips."""
+    """Return the FAPs that belong together: this one, its mirror image, and their inner lip points."""
     inner = fap - OUTER if 4 <= fap - OUTER <= 13 else fap
     return min(inner, tables.faps()[inner - 1].mirror)
 

@@ -13,10 +13,10 @@ def read_profiles(text: str, where: str = "profiles") -> tuple[Profile, ...]:
     Empty lines, and those that begin with #, do not count.
 
     Args:
-        where: what to call the file in messages.
+        where: the name of the file in messages.
 
     Raises:
-        ValueError: a label without a number, one that comes twice, or what is no range; with the line.
+        ValueError: a label without a number, a label twice, or an invalid range; with the line.
     """
     found: dict[str, Profile] = {}
     label = ""
@@ -42,7 +42,7 @@ def read_profiles(text: str, where: str = "profiles") -> tuple[Profile, ...]:
 
 
 def write_profiles(profiles: Iterable[Profile]) -> str:
-    """The text of such a file; a profile whose name has no number gets 0."""
+    """Return the text of a profile file; a profile without a number gets 0."""
     lines = []
     for profile in profiles:
         numbered = profile.name.rpartition(" ")[2].isdecimal() and " " in profile.name

@@ -18,7 +18,7 @@ NEUTRAL = "neutral"
 def wheel(
     angle: float, activation: float | None = None, profiles: str = "own", ring: str = "paul"
 ) -> Profile:
-    """What shows at a place on the wheel: the archetypes on both sides of it, the nearer the more.
+    """Return the profile at a place on the wheel: a mix of the archetypes on both sides, by nearness.
 
     Each range is that of an archetype times the activation over the archetype's own, and times its share;
     a FAP that only one of them moves counts by its share too, and those in which the two contradict each
@@ -27,8 +27,8 @@ def wheel(
 
     Args:
         angle: degrees, any turn: -700 is 20.
-        activation: 0, the middle, which shows nothing, to 7, the rim; None as much as the archetypes do.
-        profiles: "own", whose archetypes are drawn for the rim, "published" or "raw", for their activations.
+        activation: 0, the middle, which is neutral, to 7, the rim; None as for the archetypes.
+        profiles: "own", whose archetypes are at the rim, "published" or "raw", at their activations.
         ring: "paul", with trust at 0, fear at 45 and so on, "plutchik", with the angles of Plutchik's words,
             or "affect", by the angle of (valence, arousal).
 
@@ -52,7 +52,7 @@ def wheel(
 
 
 def strength_at(activation: float | None) -> float:
-    """How strongly our own archetypes show at an activation: 0 in the middle, 1 at the rim; None is the rim.
+    """Return the strength of our own archetypes at an activation: 0 in the middle, 1 at the rim (None).
 
     Raises:
         ValueError: an activation off the wheel.
@@ -72,7 +72,7 @@ def shares(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str,
 
 
 def affect(valence: float, arousal: float, profiles: str = "own") -> Profile:
-    """What shows at a place in the plane of valence and arousal (the extension of Paul 2010, 8.2).
+    """Return the profile at a place in the plane of valence and arousal (the extension of Paul 2010, 8.2).
 
     There is no one-to-one relation between valence and the angle of Plutchik's wheel, so this has a ring of
     its own: each archetype stands where Whissell's evaluation and activation of its word put it, and shows
@@ -119,7 +119,7 @@ def _plain(name: str) -> str:
 
 @cache
 def _anchors(profiles: str, ring: str) -> tuple[tuple[Anchor, ...], tuple[float, ...]]:
-    """Those of a ring that the set has a profile of, by rising angle, and the angles."""
+    """Return the emotions of a ring that have a profile in the set, by rising angle, and the angles."""
     model, known = emotion_model(), archetypes(profiles)
     if not places(ring):
         raise ValueError(f"ring: wanted paul, plutchik or affect, got {ring!r}")

@@ -72,7 +72,7 @@ def emotion(word: str, profiles: str = "own") -> Profile:
 
 
 def strength_of(place: WordPlace) -> float:
-    """How strongly our own archetypes show for a word: 1 as they are drawn.
+    """Return the strength of our own archetypes for a word: 1 is full.
 
     A word is a kind of face: what Whissell rated counts beside its neighbours on Plutchik's ring, so that
     terrified is more than afraid, and afraid as much as fear.
@@ -86,7 +86,7 @@ def strength_of(place: WordPlace) -> float:
 
 
 def place_of(word: str, profiles: str = "own") -> WordPlace | None:
-    """Where on the wheel a word is; None for the neutral face, which is nowhere on it.
+    """Return a word's place on the wheel, or None for the neutral face.
 
     An archetype and the number of one of its profiles in that set is where the archetype is.
 
@@ -116,7 +116,7 @@ def place_of(word: str, profiles: str = "own") -> WordPlace | None:
 
 @cache
 def known_words() -> Mapping[str, str]:
-    """Every word that has a profile -> where it comes from: "wheel", "whissell" or "own"."""
+    """Return word -> its source, "wheel", "whissell" or "own", for every word with a profile."""
     found = dict.fromkeys([NEUTRAL, *ring("paul")], "wheel")
     found |= {row.word: "whissell" for row in whissell_words().values() if row.activation is not None}
     found |= dict.fromkeys(own_words(), "own")

@@ -18,14 +18,14 @@ class Expression:
     """A shape that a face takes, with a name of its own (Wojdel 2005, 5.4.1).
 
     Attributes:
-        name: as it is written: "template:surprise", "SMILE".
-        features: what is seen, in words.
-        means: words and phrases that it is asked for by.
+        name: as written: "template:surprise", "SMILE".
+        features: the visible features, in words.
+        means: words and phrases for searching.
         aus: (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1 at intensity 1.
-        gaps: onset, apex and offset, each with where it comes from; seconds.
-        possible, probable: seconds for which it was seen on people, (least, most); None where nobody says.
+        gaps: onset, apex and offset, each with its source; seconds.
+        possible, probable: seconds for which people showed it, (least, most); None if unknown.
         source: where the expression comes from.
-        file: of a user's own; None for a shipped one.
+        file: of a user's expression; None for a built-in one.
     """
 
     name: str
@@ -91,5 +91,5 @@ class Expression:
 
 
 def key(name: str) -> str:
-    """What two spellings of a name have in common: case, and what stands between words, do not count."""
+    """Return the key of a name: case and separators do not count."""
     return re.sub(r"[\s_-]+", "_", re.sub(r"\s*:\s*", ":", name.strip())).upper()

@@ -40,7 +40,7 @@ class Library(Mapping[str, Expression]):
         self._as_written = {one.name: one for one in self._known.values()}
 
     def __getitem__(self, name: str) -> Expression:
-        # Nearly always it is spelt as it is written here.
+        # Nearly always the exact spelling.
         return self._as_written.get(name) or self._known[key(name)]
 
     def __iter__(self) -> Iterator[str]:
@@ -59,7 +59,7 @@ class Library(Mapping[str, Expression]):
         return list(dict.fromkeys(name for part in found for name in parts[part]))[:3]
 
     def unknown(self, name: str) -> str:
-        """What to say of a name that is none of these."""
+        """Return the message for an unknown name."""
         near = self.near(name)
         hint = f", did you mean {' or '.join(near)}?" if near else ""
         return f"wanted a name of `realizer expressions list`, got {name[:60]!r}{hint}"
@@ -76,7 +76,7 @@ def shipped() -> Library:
 
 
 def library_of(folder: Path | None = None) -> Library:
-    """What ships, and a user's own expressions before them. A folder is read once.
+    """Return the library: a user's expressions before the built-in ones. A folder is read once.
 
     Raises:
         TableError: files that are no expressions; every fault, with file and key.
@@ -109,7 +109,7 @@ def _of_lexeme(name: str) -> Expression:
 
 
 def _of_template(template: Template) -> Expression:
-    """The apex fills what the average, within its probable range, leaves beside half of onset and offset."""
+    """Return the apex: the average within its probable range, less half of onset and offset."""
     onset, hold, offset = gaps("face").gaps
     evident = template.evident
     if template.probable is not None:

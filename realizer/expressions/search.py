@@ -11,7 +11,7 @@ import numpy as np
 from realizer.expressions.expression import Expression
 from realizer.tables import by_number
 
-# What a word of a question counts for, by where it is found.
+# Weight of a matching word, by where it is found.
 NAMED, MEANT, SEEN, NEARLY = 3.0, 2.0, 1.0, 0.5
 LITTLE = frozenset(
     [
@@ -81,7 +81,7 @@ LEAST = 3  # letters of a stem
 
 
 def by_meaning(text: str, expressions: Iterable[Expression]) -> list[tuple[Expression, float]]:
-    """Those that have words of a text in their name, in what they mean or in what is seen, by how many.
+    """Return expressions that share words with a text, in name, meaning or features, by number of words.
 
     Returns:
         (expression, score): 1 where every word of the text is in its name; sorted, none with 0.
@@ -112,13 +112,13 @@ def by_meaning(text: str, expressions: Iterable[Expression]) -> list[tuple[Expre
 def by_action_units(
     asked: Mapping[tuple[int, str], float], expressions: Iterable[Expression]
 ) -> list[tuple[Expression, float]]:
-    """Those that share action units with what is asked for, by the cosine between both, sides apart.
+    """Return expressions that share action units with the request, by cosine, with sides apart.
 
     Args:
         asked: (AU, side LEFT | RIGHT | BOTH) -> intensity.
 
     Returns:
-        (expression, cosine 0..1), the best first; none that shares nothing.
+        (expression, cosine 0..1), the best first, without those of cosine 0.
     """
     wanted = _vector(asked)
     found = []

@@ -29,7 +29,7 @@ class Span:
 def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
     """When each entry of a track shows.
 
-    An entry lies from the end of the one before it to the start of the next. Its onset lies at its beginning
+    An entry spans from the end of the one before it to the start of the next. Its onset is at its beginning
     and its offset at its end; joined by one of them alone, the other expression is whole up to there. The
     first rises by its onset and the last goes by its offset, whatever the joins. A break has neither: the
     expression before it goes by its own offset, the one after it comes by its own onset. Where an entry is

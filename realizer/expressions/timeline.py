@@ -17,12 +17,12 @@ NEUTRAL = "NEUTRAL"
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One place of a track.
+    """An entry of a track.
 
     Attributes:
         expression: its name in the library; "neutral" is a break.
         intensity: 0..1.
-        duration: seconds from its beginning to its end, onset and offset with it; None is the expression's
+        duration: seconds with onset and offset; None is the expression's
             own, of a break half a second.
     """
 
@@ -42,7 +42,7 @@ class Track:
     Attributes:
         name: for messages.
         entries: at least one.
-        joins: what lies between two entries: the "offset" of the first, the "onset" of the second, or both.
+        joins: the transition between two entries: "offset" of the first, "onset" of the second, or both.
         curve: "linear" as hers, or "smooth".
         start: seconds from the timeline's start.
     """
@@ -72,7 +72,7 @@ class Timeline:
 
 
 def faults_of(timeline: Timeline, library: Library) -> list[str]:
-    """Entries whose expression is not in the library: channel, entry, what was wanted, what came."""
+    """Yield entries whose expression is not in the library: channel, entry, what was wanted, what came."""
     return [
         f"channel {track.name}, entry {number}, expression: {library.unknown(entry.expression)}"
         for track in timeline.tracks
@@ -82,7 +82,7 @@ def faults_of(timeline: Timeline, library: Library) -> list[str]:
 
 
 def remarks(timeline: Timeline, takes: Collection[str] | None = None) -> list[str]:
-    """What a timeline asks of the mixer that has no effect, a sentence each.
+    """Yield mixer requests of a timeline that have no effect, a sentence each.
 
     Args:
         takes: what moves the face (`Face.takes`); None: it is not known.

@@ -20,7 +20,7 @@ ENTRY = ("expression", "intensity", "duration")
 
 
 def read_timeline(content: bytes) -> Timeline:
-    """A timeline of TOML or, where it begins as an object or a list of it does, of JSON.
+    """Read a timeline: TOML, or JSON if it begins as an object or a list.
 
         mixer = "successive"    # or "additive", which is usual
         order = [4, 1, 2]       # with "successive": these action units first
@@ -37,7 +37,7 @@ def read_timeline(content: bytes) -> Timeline:
         ]
 
     Raises:
-        TableError: all that is wrong, a line each: channel, entry, what was wanted, what came.
+        TableError: all faults, a line each: channel, entry, what was wanted, what came.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -59,7 +59,7 @@ def _is_json(text: str) -> bool:
 
 
 class _Reading:
-    """What is wrong with a file, as it is read."""
+    """The faults of a file while it is read."""
 
     def __init__(self) -> None:
         self.faults: list[str] = []
@@ -97,7 +97,7 @@ class _Reading:
         if not isinstance(told, list):
             self._fault("timeline, order", "a list of action units, such as [4, 1, 2]", told)
             return ()
-        # What turns follows all others, whatever their order (5.1).
+        # Rotations follow all other units, whatever their order (5.1).
         still = {row.au for row in action_units() if not row.degrees}
         order: list[int] = []
         for number, au in enumerate(told, 1):

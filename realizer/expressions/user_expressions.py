@@ -24,7 +24,7 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
     """The expressions of a folder, by the names of their files.
 
         name = "polite smile"                # else the name of the file
-        means = ["greeting", "thank you"]    # what it is found by
+        means = ["greeting", "thank you"]    # search words
         features = "raised corners of the mouth, one brow up"
         aus = { 12 = 0.5, 6 = 0.2, 2L = 0.4 }
         onset = 0.3                          # seconds; those that are missing are as for any face
@@ -35,7 +35,7 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
         source = "seen at the front desk"
 
     Raises:
-        TableError: all that is wrong, a line each: file, key, what was wanted, what came.
+        TableError: all faults, a line each: file, key, what was wanted, what came.
     """
     found: dict[str, Expression] = {}
     faults: list[str] = []
@@ -63,14 +63,14 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
 
 
 class _Reading:
-    """One file, and what is wrong with it."""
+    """One file and its faults."""
 
     def __init__(self, path: Path, row: dict[str, Any]) -> None:
         self.path, self.row = path, row
         self.faults: list[str] = []
 
     def expression(self) -> Expression | None:
-        """None where the file has faults."""
+        """Return the expression, or None if the file has faults."""
         for name in self.row.keys() - set(KEYS):
             near = difflib.get_close_matches(name, KEYS, n=1)
             hint = f", did you mean {near[0]}?" if near else ""

@@ -14,9 +14,9 @@ from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import Company, Mood, Placing, Role, knowledge
 from realizer.tables.templates import templates
 
-NEAR = 1.0  # s; what is nearer than that is "in the neighbourhood" (6.3.3)
+NEAR = 1.0  # s; nearer expressions are "in the neighbourhood" (6.3.3)
 FRAME = 0.04  # s; she counted frames
-FEW = 3  # expressions; of fewer no pace can be told
+FEW = 3  # expressions; fewer show no pace
 RATIO = 2.0  # a pace that differs from the mood's by more than that is another mood's
 
 
@@ -32,7 +32,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What is not as people do it.
+    """An unusual expression.
 
     Attributes:
         id: of the behaviour that it is about; "" for the whole block.
@@ -53,12 +53,12 @@ def advise(
     mood: Mood | None = None,
     lists: Words = ENGLISH,
 ) -> Iterator[Advice]:
-    """What the knowledge base has to say about a block; behaviours that are no templates are passed over.
+    """Yield advice on a block; behaviours that are no templates are ignored.
 
     Args:
-        seen: the templates of the block, as they are scheduled.
+        seen: the scheduled templates of the block.
         words: speech id -> (characters before it in the text, seconds) of each word.
-        role, mood: of who is animated.
+        role, mood: of the animated character.
         lists: the language of a text that names none, and which words count in which.
     """
     seen = sorted(seen, key=lambda one: one.start)
@@ -80,7 +80,7 @@ def advise(
 
 
 def _length(one: Seen, mood: Mood | None) -> Iterator[Advice]:
-    """What nobody was seen to show so long, and what is unusual, for the mood too.
+    """Yield durations that nobody was seen to show, and those that are unusual, also for the mood.
 
     Of some templates the mean is beyond what table 6.15 calls probable; the mean is not unusual.
     """
@@ -108,8 +108,8 @@ def lasting(
     Args:
         id: of what shows it; name: of the expression.
         lasts: seconds.
-        possible, probable: seconds, (least, most); None where nobody says.
-        source: who says so.
+        possible, probable: seconds, (least, most); None if unknown.
+        source: where it was observed.
     """
     if possible is not None and not possible[0] - 1e-3 <= lasts <= possible[1] + 1e-3:
         how = _how(lasts, possible[0])
@@ -153,7 +153,7 @@ def _company(one: Seen, company: Company, seen: Sequence[Seen]) -> Iterator[Advi
 def _kept(
     id: str, text: Sequence[Sentence], seen: Sequence[Seen], times: dict[int, float], words: WordList | None
 ) -> Iterator[Advice]:
-    """Words that are said with an expression which is not there."""
+    """Yield words that usually have an expression which is missing."""
     for placement in place(text, knowledge(), "speaker", None, words):
         at = times.get(placement.word.place)
         if not placement.rule.keep or at is None:

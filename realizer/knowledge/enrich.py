@@ -22,7 +22,7 @@ MARK, ESCAPE = (
     len("&amp;") - 1,
 )  # what they add to the text that a voice is given
 OPENING = "\"'“‘„«‹([¿¡"
-INTENSITY = 0.7  # of what is placed: people talk with less than a full face
+INTENSITY = 0.7  # intensity of placed expressions: people talk with less than a full face
 NEVER = 0.2  # s; what would be shorter than that is not placed
 
 
@@ -44,10 +44,10 @@ class Heard(NamedTuple):
 
 @dataclass(frozen=True)
 class Enricher:
-    """What is known of who is animated.
+    """The context of the animated character.
 
     Attributes:
-        role: who talks, or who listens to what is said.
+        role: whether the character speaks or listens.
         mood: how often, and for how long, expressions come; None: as on average.
         words: the language of a text that names none, and which words count in which.
     """
@@ -57,7 +57,7 @@ class Enricher:
     words: Words = ENGLISH
 
     def text(self, text: str, block: str = "bml1") -> Block:
-        """A block that says `text` with the face of a speaker, or that shows who hears it."""
+        """Return a block that says `text` with a speaker's face, or that shows a listener."""
         if self.role == "listener":
             return self.listener((Heard(text, 0.0, self.words.language),), block)
         named = "" if self.words.everywhere else self.words.language
@@ -65,10 +65,10 @@ class Enricher:
         return self.block(Block(id=block, children=(speech,)))
 
     def texts(self, text: str, longest: int) -> Iterator[Block]:
-        """The same in blocks that can be played, each after the one before, cut between sentences.
+        """Return the same as playable blocks, each after the one before, cut between sentences.
 
         Args:
-            longest: characters that a voice takes at once, marks included.
+            longest: characters that a voice can take at once, marks included.
         """
         for number, block in enumerate(self._short(text, longest, longest // 2), 1):
             yield replace(block, id=f"bml{number}", composition="APPEND" if number > 1 else "MERGE")
@@ -85,7 +85,7 @@ class Enricher:
     def block(self, block: Block) -> Block:
         """A speaker's block with expressions at its words, and with company for the expressions it has.
 
-        What the block says already is left as it is; doing it twice adds nothing.
+        Expressions of the block stay; enriching twice adds nothing.
         """
         names = _Names(block)
         speeches: dict[str, Speech] = {}
@@ -101,7 +101,7 @@ class Enricher:
         return replace(block, children=(*children, *placed), places={})
 
     def listener(self, said: Iterable[Heard], block: str) -> Block:
-        """A block of expressions for who hears these texts."""
+        """Return a block of expressions for a listener to these texts."""
         names = _Names(Block(id=block))
         placed: list[Expression] = []
         for text, begin, language in said:
@@ -152,7 +152,7 @@ class Enricher:
         return Expression(id=id, name=PREFIX + name, intensity=INTENSITY, because=because, syncs=syncs)
 
     def _company(self, node: Expression, beside: Sequence[Expression], names: _Names) -> Iterator[Expression]:
-        """What comes with an expression and is not there yet."""
+        """Return the accompanying expressions that are missing."""
         for company in self.knowledge.companies:
             if company.offered or company.of != template_of(node):
                 continue
@@ -165,7 +165,7 @@ class Enricher:
 
 
 def _length(node: object) -> int:
-    """Characters that a voice is given, about; 0 of what is not spoken."""
+    """Return the approximate number of characters for a voice; 0 for behaviours that do not speak."""
     if not isinstance(node, Speech) or node.text is None:
         return 0
     text = str(node.text)
@@ -220,7 +220,7 @@ class _Names:
 
 
 def _around(node: Expression, company: Company) -> tuple[SyncRef | None, SyncRef | None]:
-    """Where the other expression starts and ends; no start: there is no room for it."""
+    """Return start and end of the other expression; no start if there is no room."""
 
     def point(sync: str, offset: float = 0.0) -> SyncRef:
         return SyncRef(behaviour=node.id, sync=sync, offset=offset)
@@ -242,7 +242,7 @@ def _refers(node: Expression, id: str) -> bool:
 
 
 def _held(template: Template, length: float) -> float:
-    """Seconds from attackPeak to relax, so that it can be seen `length` times as long as usual."""
+    """Return the seconds from attackPeak to relax that show it `length` times as long as usual."""
     seen = template.evident * length
     if template.possible is not None:
         seen = min(max(seen, template.possible[0]), template.possible[1])

@@ -9,19 +9,19 @@ from realizer.knowledge.sentences import Sentence, SpokenWord
 from realizer.tables.emotional_words import WordList
 from realizer.tables.knowledge import Knowledge, Mood, Placing, Role
 
-# A negation turns a word around that stands at most so many words after it: "not so very bad".
+# A negation applies to a word at most so many words after it: "not so very bad".
 REACH = 3
-# What a negation turns around: who says "do not be afraid" is not.
+# Categories that a negation inverts: "do not be afraid" shows no fear.
 TURNED = ("sorrow", "fright", "irritation", "disapproval", "approval", "assent")
 
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """What one rule places.
+    """A placement by one rule.
 
     Attributes:
         rule: the rule.
-        word: where it begins.
+        word: the index of its first word.
     """
 
     rule: Placing
@@ -35,10 +35,10 @@ def place(
     mood: Mood | None = None,
     words: WordList | None = None,
 ) -> tuple[Placement, ...]:
-    """Where expressions go, in the order of the text.
+    """Return the placements of expressions, in the order of the text.
 
-    One place gets what the most important rule asks for. A mood or a listener keeps expressions apart: of two
-    that are too near the less important one goes, but never one whose rule says that it stays.
+    At one place the most important rule wins. A mood or a listener keeps expressions apart: of two
+    that are too near, the less important one is dropped, except if its rule says that it stays.
 
     Args:
         words: the categories of words; None: only punctuation counts.
@@ -58,7 +58,7 @@ def place(
 
 
 def _asked(sentence: Sentence, rules: Sequence[Placing], words: WordList | None) -> Iterator[Placement]:
-    """What the rules ask for in one sentence; the first rule that asks for a place has it."""
+    """Yield the placements of one sentence; the first rule for a place wins."""
     categories = _categories(sentence, words)
     taken: set[int] = set()
     for rule in rules:

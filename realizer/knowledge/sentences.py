@@ -19,7 +19,7 @@ SAID = re.compile(f"[^{PICTURE}]")
 
 @dataclass(frozen=True, slots=True)
 class SpokenWord:
-    """A word, its place in the text, and when it is said.
+    """A word, its place in the text, and its time.
 
     Attributes:
         place: characters before it.
@@ -80,7 +80,7 @@ def _pieces(text: str) -> Iterator[tuple[str, int, str]]:
 
 
 def _pauses(between: str) -> int:
-    """Units of what stands between two words: one for each run of punctuation (eq. 6.6)."""
+    """Return the units between two words: one for each run of punctuation (eq. 6.6)."""
     phrase = syllable_facts()["phrase"]
     inside = [sign in phrase for sign in between]
     return sum(now and not before for before, now in zip([False, *inside], inside, strict=False))

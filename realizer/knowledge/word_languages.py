@@ -19,8 +19,8 @@ class Words:
 
     Attributes:
         language: BCP-47 of a text that names none.
-        own: a list of the user's, before those that ship; None: there is none.
-        everywhere: whether that list is for all texts, as nobody asked for a language; otherwise it is for
+        own: a user's list, before the built-in ones; None if there is none.
+        everywhere: whether that list is for all texts, because no language was requested; if not, for
             those in `language`.
     """
 
@@ -29,7 +29,7 @@ class Words:
     everywhere: bool = True
 
     def of(self, language: str) -> WordList | None:
-        """The words of a language ("en-GB" is "en"); None where there are none, so that no word counts."""
+        """Return the words of a language ("en-GB" is "en"), or None, so that no word counts."""
         if self.own is not None and (self.everywhere or _same(language, self.language)):
             return self.own
         return word_list(language)
@@ -54,7 +54,7 @@ def _named(speech: Speech, block: Block) -> Iterator[str | None]:
 
 
 def _of_ssml(content: str) -> str | None:
-    # The content comes from the parser, which lets no DTD and no entities through.
+    # The content comes from the parser, which rejects DTDs and entities.
     try:
         return ElementTree.fromstring(content).get(LANG)
     except ElementTree.ParseError:
@@ -62,6 +62,6 @@ def _of_ssml(content: str) -> str | None:
 
 
 def _same(one: str, other: str) -> bool:
-    """Whether two tags are of one language, whatever their country."""
+    """Return whether two tags are of one language, whatever their country."""
     first, second = (tag.replace("_", "-").partition("-")[0].lower() for tag in (one, other))
     return first == second

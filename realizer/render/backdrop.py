@@ -16,10 +16,10 @@ BACKGROUND = "REALIZER_BACKGROUND"
 
 
 def colour_of(background: str | None, *, alpha: bool = True) -> str | None:
-    """What stands behind: None is the light's own gradient, else "#rrggbb" or "transparent".
+    """Return the background: None is the light's own gradient, else "#rrggbb" or "transparent".
 
     Args:
-        background: what the caller asked for; None is what the variable REALIZER_BACKGROUND says.
+        background: the caller's choice; None selects the variable REALIZER_BACKGROUND.
         alpha: without it, a variable that says "transparent" means the gradient: films are opaque.
 
     Raises:
@@ -34,7 +34,7 @@ def colour_of(background: str | None, *, alpha: bool = True) -> str | None:
 
 
 def channels(background: str | None) -> int:
-    """Of a picture: four where it is transparent."""
+    """Return the number of channels of a picture: four if it is transparent."""
     return 4 if background == TRANSPARENT else 3
 
 

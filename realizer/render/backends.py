@@ -19,13 +19,13 @@ CARDS = ("dri/renderD*", "nvidia[0-9]*", "dxg")
 
 
 class Drawer(Protocol):
-    """What every canvas can do."""
+    """The interface of canvases."""
 
     def draw(self, vertices: Float32, normals: Float32, out: UInt8 | None = None) -> UInt8:
         """(h, w, 3) uint8, (h, w, 4) where transparent, of (n, 3) vertices and unit normals."""
 
     def close(self) -> None:
-        """Free what it holds."""
+        """Release the canvas's resources."""
 
 
 def open_canvas(
@@ -40,7 +40,7 @@ def open_canvas(
 
     Args:
         background: as `realizer.render.backdrop.backdrop` takes it.
-        way: one of WAYS; "auto" takes what is faster here, and the other one where that is missing.
+        way: one of WAYS; "auto" selects the faster one here, or the other if that is missing.
 
     Raises:
         RenderError: no such way, or it is missing here; the text says what to install.

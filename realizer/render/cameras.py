@@ -41,7 +41,7 @@ PRESETS: Mapping[str, Framing] = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Camera:
-    """A camera that stands level.
+    """A level camera.
 
     Attributes:
         position, target: (3,) float64 metres; same height.
@@ -119,7 +119,7 @@ def camera_for(face: Face, name: str = "front") -> Camera:
     back = np.array([math.sin(yaw), 0.0, math.cos(yaw)])
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
     hairline, chin = (np.asarray(face.points[p], np.float64) for p in ("11.1", "2.1"))
-    # A point at height y and depth d stands (y - eye) / (d tan(fovy / 2)) of half the picture above its
+    # A point at height y and depth d is (y - eye) / (d tan(fovy / 2)) of half the picture above its
     # middle: two points, two unknowns.
     high, low = 1 - 2 * framing.hairline, 1 - 2 * framing.chin
     depths = [framing.distance - float(p @ back) for p in (hairline, chin)]
@@ -142,7 +142,7 @@ def camera_for(face: Face, name: str = "front") -> Camera:
 def _sideways(face: Face, right: Float64, yaw: float) -> float:
     """Metres along `right` of the picture's middle: half-way between the outermost points above the chin.
 
-    From the front that is the nose's plane, whatever the hair does.
+    From the front that is the nose's plane, whatever the hair.
     """
     if yaw == 0:
         return float(np.asarray(face.points["2.1"], np.float64) @ right)

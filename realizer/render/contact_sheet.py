@@ -51,7 +51,7 @@ def sheet(
         pictures: (h, w, 3) uint8 each, all of one size; at least one.
         titles: a short line each, such as a time or the name of a FAP.
         notes: lines each, such as sync points; cut to the picture's width. A line too many becomes "+2".
-        columns: None makes the sheet about as wide as it is high, half as much again.
+        columns: None makes the sheet about one and a half times as wide as it is high.
 
     Raises:
         ValueError: no pictures.
@@ -68,8 +68,8 @@ def album(groups: Sequence[Group], legend: UInt8 | None = None, says: str = "") 
 
     Args:
         groups: their cells all have as many pictures, of one size; at least one cell.
-        legend: (h, w, 3) picture that stands at the right above everything, beside `says`.
-        says: what the album shows; the line at the top.
+        legend: (h, w, 3) picture at the top right, beside `says`.
+        says: the description of the sheet, in the line at the top.
 
     Raises:
         ValueError: no cells.
@@ -87,7 +87,7 @@ def columns_for(count: int, width: int, height: int) -> int:
 
 
 class _Form:
-    """How large cells of a kind are, and their letters."""
+    """The size of cells of a kind, and their font."""
 
     def __init__(self, cells: Sequence[Cell]) -> None:
         if not cells:

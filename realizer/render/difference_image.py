@@ -25,7 +25,7 @@ def ramp(amount: Float32) -> Float32:
 
 
 def faint(neutral: UInt8) -> Float32:
-    """(h, w, 3) sRGB 0..255: what lies below the differences, of (h, w, 4) pixels without a background."""
+    """Return the background (h, w, 3), sRGB 0..255, under the differences, of (h, w, 4) pixels."""
     from PIL import Image, ImageFilter
 
     share = neutral[..., 3:] / np.float32(255)

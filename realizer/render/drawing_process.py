@@ -24,7 +24,7 @@ PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes abo
 
 
 class Child:
-    """One drawing process; it opens its canvas while its owner goes on."""
+    """One drawing process; it opens its canvas while its owner continues."""
 
     def __init__(self, order: Open) -> None:
         from realizer.render.backdrop import channels
@@ -115,13 +115,13 @@ def _end(
 
 
 def available(way: str | None = None) -> str | None:
-    """None where pictures can be drawn, that way; otherwise a sentence that says what to install."""
+    """Return None if pictures can be drawn that way, or a sentence that says what to install."""
     return asked(way)[1]
 
 
 @cache
 def asked(way: str | None = None) -> tuple[str, str | None]:
-    """The way pictures are drawn here, and None; or "" and what to install. Asks a new process, once."""
+    """Return the way pictures are drawn here, and None; or "" and what to install. Cached."""
     done = subprocess.run(
         [*_command(), "--check", way or os.environ.get(DRAW) or "auto"],
         env=_environment(),

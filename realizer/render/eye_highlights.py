@@ -37,7 +37,7 @@ class Glints:
         self.triangles: Int32 = np.concatenate([np.zeros((0, 3), np.int64), *caps]).astype(np.int32)
 
     def to_json(self) -> dict[str, Any]:
-        """The eyes as plain numbers, for whoever draws the face's vertices and its own glints.
+        """Return the highlights as numbers, for clients that draw the face themselves.
 
         A cap's middle is towards key + `Light.glint` x the camera, its edge `Light.glint_width` away; its
         points lie `radius` from the centre, which is the sum of the weights times the vertices from `first`.
@@ -73,7 +73,7 @@ class _Ball:
         centre = found[:3]
         mixture = np.vstack([local.T, np.ones(len(local))])
         self.weights: Float32 = np.linalg.lstsq(mixture, [*centre, 1.0], rcond=None)[0].astype(np.float32)
-        # Where eyes bulge over the iris, the bulge counts.
+        # The bulge of the cornea counts, if the eye has one.
         self.radius = np.float32(np.linalg.norm(local - centre, axis=1).max())
         self.first, self._range = first, slice(first, last)
 

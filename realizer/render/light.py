@@ -60,7 +60,7 @@ class Light:
     highlight: float
     dull: float
     sharp: float
-    glint: float  # a glint stands on the eyes towards key + glint x v: 1 is the mirror's place, more is lower
+    glint: float  # place of the glint along key + glint x v: 1 is the mirror's place, more is lower
     glint_width: float  # radians from its middle to its edge
     exposure: float
     knee: float
@@ -85,7 +85,7 @@ def presets() -> Mapping[str, Light]:
 
 
 def preset(name: str | None = None) -> Light:
-    """The light of that name; None is the one that the variable REALIZER_LIGHT names, or "portrait".
+    """Return the light of that name; None selects REALIZER_LIGHT, then "portrait".
 
     Raises:
         RenderError: no such light; the text lists the known ones.

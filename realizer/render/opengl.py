@@ -126,7 +126,7 @@ def _open(pyrender: Any, size: tuple[int, int]) -> Any:
             return Offscreen(*size)
         except Exception as error:
             fault = fault or error
-            if isinstance(error, ValueError):  # no device of that number: the first fault tells more
+            if isinstance(error, ValueError):  # no device of that number: the first error is more useful
                 break
     raise RenderError(f"{NO_GL} ({_first_line(fault)})")
 

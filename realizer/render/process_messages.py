@@ -17,7 +17,7 @@ from realizer.face.model import Face
 
 @dataclass(frozen=True)
 class Open:
-    """The first message: what to draw, and the file under both sides' memory. Answered with the way taken."""
+    """The first message: what to draw, and the file of the shared memory. The answer names the way chosen."""
 
     face: str | Face
     size: tuple[int, int]

@@ -15,7 +15,7 @@ from realizer.core.array_types import Float32, Int32, UInt8
 from realizer.core.errors import RenderError
 
 NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-realizer[render]'"
-# Where in a pixel its samples stand, a row of samples each: in the middle, or on a turned grid, no two in
+# Sample positions in a pixel, a row each: in the middle, or on a rotated grid with no two in
 # one column, as graphics cards place four.
 PLAIN = (0.5,)
 SMOOTH = (0.375, 0.875, 0.125, 0.625)
@@ -31,15 +31,15 @@ class Raster:
 
         Args:
             size: width, height in pixels.
-            smooth: four samples a pixel, otherwise one.
+            smooth: four samples a pixel instead of one.
         """
         width, height = size
         self._samples = SMOOTH if smooth else PLAIN
-        # A pixel's samples side by side: what a small triangle writes is near in memory.
+        # The samples of a pixel are adjacent, so that a small triangle writes to adjacent memory.
         # Each is one number, nearness above and tone below: the greater one is the nearer one.
         self._keys = np.zeros((height, width, len(self._samples)), np.uint64)
         self._picture = np.zeros((height, width), np.uint32)
-        # A band of rows for each processor: the loops let go of Python's lock.
+        # A band of rows for each processor: the loops release Python's lock.
         bands = max(1, min(THREADS, os.cpu_count() or 1, height))
         edges = [height * k // bands for k in range(bands + 1)]
         self._bands = list(pairwise(edges))
@@ -51,7 +51,7 @@ class Raster:
         Args:
             points: (n, 2) pixels, x to the right and y down from the top left corner.
             nearness: (n,), above 0, more is nearer and straight across the picture: one over the distance.
-            triangles: (m, 3); what is not counter-clockwise as one sees it is left out.
+            triangles: (m, 3); those that are not counter-clockwise as seen are left out.
             colours: (n, 3) sRGB 0..1.
 
         Raises:
@@ -90,7 +90,7 @@ class Raster:
 
 
 def ready() -> str | None:
-    """None where `Raster` can draw; otherwise a sentence that says what to install."""
+    """Return None if `Raster` can draw, or a sentence that says what to install."""
     try:
         _compiled()
     except RenderError as error:
@@ -100,7 +100,7 @@ def ready() -> str | None:
 
 @cache
 def _compiled() -> tuple[Callable[..., None], ...]:
-    """The three loops below as machine code; kept on disk where a place can be written, so compiled once."""
+    """Return the three loops below as machine code, cached on disk if possible, so compiled once."""
     try:
         import numba
     except ImportError as error:
@@ -125,7 +125,7 @@ def _fill(
     """Write each triangle's samples where nothing nearer is: nearness and RGBA in one number.
 
     Args as `Raster.__call__`, but colours 0.5..255.5 and a tuple of samples; `keys` is (h, w, samples), and
-    those rows from `begin` to `stop` are written.
+    rows `begin` to `stop` are written.
     """
     width = keys.shape[1]
     high_half = np.uint64(32)
@@ -167,7 +167,7 @@ def _fill(
         long_at = x0 - long_slope * y0
         bend = min(max(int(np.ceil(y1 * per - 0.5)), top), end)
         right = (x1 - x0) * (y2 - y0) > (x2 - x0) * (y1 - y0)  # the third corner
-        # What a triangle carries grows by so much a pixel to the right and down.
+        # The change of a triangle's values per pixel to the right and down.
         px, py, qx, qy = vy / turn, vx / turn, uy / turn, ux / turn
         n0, n1, n2 = nearness[a], nearness[b] - nearness[a], nearness[c] - nearness[a]
         r0, r1, r2 = colours[a, 0], colours[b, 0] - colours[a, 0], colours[c, 0] - colours[a, 0]
@@ -196,7 +196,7 @@ def _fill(
                     if first < last:
                         left, beyond = min(left, first), max(beyond, last)
                 firsts[k], lasts[k] = first, last
-            # One tone a pixel, that of its middle; how near it is, a sample.
+            # One colour a pixel, that of its middle; one depth a sample.
             dx, dy = left + 0.5 - ax, line + 0.5 - ay
             near, red = np.float32(n0 + nx * dx + ny * dy), np.float32(r0 + rx * dx + ry * dy)
             green, blue = np.float32(g0 + gx * dx + gy * dy), np.float32(b0 + bx * dx + by * dy)
@@ -222,7 +222,7 @@ def _fill(
 
 
 def _mean(keys: Any, picture: Any) -> None:
-    """The mean of each pixel's samples, one or four, all four bytes at once; clears the samples."""
+    """Return the mean of each pixel's samples, one or four, all four bytes at once; clears the samples."""
     height, width = picture.shape
     nothing = np.uint64(0)
     if keys.shape[2] == 1:

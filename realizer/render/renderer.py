@@ -46,11 +46,11 @@ class Renderer:
             face: name of a face folder, or a Face (then it is sent over).
             size: width, height in pixels.
             camera: a preset, or a camera of the face.
-            light: a preset; None is what REALIZER_LIGHT says, or "portrait".
-            background: "#rrggbb" or "transparent"; None is what REALIZER_BACKGROUND says, or the light's own.
+            light: a preset; None selects REALIZER_LIGHT, then "portrait".
+            background: "#rrggbb" or "transparent"; None selects REALIZER_BACKGROUND, then the light's own.
             alpha: the caller takes pictures of four channels, should REALIZER_BACKGROUND say "transparent".
-            way: "gl", "onboard" or "auto"; None is what REALIZER_DRAW says, or "auto".
-            deformer: what moves a face that is named, "mpeg4" or "au"; None is what it says itself.
+            way: "gl", "onboard" or "auto"; None selects REALIZER_DRAW, then "auto".
+            deformer: of a face that is given by name, "mpeg4" or "au"; None is its own default.
         """
         width, height = size
         if not (1 <= width <= 8192 and 1 <= height <= 8192):
@@ -63,7 +63,7 @@ class Renderer:
         self._process: Child | None = None
 
     def start(self) -> None:
-        """Start the process before there is anything to draw; what goes wrong in it is said at a picture.
+        """Start the process before there is anything to draw; its errors are raised by the first picture.
 
         Raises:
             RenderError: `background` is none.
@@ -93,7 +93,7 @@ class Renderer:
     def frames(self, poses: Float32) -> Iterator[UInt8]:
         """Each picture of (n, k) poses, (h, w, 3) uint8; the next ones are drawn while you use this one.
 
-        A picture is valid until the next one is asked for. Run the iterator to its end, or close it, before
+        A picture is valid until the next one is requested. Exhaust the iterator, or close it, before
         you ask this renderer for anything else. Errors as `draw`.
         """
         from realizer.render.process_messages import Draw
@@ -147,7 +147,7 @@ class Renderer:
 
     @property
     def background(self) -> str | None:
-        """What stands behind: None is the light's own gradient.
+        """The background; None is the light's own gradient.
 
         Raises:
             RenderError: neither a colour nor "transparent".

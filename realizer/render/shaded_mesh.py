@@ -13,7 +13,7 @@ from realizer.render.wrinkles import Wrinkles
 
 
 class Figure:
-    """The head and what the renderer adds to it, lit: whoever draws triangles gets the same picture of it.
+    """The head and the renderer's additions, lit: all backends draw the same triangles.
 
     Attributes:
         triangles: (m, 3) int32, counter-clockwise as seen; sheets are there both ways round.

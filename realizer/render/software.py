@@ -30,7 +30,7 @@ class OnboardCanvas:
 
         Args:
             background: as `backdrop` takes it.
-            smooth: four samples a pixel, otherwise one.
+            smooth: four samples a pixel instead of one.
         """
         self.size = size
         self._camera = camera
@@ -48,7 +48,7 @@ class OnboardCanvas:
         figure = self._figure
         figure.pose(vertices, normals)
         places, distances = self._camera.see(figure.points, self.size)
-        # Nothing of a head comes near the lens; what a broken one sends there stays out of the picture.
+        # Parts of a head do not come near the lens; those of a broken one are not drawn.
         nearness = np.where(distances > self._camera.near, 1 / distances, np.nan).astype(np.float32)
         pixels = self._raster(places, nearness, figure.triangles, figure.colours)
         if out is None:

@@ -15,11 +15,11 @@ def on_skin(
 
     Args:
         places: (n, 2) metres, along `right` and up.
-        right, towards: (3,) level unit vectors: the picture's x, and from the head to whoever looks.
+        right, towards: (3,) level unit vectors: the picture's x, and from the head to the viewer.
         longest: metres; skin whose edges there are longer (by their median) does not count.
 
     Returns:
-        None where a place is beside the skin or the skin is too coarse.
+        None if a place is beside the skin or the skin is too coarse.
     """
     skin = face.parts.get("skin", (0, len(face.vertices)))
     low, high = places.min(axis=0), places.max(axis=0)

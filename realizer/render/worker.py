@@ -21,7 +21,7 @@ from realizer.render.process_messages import Draw, Failed, Message, Open, Pixels
 BATCH = 16  # frames deformed in one call: enough to spread its fixed cost, few enough to stay in the cache
 
 
-# What Pillow is told so that a stream keeps up. PNG of level 1 is a fifth larger than of the default 6.
+# Pillow's options for a fast stream. PNG of level 1 is a fifth larger than of the default 6.
 FASTEST: Mapping[str, Mapping[str, int]] = {"jpeg": {}, "png": {"compress_level": 1}, "webp": {"method": 0}}
 
 
@@ -89,7 +89,7 @@ def encode(pixels: UInt8, form: str, quality: int) -> bytes:
 
 
 def answer(artist: Artist | None, message: Message) -> tuple[Artist, int | bytes | str]:
-    """What a message asks for, done."""
+    """Carry out a message."""
     if isinstance(message, Open):
         artist = Artist(message)
         return artist, artist.way
@@ -105,7 +105,7 @@ def serve(orders: Connection, answers: Connection) -> None:
     artist: Artist | None = None
     owner = os.getppid()
     while True:
-        # A child of the owner may have inherited the pipe and keep it open: look at who our parent is, too.
+        # A child of the owner may have inherited the pipe and keep it open: check the parent's id, too.
         while not orders.poll(2.0):
             if os.getppid() != owner:
                 return
@@ -125,7 +125,7 @@ def serve(orders: Connection, answers: Connection) -> None:
 
 
 def check(way: str) -> int:
-    """Draw one triangle; say on stdout which way was taken, or return 3 and say what is missing."""
+    """Draw one triangle; print the chosen way, or return 3 and print what is missing."""
     from realizer.core.errors import RenderError
     from realizer.render.probe_triangle import triangle
 
@@ -146,7 +146,7 @@ def main(arguments: list[str]) -> int:
         return check(*arguments[1:])
     orders = connection(0, writes=False)
     answers = connection(1, writes=True)
-    os.dup2(2, 1)  # what a library prints must not get between the answers
+    os.dup2(2, 1)  # output of libraries must not mix with the answers
     try:
         serve(orders, answers)
     except BrokenPipeError:

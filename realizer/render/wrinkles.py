@@ -1,6 +1,6 @@
 """Wrinkles: strips of skin that darken as the skin under them is compressed.
 
-What pushes is seen from the shape itself, two feature points that come nearer, so furrows follow whatever
+Compression is measured on the shape itself, by two feature points that approach, so furrows follow any
 moves a face: FAPs, action units or shapes.
 """
 
@@ -27,7 +27,7 @@ SHADE = np.array([0.82, 1.03, 1.10], np.float32)
 
 @dataclass(frozen=True)
 class _Drive:
-    """How near two vertices have come: 0 at `start`, 1 at `full` (relative changes of their distance)."""
+    """Return how close two vertices have come: 0 at `start`, 1 at `full` (relative change of distance)."""
 
     a: int
     b: int
@@ -49,7 +49,7 @@ class Wrinkles:
     """
 
     def __init__(self, face: Face) -> None:
-        """Furrows whose feature points the face lacks, or whose skin is too coarse, are left out."""
+        """Build the furrows; those without feature points, or on too coarse skin, are left out."""
         table = _table()
         size = face.fapu.es0
         drawn = [
@@ -79,7 +79,7 @@ class Wrinkles:
         self.count = first
 
     def to_json(self) -> dict[str, Any]:
-        """The furrows as plain numbers, for whoever draws the face's vertices; as `__call__` uses them.
+        """Return the furrows as numbers, for clients that draw the face's vertices; as `__call__` uses them.
 
         `points` are three vertices and the weights of the first two, `drives` two vertices, their distance at
         rest and the changes at which a furrow begins and is deepest, `tones` [drive, tone] pairs a point.
@@ -116,7 +116,7 @@ class Wrinkles:
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
-    """One furrow: (k, 3) vertices and weights of each point, and per drive how dark it makes each, (k,)."""
+    """One furrow: (k, 3) vertices and weights of each point, and the darkness (k,) per drive."""
 
     corners: Int32
     weights: Float64
@@ -133,7 +133,7 @@ def _table() -> dict[str, Any]:
 
 
 def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, size: float) -> _Strip | None:
-    """The furrow on the character's left (side 1) or right (-1); None where the face cannot show it."""
+    """Return the furrow on the character's left (side 1) or right (-1), or None if it cannot be shown."""
     named = [point for point, _, _ in line["through"]]
     pairs = {name: drives[name]["between"] for name in line["drives"]}
     wanted = {*named, *(p for pair in pairs.values() for p in pair)}
@@ -187,7 +187,7 @@ def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, 
 def _through(along: Float64, knots: Float64, where: Float64) -> Float64:
     """The curve through (k, 2) knots at `along`, at (n,) places: a cubic that bulges nowhere between them.
 
-    Slopes after Fritsch and Butland 1984, those at the ends by three points, kept within the first chord's
+    Slopes after Fritsch and Butland 1984, those at the ends by three points, limited to the first chord's
     turn. Written out here: SciPy's takes a third of a second to import, and a film begins with it.
     """
     steps = np.diff(along)[:, None]
@@ -219,7 +219,7 @@ def _end_slope(near: Float64, far: Float64, chord: Float64, beyond: Float64) -> 
 
 
 def _profile(depth: float, lit: float) -> Float64:
-    """How dark a furrow is across: a groove with soft walls, and below it a ridge that catches light."""
+    """Return the darkness across a furrow: a groove with soft walls, and below it a lit ridge."""
     groove = np.exp(-((ACROSS / 0.36) ** 2)) * depth
     ridge = np.exp(-(((ACROSS - 0.6) / 0.3) ** 2)) * lit
     out = groove - ridge
@@ -243,7 +243,7 @@ def _drive(face: Face, pair: list[str], drive: dict[str, Any]) -> _Drive:
 
 
 def _twin(face: Face, name: str) -> str:
-    """The feature point of the same group that lies where this one's mirror image does."""
+    """Return the mirrored feature point in the same group."""
     flipped = np.asarray(face.points[name], float) * (-1, 1, 1)
     group = [p for p in face.points if p.split(".")[0] == name.split(".")[0] and p in face.feature_points]
     return min(group, key=lambda p: float(np.linalg.norm(np.asarray(face.points[p], float) - flipped)))

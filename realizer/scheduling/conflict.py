@@ -35,13 +35,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Clash:
-    """What cannot hold together; without any one of it, the rest of it could.
+    """A conflict: a set of relations that cannot hold together; without any one of them, the rest can.
 
     Attributes:
         relations: the equalities and orders, in the order in which they chain.
         gaps: least and greatest lengths, one for each stretch of a behaviour.
-        earliest: what starts too soon, its point and the bound, seconds; None where no bound takes part.
-        named: the behaviours whose points occur, whether or not they state or hinder anything themselves.
+        earliest: the point that starts too early, and its bound in seconds; None if no bound takes part.
+        named: the behaviours whose points occur, even if they state nothing themselves.
     """
 
     relations: tuple[Relation, ...]
@@ -51,12 +51,12 @@ class Clash:
 
     @property
     def parts(self) -> list[Part]:
-        """What states or needs something in the clash, each once."""
+        """Return the statements and needs of the conflict, each once."""
         return _once([r.part for r in self.relations] + [g.part for g in self.gaps])
 
     @property
     def statements(self) -> int:
-        """How many things have to be said to explain it."""
+        """Return the number of statements needed to explain it."""
         return len(self.relations) + len(self.gaps) + (self.earliest is not None)
 
 

@@ -21,8 +21,8 @@ class _Squeeze:
     """Groups as a convex problem; node 0 is the block's start, and one class of every group that can slide.
 
     Attributes:
-        points: whose times are sought. number: (n,) the node of each point's class.
-        gaps, bounded, orders, starts: what the inequalities are, in this order: the least lengths of gaps,
+        points: the points to solve. number: (n,) the node of each point's class.
+        gaps, bounded, orders, starts: the sources of the inequalities, in this order: least lengths of gaps,
             the greatest of those that have one, orders, and first points of behaviours, not too soon.
     """
 
@@ -91,7 +91,7 @@ def squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> list[list[
 
 
 def _impossible(model: Model, shapes: Shapes, group: Group) -> list[Link] | None:
-    """Why a group cannot keep its inequalities; None if it can, perhaps after least gaps have given way."""
+    """Return why a group violates its inequalities, or None if it can satisfy them with shorter gaps."""
     one = _squeeze(model, shapes, [group])
     _, cycle = one.keep(shapes)
     if cycle and _yield_to_stated(model, one.gaps):
@@ -125,7 +125,7 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
         [model.least[gaps], -model.most[ends], [r.seconds for r in orders], model.earliest[owner[starts]]]
     )
     u, v, between = number[root[tail]], number[root[head]], shift[tail] - shift[head]
-    # What springs connect is a shape, or node 0 with all that is held or stands for it.
+    # Nodes that springs connect form a cluster, or belong to node 0, which stands for everything fixed.
     piece = np.zeros(len(nodes) + 1, np.intp)
     labels = shapes.label[owner[nodes]]
     still = shapes.held.copy()
@@ -147,7 +147,7 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
 
 
 def _anchor(model: Model, group: Group) -> int:
-    """The class that stands for the block's start in a group that can slide."""
+    """Return the class that represents the block's start in a group that can slide."""
     return int(model.root[model.first[group.shapes[0]]])
 
 

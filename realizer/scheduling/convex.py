@@ -12,7 +12,7 @@ from realizer.scheduling.model import LOOSE, TIGHT, Index
 from realizer.scheduling.rigid_clusters import settle
 from realizer.scheduling.union_find import Ties
 
-# Guesses at which inequalities bind before the interior point is asked; it is hardly ever.
+# Active sets tried before the interior point method, which is hardly ever needed.
 GUESSES = 12
 # Rounds of mending, after the interior point, which inequalities bind; one is the rule.
 ROUNDS = 20
@@ -58,9 +58,9 @@ def kept(quadratic: Quadratic, start: Float64, slack: float = LOOSE) -> tuple[Fl
 
 
 def settled(quadratic: Quadratic, x: Float64) -> Float64 | None:
-    """(size,) the x of the least cost, by guessing which inequalities bind; None where that does not end.
+    """Return the optimal x (size,) by an active-set method, or None if it does not converge.
 
-    What is broken is made to bind, what would rather let go is let go, until neither is left: then it is the
+    Violated inequalities become active, those with negative force inactive, until neither is left: then it is
     optimum. Mostly that takes two or three rounds from the least squares that know no inequalities.
     """
     u, v, w = quadratic.u, quadratic.v, quadratic.w
@@ -85,9 +85,9 @@ def settled(quadratic: Quadratic, x: Float64) -> Float64 | None:
 
 
 def optimum(quadratic: Quadratic, level: Float64) -> Float64:
-    """(size,) the x of the least cost, slowly and surely; level keeps every inequality, as `kept` finds it.
+    """Return the optimal x (size,) by the interior point method; level satisfies every inequality.
 
-    What a closed circle of inequalities leaves no room is tied first: interior points need an interior.
+    Inequalities that a closed cycle makes tight are tied first: interior points need an interior.
     """
     u, v = quadratic.u, quadratic.v
     tight = np.flatnonzero(level[v] - level[u] - quadratic.w <= 2 * LOOSE)
@@ -154,16 +154,16 @@ def _cost(quadratic: Quadratic, x: Float64) -> float:
 
 
 def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Float64]:
-    """The least squares with some inequalities held as equalities; what these leave free stays near x.
+    """Solve least squares with the active inequalities as equalities; free directions stay near x.
 
     Returns:
-        x, and the force of each inequality: positive where it pushes, negative where it holds back wrongly.
+        x, and the force of each inequality: positive if it pushes, negative if it should be inactive.
     """
     m = quadratic.size
     root, shift, whole = np.arange(m), np.zeros(m), quadratic.piece
     beside: dict[int, list[tuple[int, int]]] = {}
     held = np.flatnonzero(binding)
-    # What is farthest from being kept comes first: of several that tie the same nodes the first one counts.
+    # The most violated comes first: of several that tie the same nodes, the first counts.
     held = held[np.argsort((x[quadratic.v] - x[quadratic.u] - quadratic.w)[held], kind="stable")]
     if len(held):
         ties, pieces = Ties(m), Ties(m)
@@ -185,7 +185,7 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
     i, j = root[quadratic.i], root[quadratic.j]
     loose = i != j
     wanted = quadratic.wanted + shift[quadratic.i] - shift[quadratic.j]
-    # The smallest node of each connected piece stands still, and so does what is no root of a class.
+    # The smallest node of each connected piece is fixed, and so is every node that is no class root.
     fixed = root != np.arange(m)
     fixed[np.unique(whole, return_index=True)[1]] = True
     exact = settle(i[loose], j[loose], wanted[loose], quadratic.stiffness[loose], fixed, x)[root] + shift
@@ -215,18 +215,18 @@ def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadrat
 
 
 def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | None:
-    """Clarabel's answer: x (m,), and of each inequality its force and its room; None where it gives up."""
+    """Return Clarabel's solution x (m,), with force and slack of each inequality, or None if it fails."""
     import clarabel
 
     m = quadratic.size
-    # What lies within one class cannot change.
+    # Points of one class move together.
     elastic = quadratic.i != quadratic.j
     gi, gj = quadratic.i[elastic], quadratic.j[elastic]
     a, d = quadratic.stiffness[elastic], quadratic.wanted[elastic]
     a = a / a.max(initial=1e-9)
     rows = np.flatnonzero(quadratic.u != quadratic.v)
     u, v, w = quadratic.u[rows], quadratic.v[rows], quadratic.w[rows]
-    # Node 0 stands at 0 and is no unknown, so every column is one lower; the upper triangle is wanted.
+    # Node 0 is fixed at 0, so every column is one lower; Clarabel takes the upper triangle.
     low, high = np.minimum(gi, gj), np.maximum(gi, gj)
     upper = _Sparse(
         np.concatenate([low, gi, gj]) - 1,
@@ -247,14 +247,14 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     cones = [clarabel.NonnegativeConeT(len(rows))]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    # Close enough to tell what binds from what merely comes near.
+    # Close enough to tell active inequalities from those that are merely near.
     settings.tol_gap_abs = settings.tol_gap_rel = 1e-11
     # Now and then Clarabel's own scaling, which matrices of -1, 0 and 1 do not need, leads it astray; less
     # often it is the only way.
     for scaled in (False, True):
         settings.equilibrate_enable = scaled
         solution = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings).solve()
-        # Having come as far as rounding lets it is good enough: what binds is solved again exactly.
+        # Rounding limits the accuracy; the active set is solved again exactly.
         if str(solution.status) in ("Solved", "AlmostSolved", "InsufficientProgress"):
             force, room = np.zeros(len(quadratic.u)), np.ones(len(quadratic.u))
             force[rows], room[rows] = solution.z, solution.s

@@ -9,12 +9,12 @@ from realizer.scheduling.problem import Part, Relation
 from realizer.scheduling.timing import Clause, Warning
 
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
-# Nobody reads on; `Warning.clash` has them all.
+# Enough for people; `Warning.clash` has all.
 MOST_CLAUSES = 30
 
 
 def choose(clash: Clash) -> Part | None:
-    """What gives way: an optional constraint before any behaviour, then the behaviour of the lowest priority.
+    """Select what gives way: an optional constraint before any behaviour, then the lowest priority.
 
     Of equals the later one in the document. A behaviour that is merely referred to is spared while one that
     states or hinders something can go. None where everything is required.
@@ -41,7 +41,7 @@ def refusal(block: str, clash: Clash) -> Warning:
 
 
 def fault_warning(part: Part, text: str) -> Warning:
-    """The warning of a part that refers to what is not there."""
+    """Return the warning for a reference to something that does not exist."""
     name = part.name or "a constraint"
     return Warning(part.id, IMPOSSIBLE, f"{name} was dropped{_placed(part, part.line)}: {text}")
 

@@ -15,7 +15,7 @@ from realizer.scheduling.rigid_clusters import Shapes
 class Group:
     """Shapes that cannot slide apart, with the orders that hold them together.
 
-    `held`: they cannot slide for ever either, because some of them are tied to fixed times.
+    `held`: they cannot slide without limit, because some of them are tied to fixed times.
     """
 
     shapes: list[int]
@@ -26,9 +26,9 @@ class Group:
 def groups_of(model: Model, shapes: Shapes) -> list[Group]:
     """The groups among the shapes that orders name.
 
-    A shape from which orders lead, over however many others, to a held one cannot slide for ever: those hang
+    A cluster from which orders lead, directly or not, to a fixed one cannot slide without limit: those
     together as far as orders connect them. Of the rest, only shapes in a circle of orders bind each other;
-    any other order is kept by sliding what comes later, at no cost.
+    any other order can be satisfied by sliding the later cluster, at no cost.
     """
     orders = model.problem.orders
     if not orders:

@@ -8,9 +8,9 @@ Edge = tuple[int, int, float]
 
 
 def raise_levels(level: list[float], edges: Sequence[Edge], slack: float) -> list[int] | None:
-    """Raise levels, in place and as little as possible, until each edge is kept.
+    """Raise levels in place, as little as possible, until each edge is satisfied.
 
-    An edge (u, v, w) is kept where level[v] + slack >= level[u] + w.
+    An edge (u, v, w) is satisfied if level[v] + slack >= level[u] + w.
 
     This is Bellman-Ford's longest path from the levels given. It takes one sweep where the edges come in the
     order of the paths, so give them sorted by (roughly) where their tails end up.
@@ -38,7 +38,7 @@ def raise_levels(level: list[float], edges: Sequence[Edge], slack: float) -> lis
 
 
 def _cycle(cause: dict[int, int], edges: Sequence[Edge]) -> list[int]:
-    """A cycle among the edges that last raised their heads; [] where there is none."""
+    """Return a cycle among the edges that raised their heads last, or []."""
     seen: dict[int, int] = {}
     for start in cause:
         at = start

@@ -21,7 +21,7 @@ Step: TypeAlias = tuple[int, float, Relation | Link]
 def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[Clash]:
     """A clash for each cycle of inequalities, each of the fewest statements that some cycle there has.
 
-    Such a cycle visits no point twice; so whichever statement is taken away, the others are a path and can
+    Such a cycle visits no point twice; so without any one statement, the others are a path and can
     hold. No shorter one passes through any of its points; what clashes elsewhere is another clash.
     """
     ways = _Ways(model)
@@ -67,7 +67,7 @@ class _Ways:
         """The steps of a positive cycle through a point of at most so many statements, the fewest there are.
 
         Returns:
-            The steps, [] where there is no such cycle or it takes more steps than allowed to tell; and how
+            The steps, [] if there is no such cycle or the search takes more steps than allowed; and how
             many steps were tried.
         """
         best, layer = {start: 0.0}, {start: 0.0}

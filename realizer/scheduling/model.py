@@ -17,7 +17,7 @@ Index: TypeAlias = npt.NDArray[np.intp]
 
 # Two ways to the same point may differ by this much: sums of decimal fractions and of spoken lengths do.
 LOOSE = 1e-7  # s
-# An order is kept when it is broken by no more than the rounding of double precision.
+# Tolerance of an order: the rounding of double precision.
 TIGHT = 1e-10  # s
 
 
@@ -31,9 +31,9 @@ class Model:
         root, shift: (n,) time[p] = time[root[p]] + shift[p]; untied points are their own root.
         tied: points other than the block's start that some equality names, ascending.
         chain: (n,) seconds after the behaviour's first point when every gap has its preferred length.
-        slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens what lies between.
+        slack: (n,) the same for 1 / stiffness: how much a unit of force lengthens the gaps up to a point.
         gap: (g,) the point where each gap starts; it ends at the next point.
-        wanted, least, most, stiffness: (g,) of each gap; most is inf where there is no upper bound.
+        wanted, least, most, stiffness: (g,) of each gap; most is inf if there is no upper bound.
         earliest: (B,) no first point is sooner.
     """
 

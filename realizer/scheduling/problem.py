@@ -14,7 +14,7 @@ from realizer.scheduling.timing import Timing
 if TYPE_CHECKING:
     from bml_schema import Behaviour, Block, Constraint, SyncRef
 
-# The point that stands for the block's start; it is at 0 and every number is tied to it.
+# The point of the block's start; it is at 0 and every number is tied to it.
 ORIGIN = 0
 
 
@@ -26,7 +26,7 @@ class Part:
         id: as warnings name it, "block:behaviour" or a constraint's own id or its block's.
         name: as sentences name it, "nod1"; "" for a constraint without an id.
         order: place in the document, among its own kind.
-        line: where it stands, None where the document does not say.
+        line: the line in the document, or None if unknown.
         names: the behaviours that a constraint names, as "block:behaviour"; it goes with any of them.
     """
 
@@ -58,7 +58,7 @@ class Member:
     """A block that is solved together with others, all on one clock: seconds from the new block's start.
 
     Attributes:
-        timings: behaviour id -> what it wants of time; a behaviour that is not in it is absent, and what
+        timings: behaviour id -> preferred timing; a behaviour without one is absent, and what
             refers to it vanishes.
         start: of the block.
         earliest: no behaviour starts sooner.
@@ -79,7 +79,7 @@ class Member:
 
 @dataclass(slots=True)
 class Problem:
-    """What a solver needs to know of one or more blocks.
+    """The scheduling problem of one or more blocks.
 
     Point 0 is the block's start; behaviour b owns the k points from first[b] on, in document order. The gaps
     of a behaviour that is not rigid cost stiffness * (gap - preferred)^2 and are at least `least`.
@@ -171,7 +171,7 @@ def problem_of(
                 order,
                 place.line if place is not None else None,
             )
-            # Of one that has begun, what is still to come is held by `_pass`.
+            # The points to come of a block that has begun are fixed by `_pass`.
             earliest = -np.inf if id in member.passed else member.earliest
             first[block.id, id] = problem.add(part, member.timings[id], earliest)
             present.append((member, node, part))
@@ -191,7 +191,7 @@ def problem_of(
                 problem.faults.append((part, str(fault)))
                 break
             if target[0] == ORIGIN and sync in member.passed.get(node.id, ()):
-                continue  # what it was tied to may have moved since
+                continue  # its other end may have moved since
             says = (f"{part.name}:{sync}", "=", ref)
             problem.equalities.append(Relation(start + points.index(sync), *target, part, says))
     for member in members:
@@ -208,7 +208,7 @@ def _pass(
     points: tuple[str, ...],
     when: Mapping[str, float],
 ) -> None:
-    """Hold what has passed where it was, and the next point to what is still to come."""
+    """Fix the points that have passed, and bound the next point by the present."""
     later = False
     for i, sync in enumerate(points):
         if sync in when:
@@ -288,14 +288,14 @@ class _Filler:
         return found
 
     def elsewhere(self, ref: SyncRef) -> float:
-        """Seconds on the members' clock of a point that is solved by nobody here."""
+        """Return the seconds, on the members' clock, of a point outside this problem."""
         time = self.outside(ref)
         if time is None:
             raise LookupError(f"{ref} is not known here, or its time is not known yet")
         return float(time)
 
     def point(self, ref: SyncRef) -> tuple[int, float] | None:
-        """None where the behaviour is absent.
+        """Return None if the behaviour is absent.
 
         Raises:
             LookupError: there is no such sync point; the text says what there is.

@@ -1,6 +1,6 @@
 """Clusters of behaviours that are tied together, each at the least squares solution of its gaps.
 
-What hangs together without a contradiction keeps its preferred gaps; only the rest needs a solver.
+Behaviours tied without a contradiction keep their preferred gaps; only the rest needs a solver.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Shapes:
 
     Attributes:
         label: (B + 1,) the shape of each behaviour, named by one of them; B is the block's start.
-        held: (B + 1,) bool by label: the shape is tied to a fixed time and cannot slide.
-        at: (n,) seconds: from the block's start for held shapes, from anywhere for others.
+        held: (B + 1,) bool by label: the cluster is tied to a fixed time and cannot slide.
+        at: (n,) seconds: from the block's start for fixed clusters, relative for others.
     """
 
     label: Index
@@ -106,7 +106,7 @@ def hang(
 def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     """Put the points of whole shapes, in place, where the sum of a (gap - preferred)^2 is least.
 
-    A stretch between two tied points is one spring, whatever lies between; so only tied points are unknowns.
+    A stretch between two tied points is one spring, whatever is between; so only tied points are unknowns.
     """
     owner, chain, slack = model.owner, model.chain, model.slack
     knots = model.tied[chosen[owner[model.tied]]]
@@ -120,7 +120,7 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     number = number[roots]
     i, j = number[:-1][same], number[1:][same]
     loose = i != j
-    # The block's start is at 0. In a shape that is not held any point can be: it is slid to its place later.
+    # The block's start is at 0. A free cluster can have any point at 0: it slides to its place later.
     fixed = nodes == ORIGIN
     labels = shapes.label[owner[knots]]
     first = np.empty(len(shapes.label), np.intp)
@@ -129,7 +129,7 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     wanted = length - model.shift[q] + model.shift[p]
     x = settle(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
     time = x[number] + model.shift[knots]
-    # How much longer than preferred, for each unit of slack, after each knot; 0 after a behaviour's last one.
+    # Lengthening per unit of slack after each knot; 0 after a behaviour's last one.
     strain = np.zeros(len(knots))
     strain[:-1][same] = (time[1:][same] - time[:-1][same] - length) / give
     points = model.points_of(chosen)
@@ -157,7 +157,7 @@ def _each(numbers: Index, size: int) -> Index:
 
 
 def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64) -> Float64:
-    """Where the sum of stiffness * (x[j] - x[i] - wanted)^2 is least.
+    """Return x that minimises the sum of stiffness * (x[j] - x[i] - wanted)^2.
 
     Args:
         i, j: (s,) the two nodes of each spring. wanted, stiffness: (s,).
@@ -171,7 +171,7 @@ def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool,
     n = len(free)
     if not n:
         return x
-    # Node n stands for all that are fixed, and falls away.
+    # Node n represents all fixed points, and is removed.
     number = np.full(len(x), n)
     all_free = np.arange(n)
     number[free] = all_free

@@ -23,18 +23,18 @@ def schedule_block(
     outside: Callable[[SyncRef], float | None] = lambda ref: None,
     priorities: Mapping[str, float] | None = None,
 ) -> Schedule:
-    """The sync times of a block: every constraint kept, every gap as near its preferred length as they allow.
+    """Return the sync times of a block: constraints hold, gaps are as near as possible to their preference.
 
-    What is left free starts as early as it can. Where things cannot hold together, an optional constraint is
+    Free behaviours start as early as they can. In a conflict, an optional constraint is
     dropped, or else the behaviour of the lowest priority that is not required (of equals the later one), with
     one warning each.
 
     Args:
-        timings: behaviour id -> what it wants of time. A behaviour that is not in it counts as absent, and
+        timings: behaviour id -> preferred timing. A behaviour without one counts as absent, and
             references to it vanish silently.
         earliest: seconds from block start; nothing starts sooner.
         outside: a reference into another block, its offset included -> seconds from this block's start; None
-            where that is not known, which drops what refers to it.
+            where it is unknown, which drops what refers to it.
         priorities: behaviour id -> priority, 0 where absent.
 
     Returns:
@@ -106,7 +106,7 @@ def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warnin
     drops: list[tuple[Part, Warning]] = []
     gone: set[int] = set()
     for clash in clashes:
-        # One that a drop of this round may have settled is looked at again in the next.
+        # A conflict that a drop of this round may have settled is examined again in the next.
         if any(id(part) in gone for part in (*clash.parts, *clash.named)):
             continue
         part = choose(clash)

@@ -2,7 +2,7 @@
 
 Most blocks are such: a handful of behaviours, no orders, and time enough for all. For so few numbers arrays
 cost more than they save; so this is in plain floats what `solve` does in arrays for any problem, and it gives
-up where there is more to do.
+up in harder cases.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ made = tuple.__new__
 
 
 class _Knot(NamedTuple):
-    """A point of a behaviour that an equality names: its place in it, and where it is: root + shift."""
+    """A point of a behaviour that an equality names: its index, and its position: root + shift."""
 
     place: int
     root: int
@@ -35,7 +35,7 @@ class _Knot(NamedTuple):
 def direct(problem: Problem) -> tuple[list[float], float] | None:
     """(points,) seconds from the block's start, and the cost, as of a Solution.
 
-    None where an order, a clash, the length of a gap or a start that is too soon has to be looked after.
+    None if an order, a conflict, the length of a gap or an early start must be handled.
     """
     if problem.orders:
         return None
@@ -56,7 +56,7 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
         knots[b].append(made(_Knot, (place, root, shift)))
         hooks.append((b, root, shift - lists[b].chain[place]))
 
-    # What hangs together, each behaviour at its preferred lengths; then those shapes that have to give.
+    # Tied behaviours at their preferred lengths; then the clusters that must stretch.
     shapes, strained, held_at = hang(len(lists), hooks)
     labels = [shapes.find(b) for b in range(len(lists))]
     begins: dict[int, float] = {}
@@ -89,7 +89,7 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
     for label, times in zip(labels, at, strict=True):
         slide = 0.0 if label in begins or late[label] == NEVER else late[label]
         time += [seconds + slide for seconds in times]
-    # Exactly equal where the document says so, exactly in order, exactly not too soon, whatever rounding did.
+    # Exactly equal where the document says so, exactly in order, exactly not too early, despite rounding.
     for p in named:
         time[p] = time[ties.find(p)] + ties.shift[p]
     for first, own, earliest in zip(problem.first, lists, problem.earliest, strict=True):
@@ -101,7 +101,7 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
 
 
 def _fits(at: list[float], own: Lists) -> bool:
-    """Whether a behaviour's gaps are as long as they have to be and may be."""
+    """Return whether a behaviour's gaps are within their bounds."""
     for begin, end, least in zip(at, at[1:], own.least, strict=False):
         if end - begin < least - TIGHT or end < begin:
             return False
@@ -116,9 +116,9 @@ def _relax(
 ) -> float | None:
     """Put the points of one shape, in place, where the sum of a (gap - preferred)^2 is least; returns that.
 
-    A stretch between two knots is one spring, whatever lies between. None for more unknowns than a few.
+    A stretch between two knots is one spring, whatever is between. None for more than a few unknowns.
     """
-    # The block's start is at 0; in a shape that is not held its first knot is, and slides to its place later.
+    # The block's start is at 0; a free cluster has its first knot at 0, and slides to its place later.
     roots = {knot.root for b in members for knot in knots[b]}
     still = ORIGIN if ORIGIN in roots else knots[members[0]][0].root
     number = {root: n for n, root in enumerate(sorted(roots - {still}))}

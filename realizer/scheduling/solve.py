@@ -2,7 +2,7 @@
 
 Two stages (Paul 2010, 3.3.3, says only the first): behaviours that hold each other take the least squares of
 their gaps, then every such shape that nothing holds slides to the earliest place that its orders allow. Only
-shapes whose least squares break an inequality go to the convex solver.
+clusters whose least squares violate an inequality go to the convex solver.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def solve(problem: Problem) -> Solution | list[Clash]:
     if clashes:
         return clashes
     time = _slide(model, shapes)
-    # Exactly equal where the document says so, exactly in order, exactly not too soon, whatever rounding did.
+    # Exactly equal where the document says so, exactly in order, exactly not too early, despite rounding.
     time = time[model.root] + model.shift
     time[model.first] = np.maximum(time[model.first], model.earliest)
     length = time[model.gap + 1] - time[model.gap]
@@ -85,7 +85,7 @@ def _keep_inequalities(model: Model, shapes: Shapes) -> list[Clash]:
 
 
 def _fits(model: Model, shapes: Shapes, group: Group, begin: Float64) -> bool:
-    """Whether the group's shapes, as they are, can slide so that the orders among them hold."""
+    """Return whether the group's clusters, unchanged, can slide so that the orders among them hold."""
     if not group.orders:
         return True
     number = {shape: k for k, shape in enumerate(group.shapes, 1) if not shapes.held[shape]}
@@ -105,7 +105,7 @@ def _earliest(model: Model, shapes: Shapes) -> Float64:
 
 
 def _slide(model: Model, shapes: Shapes) -> Float64:
-    """(n,) every shape that is not held at its earliest place."""
+    """Place every free cluster as early as possible; returns (n,)."""
     ground = len(model.first)
     free = ~shapes.held
     level = np.where(free, _earliest(model, shapes), 0.0)
@@ -116,7 +116,7 @@ def _slide(model: Model, shapes: Shapes) -> Float64:
             (s if free[s] else ground, t if free[t] else ground, gain)
             for s, t, gain in slides(model, shapes, orders)
         ]
-        # What leads to a held shape has been squeezed or found to fit; only rounding could move it.
+        # Clusters before a fixed one have been solved or fit; only rounding could move them.
         edges = [edge for edge in edges if edge[1] != ground]
         number = {shape: k for k, shape in enumerate({shape for edge in edges for shape in edge[:2]})}
         component = components(len(number), [(number[s], number[t], gain) for s, t, gain in edges])

@@ -17,9 +17,9 @@ class Lists(NamedTuple):
 
     Attributes:
         chain: (k,) seconds after the first point when every gap has its preferred length.
-        slack: (k,) the same for 1 / stiffness: how much a unit of force lengthens what lies between.
+        slack: (k,) the same for 1 / stiffness: how much a unit of force lengthens the gaps up to a point.
         least, most: (k-1,) of each gap.
-        fits: at their preferred lengths all gaps are as long as they must be, as those of what is rigid are.
+        fits: whether all preferred lengths are within their bounds, as those of rigid behaviours are.
     """
 
     chain: tuple[float, ...]
@@ -32,7 +32,7 @@ class Lists(NamedTuple):
 
 @dataclass(frozen=True)
 class Timing:
-    """What one behaviour wants of time: k sync points, k-1 gaps.
+    """The timing that one behaviour prefers: k sync points, k-1 gaps.
 
     Attributes:
         points: k sync point names in chronological order, such as ("start", "attackPeak", "relax", "end").
@@ -40,7 +40,7 @@ class Timing:
         least: (k-1,) float64 seconds, the length each gap must have.
         stiffness: (k-1,) float64 > 0, the a of a (t[i+1] - t[i] - preferred[i])^2 (Paul 2010, 3.3.3).
         rigid: every gap is exactly its preferred length; stiffness, least and most do not count then.
-        most: (k-1,) float64 seconds >= least, the length each gap may have at most, inf where there is none;
+        most: (k-1,) float64 seconds >= least, the greatest length of each gap, inf if there is none;
             None: nowhere. A behaviour that has any is bounded: least and most hold against every time that
             the document states, where otherwise a stated length wins over the least gaps in it.
     """
@@ -69,7 +69,7 @@ class Timing:
 
     @cached_property
     def lists(self) -> Lists:
-        """The same in plain floats."""
+        """The same values as plain floats."""
         slack = np.ones(len(self.points) - 1) if self.rigid else 1.0 / self.stiffness
         fits = bool((self.preferred >= np.maximum(self.least, 0.0)).all())
         if self.most is not None:
@@ -86,7 +86,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Clause:
-    """One of the things that cannot hold together: who states or needs it, on which line, in words."""
+    """One part of a conflict: the statement or need, its line, in words."""
 
     id: str
     line: int | None
@@ -109,7 +109,7 @@ class Warning:  # the standard's word
     clash: tuple[Clause, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """{"id", "type", "text"}, and "clash": [{"id", "line", "text"}] where there is one."""
+        """Return {"id", "type", "text"}, and "clash": [{"id", "line", "text"}] if there is one."""
         known: dict[str, Any] = {"id": self.id, "type": self.type, "text": self.text}
         if self.clash:
             known["clash"] = [clause.to_json() for clause in self.clash]

@@ -63,7 +63,7 @@ def canonical(name: str) -> str | None:
         letters = re.sub(r"[^a-z0-9]", "", word.lower())
         if letters in _known():
             return _known()[letters]
-        # A prefix such as the mesh's name: what follows it has to be a whole word.
+        # After a prefix such as the mesh's name, the rest must be a whole word.
         pieces = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", word)
         for k in range(1, len(pieces)):
             tail = "".join(pieces[k:]).lower()

@@ -32,7 +32,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What weakens an action unit.
+    """The units that weaken an action unit.
 
     Attributes:
         kind: the class of the rule.
@@ -119,10 +119,10 @@ def read_rules(text: str, name: str) -> Rules:
 
 
 def parse_rule(text: str, kind: Kind, sets: Mapping[str, Any]) -> Rule:
-    """One rule in the notation of the table: "5<63", "18<20+23", "12<15Z", "27@25".
+    """Parse one rule in the notation of the table: "5<63", "18<20+23", "12<15Z", "27@25".
 
     Raises:
-        TableError: what was wanted, and what came.
+        TableError: the text says what was wanted, and what came.
     """
     sign = SIGNS[kind]
     left, found, right = str(text).replace(" ", "").partition(sign)
@@ -186,7 +186,7 @@ def _set(values: object, where: str, faults: list[str]) -> tuple[float, float, f
 
 
 def _at(text: str, rule: object) -> str:
-    """ ":7", the last line on which a rule stands; "" where it is written in another way."""
+    """Return ":7", the last line of a rule, or "" if it is written in another way."""
     lines = [row.partition("#")[0] for row in text.splitlines()]
     at = [n for n, row in enumerate(lines, 1) if f'"{rule}"' in row or f"'{rule}'" in row]
     return f":{at[-1]}" if at else ""
@@ -222,7 +222,7 @@ def _circles(found: list[Rule]) -> list[tuple[Rule, str]]:
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        circle = list(reversed(error.args[1]))  # each before what it gives way to
+        circle = list(reversed(error.args[1]))  # each before the unit it gives way to
         texts = [whole[pair].text for pair in pairwise(circle)]
         return [(whole[circle[-2], circle[-1]], f"closes a circle with {', '.join(texts[:-1])}")]
     return []

@@ -14,13 +14,13 @@ FILE = "emotion_model.toml"
 
 @dataclass(frozen=True, slots=True)
 class EmotionModel:
-    """What is not in the other tables of emotions.
+    """The parameters that are not in the other tables of emotions.
 
     Attributes:
         most: the highest activation, for which our own profiles are drawn.
         spread: the part of an action unit by which a drawn face may differ.
         middle: of evaluation and activation.
-        chosen: emotion -> the number of the published profile that stands for it.
+        chosen: emotion -> the number of its published profile.
         core, base: parts of a range's length within which a value belongs to it for sure, and perhaps.
         least_length: FAPU, of a range.
         absent: FAPU, as far as a FAP that is not moved may be off.

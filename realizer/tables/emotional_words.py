@@ -60,7 +60,7 @@ class WordList:
 
 @cache
 def word_list(language: str) -> WordList | None:
-    """The words of a language ("en-GB" is "en"); None where no list ships."""
+    """Return the words of a language ("en-GB" is "en"), or None if there is no built-in list."""
     subtag = language.replace("_", "-").partition("-")[0].lower()
     if not (subtag.isascii() and subtag.isalpha()):
         return None

@@ -54,7 +54,7 @@ def emotion_faces() -> Mapping[str, EmotionFace]:
 
 @cache
 def archetypes() -> tuple[Archetype, ...]:
-    """Those that have a lexeme, by rising angle."""
+    """Return the emotions that have a lexeme, by rising angle."""
     found = []
     for place in ring("plutchik").values():
         if place.activation is None or not emotion_faces()[place.name].lexeme:

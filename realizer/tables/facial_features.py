@@ -13,7 +13,7 @@ FILE = "facial_features.csv"
 
 @dataclass(frozen=True, slots=True)
 class FacialFeature:
-    """How far two feature points have moved apart or together (Raouzaiou et al. 2002, table 3).
+    """A change of the distance between two feature points (Raouzaiou et al. 2002, table 3).
 
     Attributes:
         first, second: names of MPEG-4 feature points.

@@ -21,14 +21,14 @@ SENTENCES = ("question", "exclamation")
 
 @dataclass(frozen=True, slots=True)
 class Placing:
-    """What is shown for a kind of sentence, or for a word of a category.
+    """The expressions shown for a kind of sentence, or for a word of a category.
 
     Attributes:
         when: "question", "exclamation", or a category of words.
-        show: names of templates, lower case; all at once.
+        show: names of templates, lower case; shown together.
         says: the rule in words, with its source.
         unless: categories of words that keep a sentence from it.
-        keep: whether to warn where it is missing.
+        keep: whether to warn if it is missing.
     """
 
     when: str
@@ -44,10 +44,10 @@ class Company:
 
     Attributes:
         of, other: names of templates, lower case.
-        by: where `other` stands.
+        by: the place of `other`.
         says: the rule in words, with its source.
         lead: seconds; how far `other` reaches over `of` at either end, or begins before it.
-        keep: whether to warn where it is missing.
+        keep: whether to warn if it is missing.
         offered: whether it is only suggested, not placed.
     """
 
@@ -65,7 +65,7 @@ class Mood:
     """A state of mind.
 
     Attributes:
-        name: as it was asked for.
+        name: as requested.
         distance: seconds from the end of one expression to the start of the next, on average.
         length: of expressions, beside their usual one.
     """

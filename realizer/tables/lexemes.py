@@ -93,7 +93,7 @@ def _rows(part: str) -> dict[str, Mapping[str, Any]]:
 
 
 def read_aus(cells: Mapping[str, float], place: str) -> dict[tuple[int, str], float]:
-    """(AU, side) -> intensity of a row such as { 1 = 0.5, 12L = 1.0 }; `place` is for messages."""
+    """Parse a row such as { 1 = 0.5, 12L = 1.0 } to (AU, side) -> intensity; `place` is for messages."""
     known = tables.by_number()
     aus = {}
     for cell, amount in cells.items():

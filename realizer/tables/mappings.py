@@ -1,7 +1,7 @@
 """Files that map AUs to FAPs: Paul's text format (2010, 5.2), or CSV like `au_to_fap.csv`.
 
 His text has two kinds of lines. `AU`, `AU<tab>L` or `AU<tab>R` names an action unit; each line of five
-numbers after it, `FAP AU-start AU-end FAP-start FAP-end`, says what it asks of a FAP. Empty lines and
+numbers after it, `FAP AU-start AU-end FAP-start FAP-end`, gives its effect on a FAP. Empty lines and
 comments do not count. He shows no comment and leaves some cases open; we read them so: a comment begins
 with #; blanks do as well as tabs; below its AU range a line asks nothing and above it what it asks at its
 end; several lines of one FAP are pieces of one polyline; an action unit without lines asks nothing. Where he
@@ -26,13 +26,13 @@ Side: TypeAlias = Literal["L", "R", ""]
 Units: TypeAlias = Mapping[tuple[int, Side], tuple[AuToFap, ...]]
 Line: TypeAlias = tuple[int, AuToFap]
 FORMS = (".txt", ".csv")
-OWN = "au_to_fap"  # .txt or .csv: what a face has of its own
+OWN = "au_to_fap"  # .txt or .csv: the rows of a face folder
 COLUMNS = ("au", "side", "fap", "au_from", "au_to", "fap_from", "fap_to")
 NUMBERS = ("AU-start", "AU-end", "FAP-start", "FAP-end")
 
 
 def read_mapping(path: Path) -> Units:
-    """What a file says of action units: (au, side of the axis) -> rows; those it does not name are not there.
+    """The rows of a mapping file: (au, side of the axis) -> rows; missing ones are not in it.
 
     Args:
         path: .csv as `au_to_fap.csv`; anything else is Paul's text.
@@ -55,7 +55,7 @@ def read_mapping(path: Path) -> Units:
 
 
 def own_file(folder: Path) -> Path | None:
-    """The file of a face folder that holds the face's own mapping; None where it has none.
+    """Return the mapping file of a face folder, or None.
 
     Raises:
         TableError: it has two.
@@ -192,7 +192,7 @@ def _check(row: AuToFap, where: str) -> None:
 
 
 def _sides(au: int, side: str) -> list[tuple[int, Side]]:
-    """What a file's action unit is on our axis."""
+    """Return the targets on our axis of a file's action unit."""
     if not by_number()[au].sides:
         return [(au, "")]
     return [(au, cast(Side, side))] if side else [(au, "L"), (au, "R")]
@@ -207,7 +207,7 @@ def _sides_of(row: AuToFap) -> list[Side]:
 
 
 def _joined(lines: list[Line], path: Path) -> tuple[AuToFap, ...]:
-    """The rows in order; a row said twice counts once."""
+    """Return the rows in order, without duplicates."""
     out: list[AuToFap] = []
     ordered = sorted(lines, key=lambda line: (*line[1].key, line[1].au_from, line[0]))
     for number, row in ordered:

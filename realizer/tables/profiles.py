@@ -14,7 +14,7 @@ VOCABULARIES = "vocabularies.toml"
 
 @dataclass(frozen=True, slots=True)
 class PublishedRange:
-    """One FAP of one published profile, as printed and as it is meant (Raouzaiou et al. 2002, table 5)."""
+    """One FAP of one published profile, as printed and as corrected (Raouzaiou et al. 2002, table 5)."""
 
     emotion: str
     profile: int
@@ -28,7 +28,7 @@ class PublishedRange:
 
 @dataclass(frozen=True, slots=True)
 class OwnRange:
-    """One FAP of one profile of our own."""
+    """One FAP of one of our own profiles."""
 
     emotion: str
     profile: int
@@ -39,7 +39,7 @@ class OwnRange:
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """Mean and deviation of a FAP over faces that show an emotion; None where it was not verified."""
+    """Mean and deviation of a FAP over faces that show an emotion; None if not verified."""
 
     emotion: str
     fap: int
@@ -50,13 +50,13 @@ class Statistic:
 
 @cache
 def published_ranges() -> tuple[PublishedRange, ...]:
-    """All of them, in the order of the print."""
+    """Return all rows, in the order of print."""
     return tables.read_csv(tables.text_of("profiles_published.csv"), PublishedRange, "profiles_published.csv")
 
 
 @cache
 def own_ranges() -> tuple[OwnRange, ...]:
-    """All of them, in file order."""
+    """Return all rows, in file order."""
     return tables.read_csv(tables.text_of("profiles_own.csv"), OwnRange, "profiles_own.csv")
 
 

@@ -27,7 +27,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """What one element wants: k sync points, k-1 gaps; `strokes` between two strokes of a repeated head."""
+    """The preferred timing of one element: k sync points, k-1 gaps; `strokes`: gap of repeated strokes."""
 
     points: tuple[str, ...]
     gaps: tuple[Gap, ...]
@@ -35,7 +35,7 @@ class Gaps:
 
 
 def gaps(element: str, variant: str = "") -> Gaps:
-    """What `element` ("faceLexeme") wants of time; `variant` is a lexeme or an influence, either case.
+    """Return the timing of `element` ("faceLexeme"); `variant` is a lexeme or influence, either case.
 
     A variant without an entry of its own wants what its element wants.
 

@@ -17,7 +17,7 @@ class WhissellWord:
     Attributes:
         raw_activation: as printed; `activation`: as the paper computes.
         angle: degrees on the ring "plutchik".
-        category: the archetype of whose kind it is; "" for one between two archetypes.
+        category: the archetype it belongs to; "" for a word between two archetypes.
     """
 
     word: str
@@ -43,7 +43,7 @@ class Place:
 
     Attributes:
         angle: degrees.
-        activation: 1..7 of the published archetype; None where there is none.
+        activation: 1..7 of the published archetype, or None.
         opposite, between: Paul 2010, table 6.1; "" in the other ring, `between` = "trust+fear".
     """
 
