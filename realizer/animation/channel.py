@@ -57,7 +57,7 @@ class Joint(NamedTuple):
         return self._replace(at=self.at + seconds)
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False)
 class Channel:
     """One target over time.
 
@@ -91,37 +91,12 @@ class Channel:
     there: Float64 | None = None
     source: str = ""
 
-    def __init__(
-        self,
-        target: Target,
-        times: Float64,
-        values: Float64,
-        curve: str = "smooth",
-        layer: Layer = Layer.EXPRESSION,
-        holds: bool = False,
-        gains: tuple[Gain, ...] = (),
-        until: float = float("inf"),
-        joint: Joint | None = None,
-        there: Float64 | None = None,
-        source: str = "",
-    ) -> None:
-        # As a frozen dataclass would, but all at once: a document makes dozens.
-        times, values = np.asarray(times, np.float64), np.asarray(values, np.float64)
+    def __post_init__(self) -> None:
+        times, values = np.asarray(self.times, np.float64), np.asarray(self.values, np.float64)
         if times.shape != values.shape or times.ndim != 1 or not len(times):
             raise ValueError(f"times and values: wanted two (k,), got {times.shape} and {values.shape}")
-        self.__dict__.update(
-            target=target,
-            times=times,
-            values=values,
-            curve=curve,
-            layer=layer,
-            holds=holds,
-            gains=gains,
-            until=until,
-            joint=joint,
-            there=there,
-            source=source,
-        )
+        if times is not self.times or values is not self.values:
+            self.__dict__.update(times=times, values=values)
 
     def shifted(self, seconds: float) -> Channel:
         """The same channel, later by `seconds`."""
@@ -139,7 +114,7 @@ class Channel:
 
     def scaled(self, gain: Gain) -> Channel:
         """The same channel with one more gain."""
-        return replace(self, gains=(*self.gains, gain))
+        return self.changed({"gains": (*self.gains, gain)})
 
     def changed(self, changes: Mapping[str, object]) -> Channel:
         """As `replace`, in a tenth of its time: what changes is as sound as what was there."""
