@@ -110,22 +110,22 @@ def encode_film(
     pcm[: min(len(sound), length)] = sound[:length]
     try:
         with av.open(str(path), "w", format=form.container, options=dict(form.container_options)) as film:
-            _write(av, film, form, pictures, pace, pcm, rate, count, lines)
+            _write(film, form, pictures, count, pace, pcm, rate, lines)
     except (av.error.FFmpegError, ValueError) as error:
         raise RealizerError(f"the film could not be written: {error}") from error
 
 
 def _write(
-    av: Any,
     film: Any,
     form: Format,
     pictures: Iterable[UInt8],
+    count: int,
     pace: Fraction,
     pcm: Int16,
     rate: int,
-    count: int,
     lines: Sequence[Span],
 ) -> None:
+    av = _av()
     video = film.add_stream(form.video, rate=pace, options={**form.options, **_steady(form.video)})
     audio = film.add_stream(form.audio, rate=rate, layout="mono")
     audio.bit_rate = form.bit_rate
