@@ -10,7 +10,6 @@ from bml_schema import Feedback
 from realizer.core.settings import Settings, SettingsError
 from realizer.playback.active_block import Speaking
 from realizer.realization import Realization, counted, warned
-from realizer.server.journal.checkpoint import restore
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.recordings import Record
 from realizer.server.journal.replay import replay
@@ -87,11 +86,9 @@ class _Again:
             settings = Settings.read({**_settings(head), **asked})
         except SettingsError as error:
             raise JournalError(f"the record of {head['session']}: {error}") from None
-        self.session = Session(
-            head["session"], settings, 0.0, named=True, scene=_scene(head), epoch=head["epoch"]
-        )
-        self.log = self.session.telling.log = _Whole(head["epoch"])
-        self.begin = restore(self.session, record.parts) if record.parts else 0.0
+        self.log = _Whole(head["epoch"])
+        self.session = Session(head["session"], settings, 0.0, named=True, scene=_scene(head), log=self.log)
+        self.begin = self.session.restore(record.parts) if record.parts else 0.0
         self._entries = record.entries
         self.last = record.entries[-1].at if record.entries else self.begin
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.server.journal.checkpoint import restore
 from realizer.server.journal.entry import Entry, Kept
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.session.session import Session
@@ -63,7 +62,7 @@ def restored(
     Raises:
         JournalError: its checkpoint cannot be read.
     """
-    at = restore(session, kept.parts) if kept.parts else 0.0
+    at = session.restore(kept.parts) if kept.parts else 0.0
     owed = replay(session, kept.entries, speak)
     return kept.entries[-1].at if kept.entries else at, owed
 

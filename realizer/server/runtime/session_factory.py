@@ -21,7 +21,7 @@ from realizer.server.journal.replay import caught_up, restored
 from realizer.server.runtime.session_registry import HubError
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.session.session import Session
-from realizer.server.session.welcome import capabilities
+from realizer.server.session.welcome import capabilities_of
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
@@ -64,7 +64,7 @@ class Origin:
         await loop.run_in_executor(None, lambda: load_face(settings.face, deformer=settings.deformer))
         mapping_of(settings.face, settings.mapping)
         library_of(settings.expressions)
-        self._capabilities = await loop.run_in_executor(None, capabilities, settings)
+        self._capabilities = await loop.run_in_executor(None, capabilities_of, settings)
 
     def close(self) -> None:
         """Nothing more is to be kept."""

@@ -1,20 +1,17 @@
-"""What a control message names in; which of a session's characters, AUs, FAPs, feelings that is, out."""
+"""Resolve the characters, action units, FAPs and emotions that control messages name."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
 from bml_schema import Emotion
 from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import World
+from realizer.playback.player import Player
 from realizer.protocol.messages.requests import Feeling, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.tables import faps
-
-if TYPE_CHECKING:
-    from realizer.server.session.session import Session
 
 
 class Wrong(Exception):
@@ -25,16 +22,16 @@ class Wrong(Exception):
         self.where = where
 
 
-def index_of(session: Session, character: str | None) -> int:
-    """Where a character stands in the session; it is added where it is new.
+def index_of(player: Player, character: str | None) -> int:
+    """Return the index of a character of the session, which is added if it is new.
 
     Raises:
         Wrong: there are too many.
     """
-    known = session.player.characters
+    known = player.characters
     if character not in (None, *known) and len(known) >= MAX_CHARACTERS:
         raise Wrong("character", f"wanted at most {MAX_CHARACTERS} characters in a session")
-    return session.player.character_index(character)
+    return player.character_index(character)
 
 
 def held(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:

@@ -16,6 +16,9 @@ MOST = 10_000
 ROOM = 2**17
 # Messages are much alike: so many characters, once they are not the newest, take a ninth of that together.
 PACK = 2**14
+# Of what was told, a checkpoint has the last so many messages and characters: minutes of talk. Who comes back
+# has the rest already, or is told of a gap.
+LAST, LAST_TEXT = 1000, 2**19
 BETWEEN = "\0"  # no XML has it
 
 
@@ -71,6 +74,17 @@ class FeedbackLog:
         self.newest = newest
         for text in texts:
             self._keep(text, now)
+
+    def last(self) -> list[str]:
+        """Return the newest messages, the oldest first: as many as a checkpoint has room for."""
+        found: list[str] = []
+        size = 0
+        for text in reversed(self.since(self.newest - LAST + 1)):
+            size += len(text)
+            if size > LAST_TEXT:
+                break
+            found.append(text)
+        return found[::-1]
 
     def _keep(self, text: str, now: float) -> None:
         self._recent.append(text)

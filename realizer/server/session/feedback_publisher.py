@@ -16,14 +16,11 @@ class Telling:
     """What a session tells of its blocks.
 
     Args:
-        epoch: POSIX seconds at which the session clock was 0; None where nobody need know.
-
-    Attributes:
         log: what it has told, for clients that come back.
     """
 
-    def __init__(self, player: Player, intake: Intake, epoch: float | None) -> None:
-        self.log = FeedbackLog(epoch)
+    def __init__(self, player: Player, intake: Intake, log: FeedbackLog) -> None:
+        self.log = log
         self._player = player
         self._intake = intake
 

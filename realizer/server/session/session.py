@@ -2,37 +2,56 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from bml_schema import WarningFeedback
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
-from realizer.protocol.messages.replies import ErrorMessage, Gap
+from realizer.protocol.messages.common import PROTOCOL, Reply
+from realizer.protocol.messages.parse import Control, parse_control
+from realizer.protocol.messages.replies import (
+    BlockState,
+    CharacterState,
+    ErrorMessage,
+    Gap,
+    Pong,
+    StateMessage,
+    VoiceState,
+)
+from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
+from realizer.protocol.wire import WireError, unpack_clip
+from realizer.server.documents.document_queue import name_of
 from realizer.server.documents.limits import too_long
 from realizer.server.documents.submission import Intake
-from realizer.server.journal import Lost
-from realizer.server.journal.checkpoint import checkpoint
+from realizer.server.journal import JournalError, Lost, checkpoint
+from realizer.server.journal.checkpoint import SessionState
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.journal_writer import Notes
 from realizer.server.session.character_faces import Faces
-from realizer.server.session.dispatch import take
+from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.effects import Close, Effect, Move, Send
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.feedback_publisher import Telling
+from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.wakeup_plan import Rhythm
 from realizer.server.session.welcome import greeting
-from realizer.server.speech.audio_clips import Clips
+from realizer.server.speech.audio_clips import ClipError, Clips
 from realizer.server.streams.broadcast import Broadcast
-from realizer.server.streams.connection import STUCK, Connection, PictureSubscription, Subscription, View
+from realizer.server.streams.connection import STUCK, Connection
 from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
+
+# Messages that change nothing for others, nor for who comes later.
+PASSING = (Hello, Ping, StateQuery, Subscribe, Unsubscribe)
 
 
 class Session:
@@ -46,9 +65,11 @@ class Session:
         scene: where targets are, to begin with.
         capabilities: what `welcome` tells.
         epoch: POSIX seconds at `now`, told with every time; None leaves them out.
+        log: the feedback log, in place of a new one.
 
     Attributes:
         ending: no more documents are taken.
+        log: the feedback that it has published.
 
     `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
     of them. `tick` is wanted when something is due (`next_due`), and at once while the session `reads`.
@@ -64,6 +85,7 @@ class Session:
         scene: Mapping[str, Position] | None = None,
         capabilities: Mapping[str, Any] | None = None,
         epoch: float | None = None,
+        log: FeedbackLog | None = None,
     ) -> None:
         self.id = id
         self.settings = settings
@@ -93,16 +115,18 @@ class Session:
         self.broadcast = Broadcast(self.player, self.faces)
         self.intake = Intake(id, settings, self.player, self._owe)
         self._connections: dict[int, Connection] = {}
-        self.telling = Telling(self.player, self.intake, epoch)
+        self.log = log or FeedbackLog(epoch)
+        self._telling = Telling(self.player, self.intake, self.log)
         self._effects: list[Effect] = []
         self._rhythm = Rhythm(self.player, self.intake, self.broadcast, self._connections)
+        self.subscriptions = Subscriptions(
+            settings, self.player, self.faces, self.broadcast, self._connections, self.reply
+        )
+        self._controls = ControlHandlers(
+            self.player, self.faces, self.clips, self.intake, self.subscriptions, self.reply
+        )
 
     # connections --------------------------------------------------------------------------------
-
-    @property
-    def log(self) -> FeedbackLog:
-        """What it has told."""
-        return self.telling.log
 
     @property
     def connections(self) -> tuple[int, ...]:
@@ -135,12 +159,6 @@ class Session:
         """How many frames, pictures and packets a client did not get because it was slow."""
         known = self._connections.get(connection)
         return 0 if known is None else known.dropped
-
-    def views(self, but: Subscription | None = None) -> list[View]:
-        """The pictures that are drawn for its connections, each once; without those of one subscription."""
-        subscriptions = [s for c in self._connections.values() for s in c.subscriptions.values()]
-        looking = [s for s in subscriptions if isinstance(s, PictureSubscription) and s is not but]
-        return list({s.view.key: s.view for s in looking}.values())
 
     def expired(self, now: float) -> bool:
         """Nobody has been here for `settings.keep` seconds."""
@@ -178,9 +196,117 @@ class Session:
         self._effects += self.broadcast.frames_due(t)[0]
         if self.notes.grown and not self._compact(t):
             return
-        kept = take(self, self._connections[connection], message, t)
+        kept = self._dispatch(self._connections[connection], message, t)
         if not self.closed and self._work(t) and not kept:
             self.note(t, "tick")
+
+    def _dispatch(self, connection: Connection, message: str | bytes, t: float) -> bool:
+        """Do what a message asks for, or reply why not; returns whether it is in the journal."""
+        if isinstance(message, bytes):
+            return self._receive_sound(connection, message, t)
+        if (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
+            control = parse_control(text)
+            if isinstance(control, ErrorMessage):
+                self.reply(connection.id, control)
+                return False
+            return self._receive_control(connection, control, message, t)
+        if self.ending:
+            words: str | None = "the service is ending and takes no more documents"
+        else:
+            words = self._write_journal(t, "text", connection, message)
+        if words is None:
+            self.intake.put(message, t)
+        else:
+            # Not by the player, which would number it: it is not in the journal, and who goes on with the
+            # session from there would number all else otherwise.
+            told = WarningFeedback(id=name_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words)
+            self.tell(told.to_xml())
+        return words is None
+
+    def _receive_sound(self, connection: Connection, message: bytes, t: float) -> bool:
+        if (words := self._write_journal(t, "sound", connection, message)) is not None:
+            self.reply(connection.id, ErrorMessage(code="journal", message=words))
+            return False
+        try:
+            self.clips.take(unpack_clip(message))
+        except WireError as error:
+            self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
+        except ClipError as error:
+            self.reply(connection.id, ErrorMessage(code="clip", message=str(error), where=error.where))
+        return True
+
+    def _receive_control(self, connection: Connection, control: Control, message: str, t: float) -> bool:
+        if isinstance(control, PASSING):
+            known = self.player.characters
+            self._handle(connection, control, t)
+            for name in self.player.characters:
+                if name not in known:  # who is named first is who moves where nobody is named
+                    self.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
+            return False
+        if (words := self._write_journal(t, "text", connection, message)) is not None:
+            self.reply(connection.id, ErrorMessage(code="journal", message=words))
+            return False
+        self._handle(connection, control, t)
+        return True
+
+    def _handle(self, connection: Connection, control: Control, t: float) -> None:
+        match control:
+            case Hello():
+                self._hello(connection, control, t)
+            case StateQuery():
+                self.reply(connection.id, self._state(connection, t))
+            case Ping():
+                self.reply(connection.id, Pong(id=control.id, time=t))
+            case _:
+                self._controls.handle(connection, control, t)
+
+    def _hello(self, connection: Connection, message: Hello, t: float) -> None:
+        if message.version != PROTOCOL:
+            words = f"wanted version {PROTOCOL} of the protocol, got {message.version}"
+            self.reply(connection.id, ErrorMessage(code="version", message=words, where="hello.version"))
+        elif message.session not in (None, self.id):
+            assert message.session is not None
+            self._effects.append(Move(connection.id, message.session, message.seen))
+        else:
+            self.welcome(connection.id, t + self.opened)
+            if message.seen is not None:
+                self.resume(connection.id, message.seen)
+
+    def _state(self, connection: Connection, t: float) -> StateMessage:
+        state = self.player.state(t)
+        preparing = [
+            BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
+            for w in self.intake.preparation.waiting
+        ]
+        faces = [
+            CharacterState(face=self.faces.name(index), voice=self.intake.voices.get(index), **face)
+            for index, face in enumerate(state["characters"])
+        ]
+        return StateMessage(
+            session=self.id,
+            time=t,
+            blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
+            characters=faces,
+            voice=VoiceState(name=self.settings.voice, fault=self.intake.orders.fault),
+            connections=len(self._connections),
+            dropped=connection.dropped,
+        )
+
+    # journal ------------------------------------------------------------------------------------
+
+    def _write_journal(
+        self, t: float, kind: Kind, connection: Connection, message: str | bytes
+    ) -> str | None:
+        """Write a message to the journal; returns why it is not taken, or None once it is there."""
+        try:
+            self.notes.keep(t, kind, connection.id, message)
+        except Lost as error:
+            self.lose(error)
+            return str(error)
+        except JournalError as error:
+            log.error("session %s: %s", self.id, error)
+            return f"this could not be kept, so it is not taken: {error}"
+        return None
 
     def note(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
         """Write into the journal what has happened; False where the session is another process's now."""
@@ -192,13 +318,65 @@ class Session:
         return True
 
     def _compact(self, t: float) -> bool:
-        """Let the journal begin anew where nothing plays; False where another process has the session."""
+        """Replace the journal by a checkpoint if nothing plays; False if another process has the session.
+
+        One whose journal is long, as its face never comes to rest, need only have nothing that plays: then a
+        blink or a nod of the next seconds, which goes by what was said last, may be another after a takeover.
+
+        Args:
+            t: seconds on the session clock; what was due until then was told.
+        """
+        if not (self.intake.resting and self.player.resting(t if self.notes.overgrown else float("-inf"))):
+            return True
         try:
-            checkpoint(self, t)
+            if self.notes.compact(checkpoint.write(self._saved(t), self.clips.changes())):
+                self.clips.settle()
         except Lost as error:
             self.lose(error)
             return False
         return True
+
+    def _saved(self, t: float) -> SessionState:
+        past, expected = self.player.cast.known()
+        return SessionState(
+            at=t,
+            connections=self.connections,
+            seq=self.log.newest,
+            told=self.log.last(),
+            scene=self.player.world.scene,
+            characters=self.player.held_by,
+            faces=self.faces.given,
+            voices=self.intake.voices,
+            past=past,
+            expected=expected,
+            spoken=self.intake.orders.placed,
+            fault=self.intake.orders.fault,
+            clips=self.clips.ids,
+        )
+
+    def restore(self, parts: Mapping[str, str]) -> float:
+        """Become, as a new session opened at 0, what one was at its checkpoint, with its connections.
+
+        Args:
+            parts: as `Kept` has them.
+
+        Returns:
+            Seconds on its clock.
+
+        Raises:
+            JournalError: these are no parts, or of another version.
+        """
+        state, clips = checkpoint.read(self.id, parts)
+        self.player.set_scene(state.scene)
+        self.player.restore(state.characters, state.past, state.expected)
+        self.faces.given.update(state.faces)
+        self.intake.voices.update(state.voices)
+        self.intake.orders.placed, self.intake.orders.fault = state.spoken, state.fault
+        self.clips.restore(clips)
+        self.log.restore(state.seq, state.told, state.at)
+        for connection in state.connections:
+            self.connect(connection, state.at)
+        return state.at
 
     def lose(self, error: Lost) -> None:
         """Another process has the session: let everybody go, to come back there."""
@@ -336,7 +514,7 @@ class Session:
 
     def _publish(self, t: float) -> None:
         """Tell all that is due to everybody who has not switched it off."""
-        self._effects += self.telling.publish(t, self._connections.values())
+        self._effects += self._telling.publish(t, self._connections.values())
 
     def tell(self, feedback: str) -> None:
         """Send everybody who takes it feedback that has no number: nobody who comes back gets it again."""
@@ -352,16 +530,13 @@ class Session:
             seen = first - 1
         known = self._connections[connection]
         known.place = seen + 1
-        self._effects += self.telling.catch_up(known)
+        self._effects += self._telling.catch_up(known)
 
     def welcome(self, connection: int, now: float) -> None:
         """Tell a client where it is and what there is."""
-        self.reply(connection, greeting(self, now - self.opened))
+        t, seq = now - self.opened, self.log.newest
+        self.reply(connection, greeting(self.id, t, seq, self.settings, self.capabilities))
 
-    def move(self, connection: int, session: str, seen: int | None) -> None:
-        """A client asks for another session."""
-        self._effects.append(Move(connection, session, seen))
-
-    def reply(self, connection: int, reply: Any) -> None:
+    def reply(self, connection: int, reply: Reply) -> None:
         if not self.closed:
             self._effects.append(Send(connection, reply.text()))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
@@ -10,22 +11,25 @@ from realizer.protocol.messages.common import MAX_CONTROL, MAX_FPS, PICTURES, ST
 from realizer.protocol.messages.replies import Capabilities, Limits, Welcome
 from realizer.server.documents.limits import MAX_CHARACTERS
 
-if TYPE_CHECKING:
-    from realizer.server.session.session import Session
 
+def greeting(id: str, t: float, seq: int, s: Settings, capabilities: Mapping[str, Any]) -> Welcome:
+    """Return the answer to `hello`.
 
-def greeting(session: Session, t: float) -> Welcome:
-    """What `hello` is answered with; `t` is seconds on the session clock."""
-    s = session.settings
+    Args:
+        id: of the session.
+        t: seconds on the session clock.
+        seq: of the newest feedback.
+        capabilities: of the service.
+    """
     return Welcome(
-        session=session.id,
+        session=id,
         time=t,
-        seq=session.log.newest,
+        seq=seq,
         capabilities=Capabilities(
             streams={stream: list(encodings) for stream, encodings in STREAMS.items()},
             pictures=list(PICTURES),
             fps=s.fps,
-            **session.capabilities,
+            **capabilities,
         ),
         limits=Limits(
             message=s.max_message,
@@ -47,7 +51,7 @@ def greeting(session: Session, t: float) -> Welcome:
     )
 
 
-def capabilities(settings: Settings) -> dict[str, Any]:
+def capabilities_of(settings: Settings) -> dict[str, Any]:
     """What `welcome` tells beside streams; names, as documents and messages take them."""
     from realizer.animation.axis import AU_NAMES
     from realizer.behaviours.registry import KINDS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -33,7 +33,7 @@ class ClipError(RealizerError):
 
 
 @dataclass(eq=False)
-class _Clip:
+class Clip:
     """What has come of one clip: `sound` is there when its last piece is."""
 
     pieces: list[bytes] = field(default_factory=list)
@@ -64,8 +64,12 @@ class _Clip:
         }
 
     @classmethod
-    def of(cls, told: Mapping[str, Any]) -> _Clip:
-        """What `plain` told of."""
+    def of(cls, told: Mapping[str, Any]) -> Clip:
+        """Return the clip that `plain` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is none.
+        """
         sound = None
         if told["sound"] is not None:
             pcm = np.frombuffer(base64.b64decode(told["sound"]["pcm"]), "<i2")
@@ -84,7 +88,7 @@ class Clips:
 
     def __init__(self) -> None:
         self.recordings: dict[str, Recording] = {}
-        self._clips: dict[str, _Clip] = {}
+        self._clips: dict[str, Clip] = {}
         self._changed: set[str] = set()
 
     @property
@@ -103,15 +107,11 @@ class Clips:
         """What `changes` told of is kept."""
         self._changed.clear()
 
-    def restore(self, clips: Iterable[tuple[str, str]]) -> None:
-        """Have the clips, id and JSON of each, that others have told of; the oldest first.
-
-        Raises:
-            KeyError, TypeError, ValueError: that is none.
-        """
-        for id, text in clips:
-            self._clips[id] = _Clip.of(json.loads(text))
-            self._publish(id, self._clips[id])
+    def restore(self, clips: Mapping[str, Clip]) -> None:
+        """Add the clips of a checkpoint, the oldest first."""
+        for id, clip in clips.items():
+            self._clips[id] = clip
+            self._publish(id, clip)
 
     def take(self, piece: ClipPiece) -> None:
         """One more piece of a clip.
@@ -153,7 +153,7 @@ class Clips:
         assert message.clip is not None
         phonemes = [*message.phonemes, *_sounds(message)]
         self._changed.add(message.clip)
-        clip = self._clips.get(message.clip) or _Clip()
+        clip = self._clips.get(message.clip) or Clip()
         before: tuple[list[Timed], list[Timed], str | None]
         before = ([], [], None) if clip.told else (clip.words, clip.phonemes, clip.text)
         for name, old, new in (("words", before[0], message.words), ("phonemes", before[1], phonemes)):
@@ -170,12 +170,12 @@ class Clips:
         self._publish(message.clip, clip)
         self._make_room(message.clip)
 
-    def _new(self, id: str) -> _Clip:
+    def _new(self, id: str) -> Clip:
         self.recordings.pop(id, None)
-        self._clips[id] = _Clip()
+        self._clips[id] = Clip()
         return self._clips[id]
 
-    def _whole(self, id: str, clip: _Clip) -> None:
+    def _whole(self, id: str, clip: Clip) -> None:
         content, clip.pieces = b"".join(clip.pieces), []
         try:
             if clip.rate:
@@ -190,7 +190,7 @@ class Clips:
             raise ClipError(f"clip:{id}", str(error)) from None
         self._publish(id, clip)
 
-    def _publish(self, id: str, clip: _Clip) -> None:
+    def _publish(self, id: str, clip: Clip) -> None:
         self.recordings.pop(id, None)
         if clip.sound is None or not clip.told:
             return

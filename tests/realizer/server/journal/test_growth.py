@@ -12,10 +12,10 @@ import pytest
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import Journal, JournalError, Kept, journal_at
-from realizer.server.journal.checkpoint import MOST_TOLD, restore
 from realizer.server.journal.journal_writer import ENTRIES, LONG, Notes
 from realizer.server.journal.replay import restored
 from realizer.server.session.effects import Send, Speak
+from realizer.server.session.feedback_log import LAST
 from realizer.server.session.session import Session
 from tests.interleavings import Memory, spoken
 from tests.told import numbers
@@ -105,7 +105,7 @@ def test_a_client_that_missed_more_than_a_checkpoint_has_is_told_of_a_gap() -> N
     end = talked(session, 400)
     kept = journal.take("long")
     assert kept is not None
-    assert len(json.loads(kept.parts["state"])["told"]) <= MOST_TOLD
+    assert len(json.loads(kept.parts["state"])["told"]) <= LAST
     again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
     restored(again, kept, spoken)
     again.connect(9, end, seen=1)
@@ -189,6 +189,6 @@ def test_while_a_block_waits_or_a_speech_is_open_nothing_is_left_out() -> None:
 def test_a_checkpoint_that_cannot_be_read_is_no_session(state: str, why: str) -> None:
     session = Session("s", SETTINGS, 0.0, named=True)
     with pytest.raises(JournalError, match=f"the checkpoint of session s.*{why}"):
-        restore(session, {"state": state})
+        session.restore({"state": state})
     with pytest.raises(JournalError, match="the checkpoint of session s"):
         restored(session, Kept(0.0, [], {"clip:c": "{}"}), spoken)

@@ -56,9 +56,9 @@ def test_a_feeling_is_what_it_moves() -> None:
 
 def test_a_character_that_is_new_has_a_place_while_there_is_room(drive) -> None:
     session = drive().session
-    assert [index_of(session, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
+    assert [index_of(session.player, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
     for number in range(2, MAX_CHARACTERS):
-        assert index_of(session, f"c{number}") == number
+        assert index_of(session.player, f"c{number}") == number
     with pytest.raises(Wrong, match="wanted at most 16 characters"):
-        index_of(session, "one more")
-    assert index_of(session, "Ben") == 1
+        index_of(session.player, "one more")
+    assert index_of(session.player, "Ben") == 1

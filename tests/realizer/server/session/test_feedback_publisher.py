@@ -10,6 +10,7 @@ from realizer.core.settings import Settings
 from realizer.playback.player import Player
 from realizer.server.documents.submission import Intake
 from realizer.server.session.effects import Send
+from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.feedback_publisher import Telling
 from realizer.server.streams.connection import Connection, FeedbackFilter
 
@@ -21,7 +22,7 @@ def telling() -> Telling:
     player = Player(idle=False)
     intake = Intake("s", Settings(), player, lambda effects: None)
     player.submit(parse(NOD, VOCABULARY), 0.0)
-    return Telling(player, intake, epoch=None)
+    return Telling(player, intake, FeedbackLog())
 
 
 def numbers(sends: list[Send], connection: int) -> list[int | None]:

@@ -97,11 +97,11 @@ def test_videos_of_one_character_with_views_of_their_own_run_side_by_side(drive)
         far: b"front",
     }
     assert look(view="side") == side, "the same again, in its place"
-    assert len(driver.session.views()) == 2, "who looks alike looks at the same pictures"
+    assert len(driver.session.subscriptions.views()) == 2, "who looks alike looks at the same pictures"
     driver.send({"type": "unsubscribe", "stream": "video", "view": "far"})
     driver.send({"type": "unsubscribe", "stream": "video"})
     assert look(view="new") not in (plain, side)
-    assert len(driver.session.views()) == 1
+    assert len(driver.session.subscriptions.views()) == 1
     for number in range(238):
         look(view=f"v{number}")
     error = driver.send({"type": "subscribe", "stream": "video", "view": "one more"}).of("error")[-1]
