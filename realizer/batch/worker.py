@@ -11,7 +11,8 @@ from typing import Any
 
 from realizer.batch.task import Options, Task, fingerprint
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import realize
 from realizer.realization import Realization
 from realizer.render import Renderer

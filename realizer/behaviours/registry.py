@@ -40,7 +40,7 @@ FAMILIES: Registry[tuple[Kind, ...]] = Registry(
 
 def _kinds() -> Mapping[str, Kind]:
     kinds: dict[str, Kind] = {}
-    for family in FAMILIES.working().values():
+    for _, family in FAMILIES.working():
         for kind in family:
             kinds.setdefault(kind.tag, kind)  # the first counts: a plug-in replaces no element of ours
     return MappingProxyType(kinds)

@@ -23,7 +23,7 @@ STATUS = ("done", "refused", "failed")
 
 def _formats(context: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
     """("fap", ".mp4") -> (".fap", ".mp4"), each once."""
-    from realizer.outputs import OUTPUTS
+    from realizer.outputs.registry import OUTPUTS
 
     suffixes = dict.fromkeys(f".{name.removeprefix('.').lower()}" for name in value)
     for suffix in suffixes:

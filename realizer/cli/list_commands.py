@@ -22,10 +22,11 @@ def voices() -> None:
 @click.command()
 def outputs() -> None:
     """List what `realize -o` can write, by suffix, and how to get what is missing for it."""
-    from realizer.outputs import OUTPUTS
+    from realizer.outputs.registry import OUTPUTS
 
-    width, kinds = (max(map(len, column)) for column in (OUTPUTS, (o.media_type for o in OUTPUTS.values())))
-    for suffix, output in sorted(OUTPUTS.items()):
+    found = dict(OUTPUTS.working())
+    width, kinds = (max(map(len, column)) for column in (found, (o.media_type for o in found.values())))
+    for suffix, output in sorted(found.items()):
         fixes = [fix for fix in map(_missing, output.needs) if fix is not None]
         mark = f"  (missing: {'; '.join(fixes)})" if fixes else ""
         click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.says}{mark}")

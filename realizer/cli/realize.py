@@ -115,8 +115,8 @@ def perform(
 
     They are read when all that was asked has been found possible.
     """
-    from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
+    from realizer.outputs.registry import output_for
 
     writer = None
     if output not in (None, "-"):

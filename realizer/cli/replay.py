@@ -41,8 +41,8 @@ def replay(
     film of it, as they were live. Everything is done at its own time, without a clock: what went wrong once
     goes wrong again, so a record is the best report of a fault.
     """
-    from realizer.outputs import output_for
     from realizer.outputs.output import Drawing
+    from realizer.outputs.registry import output_for
     from realizer.server.journal import JournalError
     from realizer.server.journal.playback import played, told
     from realizer.server.journal.recordings import read_record

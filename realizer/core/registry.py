@@ -7,7 +7,7 @@ in the group of a registry.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache, cached_property
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -50,7 +50,8 @@ class Registry(Mapping[str, T], Generic[T]):
         return self._objects[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter((*self._ours, *self._plugins))
+        yield from self._ours
+        yield from self._plugins
 
     def __len__(self) -> int:
         return len(self._ours) + len(self._plugins)
@@ -58,15 +59,17 @@ class Registry(Mapping[str, T], Generic[T]):
     def __contains__(self, name: object) -> bool:  # without an import
         return name in self._ours or name in self._plugins
 
-    def working(self) -> dict[str, T]:
-        """Return the objects by name, without the plug-ins that cannot be used: each is one warning."""
-        found = {}
-        for name in self:
+    def working(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, T]]:
+        """Yield names and objects, without the plug-ins that cannot be used: each is one warning.
+
+        Args:
+            names: only these; None stands for all.
+        """
+        for name in self if names is None else names:
             try:
-                found[name] = self[name]
+                yield name, self[name]
             except PluginError as error:
                 self._warn(str(error))
-        return found
 
     @cached_property
     def _plugins(self) -> dict[str, EntryPoint]:

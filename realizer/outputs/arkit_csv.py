@@ -59,9 +59,9 @@ def _timecode(seconds: float, fps: float) -> str:
     return f"{whole // 3600:02}:{whole // 60 % 60:02}:{whole % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
 
 
-OUTPUTS = (
-    Output(
-        ".arkit.csv", "text/csv", "a row a frame: ARKit's 52 weights as Live Link Face writes them",
-        _encode,
-    ),
-)  # fmt: skip
+ARKIT_CSV = Output(
+    ".arkit.csv",
+    "text/csv",
+    "a row a frame: ARKit's 52 weights as Live Link Face writes them",
+    _encode,
+)

@@ -29,4 +29,4 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
     return encode_csv(realization).encode()
 
 
-OUTPUTS = (Output(".csv", "text/csv", "a row a frame: time, action units, FAPs", _encode),)
+CSV = Output(".csv", "text/csv", "a row a frame: time, action units, FAPs", _encode)

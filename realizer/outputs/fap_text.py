@@ -76,4 +76,4 @@ def _word(name: str) -> str:
     return re.sub(r"\s+", "_", name.strip()) or "realizer"
 
 
-OUTPUTS = (Output(".fap", "text/x-fap", "MPEG-4 FAP text 2.1, integers in FAPU", _encode),)
+FAP = Output(".fap", "text/x-fap", "MPEG-4 FAP text 2.1, integers in FAPU", _encode)

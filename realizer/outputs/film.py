@@ -218,7 +218,5 @@ def _output(suffix: str, media_type: str, says: str) -> Output:
     return Output(suffix, media_type, says, encode, ("render", "film"), _draws, save=write_film)
 
 
-OUTPUTS = (
-    _output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC"),
-    _output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus"),
-)
+MP4 = _output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC")
+WEBM = _output(".webm", "video/webm", "film with sound and subtitles, VP9 and Opus")

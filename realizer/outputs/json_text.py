@@ -25,8 +25,6 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
     return encode_json(realization).encode()
 
 
-OUTPUTS = (
-    Output(
-        ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", _encode, everybody=True
-    ),
+JSON = Output(
+    ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", _encode, everybody=True
 )

@@ -112,9 +112,9 @@ def _ms(seconds: float) -> float:
     return round(seconds * 1000, 1)
 
 
-OUTPUTS = (
-    Output(
-        ".talkinghead.json", "application/json", "words, visemes, face and sound for TalkingHead",
-        _encode,
-    ),
-)  # fmt: skip
+TALKINGHEAD = Output(
+    ".talkinghead.json",
+    "application/json",
+    "words, visemes, face and sound for TalkingHead",
+    _encode,
+)

@@ -103,12 +103,10 @@ def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"'
 
 
-OUTPUTS = (
-    Output(
-        ".textgrid",
-        "text/x-textgrid",
-        "words, phonemes and sync points for Praat",
-        _encode,
-        everybody=True,
-    ),
+TEXTGRID = Output(
+    ".textgrid",
+    "text/x-textgrid",
+    "words, phonemes and sync points for Praat",
+    _encode,
+    everybody=True,
 )

@@ -142,6 +142,4 @@ def _table() -> dict[str, Any]:
     return read_toml(text_of(FILE), FILE)
 
 
-OUTPUTS = (
-    Output(".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", _encode),
-)  # fmt: skip
+VRMA = Output(".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", _encode)

@@ -74,6 +74,4 @@ def _chunk(name: bytes, content: bytes) -> bytes:
     return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
 
 
-OUTPUTS = (
-    Output(".webp", "image/webp", "animated picture without sound", _encode, ("render",), _draws),
-)  # fmt: skip
+WEBP = Output(".webp", "image/webp", "animated picture without sound", _encode, ("render",), _draws)

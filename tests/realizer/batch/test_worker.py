@@ -13,7 +13,8 @@ import pytest
 
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Worker, perform
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import realize
 
 

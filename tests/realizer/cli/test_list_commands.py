@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from realizer.outputs import OUTPUTS
+from realizer.outputs.registry import OUTPUTS
 
 
 def lines(before: str = "") -> dict[str, str]:

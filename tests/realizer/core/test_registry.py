@@ -59,7 +59,8 @@ def test_registry_imports_a_plugin_when_it_is_used(installed):
     assert ".seven" in found
     assert MODULE not in sys.modules
     assert found[".seven"] == 7
-    assert found.working().keys() == {"pi", "tau", ".seven"}
+    assert dict(found.working()).keys() == {"pi", "tau", ".seven"}
+    assert dict(found.working([".seven"])) == {".seven": 7}
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ def test_registry_leaves_out_a_broken_plugin(installed, caplog, value, code, say
     installed({"bad": value}, code)
     found = numbers()
     for _ in range(2):
-        assert found.working().keys() == {"pi", "tau"}
+        assert dict(found.working()).keys() == {"pi", "tau"}
     (record,) = caplog.records
     assert record.getMessage().startswith(f"plug-in 'bad' of test-plugin ({GROUP}, {value}) {says}")
     with pytest.raises(PluginError, match="plug-in 'bad'"):

@@ -9,8 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.film import FORMATS, RATE, encode_film
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.speech_spans import Span
 
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")

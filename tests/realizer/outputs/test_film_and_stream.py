@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import realize
 from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Draw, Speak

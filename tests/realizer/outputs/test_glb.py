@@ -14,9 +14,10 @@ from realizer.face.deform import deform
 from realizer.face.glb import to_glb
 from realizer.face.load import load_face
 from realizer.facebuild.arkit.gltf import Gltf
-from realizer.outputs import OUTPUTS, Drawing
 from realizer.outputs.glb import encode_glb
 from realizer.outputs.morph_targets import TRUE, morphs
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import realize
 
 FPS = 12.5

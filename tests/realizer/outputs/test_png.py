@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
 from realizer.outputs.png import moments, row_at
+from realizer.outputs.registry import OUTPUTS
 from realizer.scheduling.timing import Schedule
 
 

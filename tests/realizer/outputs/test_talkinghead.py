@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.outputs import OUTPUTS, Drawing, output_for
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS, output_for
 from realizer.pipeline import realize
 from realizer.tables.arkit_names import shapes
 

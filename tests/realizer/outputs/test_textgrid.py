@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import realize
 from realizer.speech.utterance import Word
 

@@ -14,7 +14,8 @@ import pytest
 
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.outputs import OUTPUTS, Drawing, output_for
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS, output_for
 from realizer.speech.utterance import Phoneme
 from realizer.tables import faps
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import realize
 
 webvtt = pytest.importorskip("webvtt", reason="pip install webvtt-py")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realizer.outputs import OUTPUTS, Drawing
+from realizer.outputs.output import Drawing
+from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.webp import encode_webp
 from realizer.pipeline import realize
 

@@ -1,0 +1,45 @@
+"""The registry of outputs: one row for each suffix that can be written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from realizer.core.registry import Registry
+from realizer.outputs.output import Output
+
+__all__ = ["OUTPUTS", "output_for"]
+
+OUTPUTS: Registry[Output] = Registry(
+    "realizer.outputs",
+    {
+        ".fap": "realizer.outputs.fap_text:FAP",
+        ".json": "realizer.outputs.json_text:JSON",
+        ".csv": "realizer.outputs.csv_table:CSV",
+        ".vtt": "realizer.outputs.vtt:VTT",
+        ".textgrid": "realizer.outputs.textgrid:TEXTGRID",
+        ".wav": "realizer.outputs.wav:WAV",
+        ".png": "realizer.outputs.png:PNG",
+        ".mp4": "realizer.outputs.film:MP4",
+        ".webm": "realizer.outputs.film:WEBM",
+        ".webp": "realizer.outputs.webp:WEBP",
+        ".glb": "realizer.outputs.glb:GLB",
+        ".vrma": "realizer.outputs.vrma:VRMA",
+        ".arkit.csv": "realizer.outputs.arkit_csv:ARKIT_CSV",
+        ".talkinghead.json": "realizer.outputs.talkinghead:TALKINGHEAD",
+    },
+    wanted="a realizer.outputs.output.Output",
+    accepts=lambda value: isinstance(value, Output),
+)
+
+
+def output_for(path: str | Path) -> Output:
+    """The encoding of a path's suffix, either case; the longest that fits: `x.arkit.csv` is no `.csv`.
+
+    Raises:
+        ValueError: no or an unknown suffix; the text lists the known ones.
+    """
+    parts = [part.lower() for part in Path(path).suffixes]
+    for k in range(len(parts)):
+        if "".join(parts[k:]) in OUTPUTS:
+            return OUTPUTS["".join(parts[k:])]
+    raise ValueError(f"{path}: wanted a suffix of {' '.join(OUTPUTS)}, got {parts[-1] if parts else 'none'}")
