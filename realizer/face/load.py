@@ -14,6 +14,7 @@ import numpy as np
 
 from realizer.core.array_types import Float32
 from realizer.core.errors import FaceError
+from realizer.core.registry import Registry
 from realizer.face.basis import basis_from
 from realizer.face.features import fapu_of, read_features
 from realizer.face.mesh_checks import range_faults, value_faults
@@ -24,6 +25,15 @@ from realizer.tables import faps
 if TYPE_CHECKING:
     from realizer.face.au.model import Model
 
+PACKAGE = Path(__file__).parents[1]
+CHECKOUT = PACKAGE.parent / "faces"
+WHEEL = PACKAGE / "_faces"  # the copy in a wheel
+FACES: Registry[Path | str] = Registry(
+    "realizer.faces",
+    {"checkout": "realizer.face.load:CHECKOUT", "wheel": "realizer.face.load:WHEEL"},
+    wanted="a folder of face folders as a Path or a string",
+    accepts=lambda value: isinstance(value, (Path, str)),
+)
 DEFAULT = "ada"  # the face that the name "default" stands for
 VARIABLE = "REALIZER_FACES"
 DEFORMER = "REALIZER_DEFORMER"
@@ -55,8 +65,8 @@ def load_face(
 
     Args:
         name: a folder with faces in it, or "default".
-        directory: where to look first; else what REALIZER_FACES names, `faces` beside the package, and the
-            faces that came with the package.
+        directory: where to look first; else what REALIZER_FACES names, `faces` beside the package, the
+            faces that came with the package, and those of plug-ins.
         deformer: "mpeg4" (only FAPs move it) or "au" (its model of action units; FAPs for the rest); None
             selects REALIZER_DEFORMER, then face.toml, then "mpeg4".
 
@@ -110,10 +120,10 @@ def folder_of(name: str, directory: Path | str | None = None) -> Path:
         raise FaceError(
             f"face: wanted a face's name, not a path, got {name!r}; {VARIABLE} says where else faces lie"
         )
-    places = list(_places(directory))
-    for place in places:
+    for place in _places(directory):
         if (place / name).is_dir():
             return place / name
+    places = list(_places(directory))
     known = ", ".join(info.name for info in list_faces(directory)) or "none"
     raise FaceError(f"face {name!r}: no such folder in {', '.join(map(str, places))}; there are: {known}")
 
@@ -157,9 +167,8 @@ def _places(directory: Path | str | None) -> Iterator[Path]:
         yield Path(directory)
     if os.environ.get(VARIABLE):
         yield Path(os.environ[VARIABLE])
-    package = Path(__file__).parents[1]
-    yield package.parent / "faces"  # a checkout
-    yield package / "_faces"  # the wheel's copy
+    for _, folder in FACES.working():
+        yield Path(folder)
 
 
 def _asked(deformer: str | None) -> str | None:

@@ -7,8 +7,6 @@ from pathlib import Path
 from realizer.core.registry import Registry
 from realizer.outputs.output import Output
 
-__all__ = ["OUTPUTS", "output_for"]
-
 OUTPUTS: Registry[Output] = Registry(
     "realizer.outputs",
     {

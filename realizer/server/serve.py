@@ -18,12 +18,9 @@ from realizer.scheduling import warm_up
 from realizer.server.runtime.gc_policy import leave_to_shell
 from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.workers import FAULT, READY, Workers, handed
-from realizer.server.transports.asap import AsapDoor
-from realizer.server.transports.stomp import StompDoor
+from realizer.server.transports import registry
 from realizer.server.transports.transport import Door
 from realizer.server.transports.websocket.server import WebSocketDoor, lines
-from realizer.server.transports.xface.player import XfacePlayerDoor
-from realizer.server.transports.xface.server import XfaceDoor
 
 # How often the drain looks whether everything has ended.
 DRAIN_STEP = 0.05  # s
@@ -196,9 +193,11 @@ class Server:
         """
         await self._shell.start()
         try:
-            for door in _doors(self._web, self._shell, self.settings):
-                await door.start()
-                self.doors.append(door)
+            made = (make(self._shell, self.settings) for make in registry.requested(self.settings))
+            for door in (self._web, *made):
+                if door is not None:
+                    await door.start()
+                    self.doors.append(door)
         except BaseException:
             await self.close()
             raise
@@ -248,17 +247,3 @@ def _warm_up(settings: Settings) -> None:
     """Load what is loaded once for all sessions and takes long enough to delay frames."""
     warm_up()
     arkit.warm_up(mapping_of(settings.face, settings.mapping))
-
-
-def _doors(web: WebSocketDoor, shell: Shell, settings: Settings) -> list[Door]:
-    """The doors that the settings ask for. A new door is a module in `doors` and a line here."""
-    doors: list[Door] = [web]
-    if settings.asap_ports is not None:
-        doors.append(AsapDoor(shell, settings))
-    if settings.xface_port is not None:
-        doors.append(XfaceDoor(shell, settings))
-    if settings.xface_player is not None:
-        doors.append(XfacePlayerDoor(shell, settings))
-    if settings.stomp is not None:
-        doors.append(StompDoor(shell, settings))
-    return doors
