@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 import realizer
-from realizer.protocol.messages.common import PROTOCOL, STREAMS
+from realizer.protocol.messages.common import PROTOCOL
 from realizer.protocol.messages.parse import SUPPORTED, Control
 from realizer.protocol.messages.replies import (
     Changed,
@@ -32,7 +32,8 @@ from realizer.protocol.messages.replies import (
     Welcome,
 )
 from realizer.protocol.messages.requests import Subscribe
-from realizer.protocol.wire import FINAL, FORGET, PAYLOADS, VERSION
+from realizer.protocol.streams import KINDS, STREAMS
+from realizer.protocol.wire import FINAL, FORGET, VERSION
 
 __all__ = ["BEGIN", "END", "FILE", "PAGE", "asyncapi", "render", "tables", "within"]
 
@@ -69,9 +70,10 @@ HEADER = (
     f"Little-endian: u8 kind, u8 version ({VERSION}), u16 flags, u32 frame, f64 time in seconds on the "
     "session clock; then what the kind says"
 )
+_FLUSHED = ", ".join(f"`{row.name}`" for row in STREAMS.values() if row.flushes)
 FLAGS = (
     "The low byte of flags is the `index` of `subscribed`; "
-    f"{FORGET:#x} on sound means: forget everything from this time on."
+    f"{FORGET:#x} on {_FLUSHED} means: forget everything from this time on."
 )
 CLIP = (
     f"A piece of a sound clip: u8 kind 4, u8 version {VERSION}, u16 flags ({FINAL:#x}: the last piece), u32 "
@@ -163,7 +165,7 @@ def _out(name: str) -> str:
 
 
 def _kinds() -> list[tuple[str, str]]:
-    return [(stream, f"kind {kind:d}, {says}") for kind, (stream, says) in PAYLOADS.items()]
+    return [(row.name, f"kind {kind}, {row.payload}") for kind, row in KINDS.items()]
 
 
 def _message(model: type[BaseModel], name: str) -> dict[str, Any]:
@@ -195,29 +197,17 @@ def tables() -> str:
         lines.append(f"| `{example}` | {_fields(model)} | {_cell(_first(model))} |")
     lines.append(f"| binary | | {_cell(CLIP)} |")
     lines += ["", "| stream | encodings | takes | binary: the header, then |", "|---|---|---|---|"]
-    kinds = {stream: f"{kind:d}: {says}" for kind, (stream, says) in PAYLOADS.items()}
-    for stream, encodings in STREAMS.items():
-        takes = ", ".join(f"`{name}`" for name in _takes(stream, encodings))
-        lines.append(f"| `{stream}` | {', '.join(encodings)} | {takes} | {_cell(kinds.get(stream, ''))} |")
+    for row in STREAMS.values():
+        takes = ", ".join(f"`{name}`" for name in row.options)
+        payload = "" if row.kind is None else _cell(f"{row.kind}: {row.payload}")
+        lines.append(f"| `{row.name}` | {', '.join(row.encodings)} | {takes} | {payload} |")
     lines += ["", "| out | with | |", "|---|---|---|", f"| XML | | {_cell(FEEDBACK)} |"]
     for name, model in REPLIES.items():
-        called = "fap`, `au`, `arkit" if name == "frame" else name
+        called = "`, `".join(row.name for row in STREAMS.values() if row.numeric) if name == "frame" else name
         codes = f" Codes: {', '.join(get_args(ErrorCode))}." if name == "error" else ""
         lines.append(f"| `{called}` | {_fields(model)} | {_cell(_first(model))}{codes} |")
     lines.append(f"| binary | | {_cell(f'{HEADER}. {FLAGS}')} |")
     return "\n".join(lines) + "\n"
-
-
-def _takes(stream: str, encodings: tuple[str, ...]) -> list[str]:
-    """What `subscribe` takes for a stream: what its description says first, and what all frames have."""
-    common = {"feedback": ["character"], "schedule": ["character"], "audio": ["character"]}
-    names = common.get(stream, ["fps", "character"])
-    own = [
-        name
-        for name, field in Subscribe.model_fields.items()
-        if (field.description or "").startswith(f"{stream}:")
-    ]
-    return [*names, *own]
 
 
 def _fields(model: type[BaseModel]) -> str:

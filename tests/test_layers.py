@@ -160,6 +160,7 @@ def test_client_loads_no_engine() -> None:
         "realizer.protocol",
         "realizer.protocol.messages",
         "realizer.protocol.messages.common",
+        "realizer.protocol.streams",
         "realizer.protocol.wire",
     }
     heavy = {"scipy", "trimesh", "pyrender", "av", "PIL", "websockets"}

@@ -11,10 +11,9 @@ import pytest
 from websockets.asyncio.client import connect
 
 from realizer.core.settings import Settings
-from realizer.protocol.messages.common import STREAMS
 from realizer.protocol.messages.parse import SUPPORTED, parse_control
 from realizer.protocol.messages.replies import ErrorMessage
-from realizer.protocol.wire import PAYLOADS
+from realizer.protocol.streams import KINDS, STREAMS
 from realizer.server.serve import Server
 from tests.protocol import (
     ANSWERS,
@@ -85,7 +84,6 @@ def test_everything_that_is_named_is_there_and_everything_there_is_named() -> No
     assert set(SUPPORTED) == set(REQUESTS) == set(REQUESTS) & set(DOCUMENT["components"]["messages"])
     assert ANSWERS.keys() < REQUESTS.keys()
     assert {answer for answers in ANSWERS.values() for answer in answers} < REPLIES.keys()
-    assert {stream for stream, _ in PAYLOADS.values()} < STREAMS.keys()
 
 
 @pytest.mark.parametrize("name", sorted(DOCUMENT["components"]["schemas"]))
@@ -110,7 +108,7 @@ def test_a_table_names_every_message_stream_and_kind() -> None:
         assert f'"type":"{name}"' in text
     for name in (*STREAMS, *REPLIES.keys() - {"frame"}):
         assert f"| `{name}` |" in text
-    assert all(f"| {kind:d}: {says} |" in text for kind, (_, says) in PAYLOADS.items())
+    assert all(f"| {kind}: {row.payload} |" in text for kind, row in KINDS.items())
 
 
 def test_what_the_service_says_fits_the_file() -> None:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.errors import RealizerError
-from realizer.protocol.wire import PAYLOADS, WireFrame, unpack
+from realizer.protocol.wire import WireFrame, unpack
 
 # Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
 KEPT = 1_000
@@ -84,8 +84,8 @@ class Mail:
     def put(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
             frame = unpack(message)
-            stream = PAYLOADS[frame.kind][0]
-            self.of(stream).append(replace(frame, told=self._told.get((stream, frame.character))))
+            told = self._told.get((frame.stream, frame.character))
+            self.of(frame.stream).append(replace(frame, told=told))
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] == "schedule" or "values" in reply:

@@ -6,13 +6,13 @@ import json
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
 from realizer.core.array_types import Float32, Float64, Int16, Int32
 from realizer.core.errors import RealizerError
+from realizer.protocol.streams import KINDS, STREAMS
 
 VERSION = 1
 # u8 kind, u8 version, u16 flags, u32 frame, f64 time; little-endian. 16 bytes, so the payload stays aligned
@@ -30,31 +30,6 @@ class WireError(RealizerError):
     """A binary message that is no frame of ours; the text says what was wanted and what came."""
 
 
-class FrameKind(IntEnum):
-    """The first byte of a binary message."""
-
-    FAP = 1
-    AU = 2
-    PICTURE = 3
-    SOUND = 4
-    MESH = 5
-    ARKIT = 6
-
-
-# kind -> stream, and what follows the header.
-PAYLOADS: Mapping[FrameKind, tuple[str, str]] = {
-    FrameKind.FAP: ("fap", "68 int32 in FAPU, column = FAP - 1"),
-    FrameKind.AU: ("au", "float32, 0..1, as `names` of `subscribed` has them"),
-    FrameKind.PICTURE: ("video", "a JPEG, PNG or WebP file"),
-    FrameKind.SOUND: ("audio", "20 ms of mono int16 PCM, at most 100 ms ahead; none in silence"),
-    FrameKind.MESH: ("mesh", "three int16 a vertex; metres = int16 x `scale` + `offset` of `subscribed`"),
-    FrameKind.ARKIT: (
-        "arkit",
-        "59 float32: ARKit's 52 weights, 0..1, then turns of head and eyes in radians",
-    ),
-}
-
-
 @dataclass(frozen=True, slots=True)
 class WireFrame:
     """One binary message taken apart.
@@ -64,7 +39,7 @@ class WireFrame:
         told: what `subscribed`, or `changed` since, told of its stream, where a client has put it here.
     """
 
-    kind: FrameKind
+    kind: int
     frame: int
     time: float
     payload: bytes
@@ -73,22 +48,22 @@ class WireFrame:
     told: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @property
+    def stream(self) -> str:
+        """Name of the stream that it belongs to."""
+        return KINDS[self.kind].name
+
+    @property
     def values(self) -> Int32 | Float32 | Int16:
         """The payload as numbers: (68,) int32, (n,) or (59,) float32, (samples,) int16 or (n, 3) int16.
 
         Raises:
             WireError: a picture has none.
         """
-        match self.kind:
-            case FrameKind.FAP:
-                return np.frombuffer(self.payload, "<i4")
-            case FrameKind.AU | FrameKind.ARKIT:
-                return np.frombuffer(self.payload, "<f4")
-            case FrameKind.SOUND:
-                return np.frombuffer(self.payload, "<i2")
-            case FrameKind.MESH:
-                return np.frombuffer(self.payload, "<i2").reshape(-1, 3)
-        raise WireError("a picture has no values: wanted a frame of numbers")
+        row = KINDS[self.kind]
+        if row.dtype is None:
+            raise WireError("a picture has no values: wanted a frame of numbers")
+        values: Int32 | Float32 | Int16 = np.frombuffer(self.payload, row.dtype)
+        return values if row.width == 1 else values.reshape(-1, row.width)
 
     @property
     def vertices(self) -> Float32:
@@ -97,14 +72,14 @@ class WireFrame:
         Raises:
             WireError: it is no mesh, or nobody has told its scale.
         """
-        if self.kind is not FrameKind.MESH or self.told is None:
-            raise WireError(f"wanted a mesh whose stream was told of, got {self.kind.name}")
+        if self.stream != "mesh" or self.told is None:
+            raise WireError(f"wanted a mesh whose stream was told of, got {self.stream}")
         scale, offset = self.told["scale"], self.told["offset"]
         return (self.values * np.float32(scale) + np.array(offset, np.float32)).astype(np.float32)
 
 
 def pack(
-    kind: FrameKind,
+    stream: str,
     frame: int,
     time: float,
     payload: bytes,
@@ -113,11 +88,12 @@ def pack(
     forget: bool = False,
 ) -> bytes:
     """One binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
+    kind = STREAMS[stream].kind
     return HEADER.pack(kind, VERSION, (character & 0xFF) | (FORGET if forget else 0), frame, time) + payload
 
 
 def pack_frames(
-    kind: FrameKind, first: int, times: Float64, rows: Int32 | Float32, *, character: int = 0
+    stream: str, first: int, times: Float64, rows: Int32 | Float32, *, character: int = 0
 ) -> tuple[bytes, int]:
     """What `pack` says of each of many frames, one behind the other, and the length of one.
 
@@ -137,7 +113,7 @@ def pack_frames(
             ("payload", rows.dtype.newbyteorder("<"), rows.shape[1:]),
         ],
     )
-    whole["kind"], whole["version"], whole["flags"] = kind, VERSION, character & 0xFF
+    whole["kind"], whole["version"], whole["flags"] = STREAMS[stream].kind, VERSION, character & 0xFF
     whole["frame"] = np.arange(first, first + len(rows))
     whole["time"], whole["payload"] = times, rows
     return whole.tobytes(), whole.dtype.itemsize
@@ -154,9 +130,9 @@ def unpack(message: bytes) -> WireFrame:
     kind, version, flags, frame, time = HEADER.unpack_from(message)
     if version != VERSION:
         raise WireError(f"wanted version {VERSION} of the frame header, got {version}")
-    if kind not in FrameKind.__members__.values():
-        raise WireError(f"wanted a kind in {[int(k) for k in FrameKind]}, got {kind}")
-    return WireFrame(FrameKind(kind), frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FORGET))
+    if kind not in KINDS:
+        raise WireError(f"wanted a kind in {list(KINDS)}, got {kind}")
+    return WireFrame(kind, frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FORGET))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +157,7 @@ class ClipPiece:
 def pack_clip(piece: ClipPiece) -> bytes:
     """One binary message; the header's time is 0 and not looked at."""
     flags, id = FINAL if piece.final else 0, piece.id.encode()
-    head = HEADER.pack(FrameKind.SOUND, VERSION, flags, piece.number, 0.0)
+    head = HEADER.pack(STREAMS["audio"].kind, VERSION, flags, piece.number, 0.0)
     return head + CLIP.pack(piece.rate, len(id)) + id + piece.sound
 
 
@@ -192,8 +168,8 @@ def unpack_clip(message: bytes) -> ClipPiece:
         WireError: it is no piece of a sound clip.
     """
     frame = unpack(message)
-    if frame.kind is not FrameKind.SOUND:
-        raise WireError(f"wanted a sound clip (kind {FrameKind.SOUND:d}), got kind {frame.kind:d}")
+    if frame.stream != "audio":
+        raise WireError(f"wanted a sound clip (kind {STREAMS['audio'].kind}), got kind {frame.kind}")
     if len(frame.payload) < CLIP.size:
         raise WireError(f"wanted a rate and an id behind the header, got {len(frame.payload)} bytes")
     rate, length = CLIP.unpack_from(frame.payload)

@@ -26,7 +26,7 @@ from stopwatch import noise
 
 from realizer.animation.lips.lip_sync import lip_channels
 from realizer.core.settings import Settings
-from realizer.protocol.wire import FrameKind, unpack
+from realizer.protocol.wire import unpack
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.cache import Kept
@@ -73,7 +73,7 @@ def first_sound(voice: Voice, message: str) -> float:
                     session.spoken(id, fitted(voice, replace(say, voice=None)), time.perf_counter())
                 case Send(_, bytes() as data):
                     frame = unpack(data)
-                    if frame.kind is FrameKind.SOUND and np.any(frame.values):
+                    if frame.stream == "audio" and np.any(frame.values):
                         session.close()
                         return 1000 * (time.perf_counter() - begin)
         session.tick(time.perf_counter())

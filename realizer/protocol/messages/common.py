@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
+
+from realizer.protocol.streams import STREAMS
 
 # Version of the protocol that `hello` and `welcome` name.
 PROTOCOL = 1
@@ -30,20 +32,16 @@ WHOLE = BeforeValidator(_whole)
 Whole = Annotated[int, WHOLE]
 # Of a time no more is told than anybody can mean.
 Seconds = Annotated[float, AfterValidator(lambda time: round(time, 6))]
-Stream = Literal["feedback", "fap", "au", "arkit", "mesh", "audio", "video", "schedule"]
-Encoding = Literal["binary", "json", "text"]
+# mypy takes no names for a Literal that are not written out.
+if TYPE_CHECKING:
+    StreamName = str
+    NumericStream = str
+    Encoding = str
+else:
+    StreamName = Literal[tuple(STREAMS)]
+    NumericStream = Literal[tuple(row.name for row in STREAMS.values() if row.numeric)]
+    Encoding = Literal[tuple(sorted({name for row in STREAMS.values() for name in row.encodings}))]
 Picture = Literal["jpeg", "png", "webp"]
-# stream -> the encodings it has, the default first.
-STREAMS: dict[str, tuple[str, ...]] = {
-    "feedback": ("text",),
-    "fap": ("binary", "json"),
-    "au": ("binary", "json"),
-    "arkit": ("binary", "json"),
-    "mesh": ("binary",),
-    "audio": ("binary",),
-    "video": ("binary",),
-    "schedule": ("json",),
-}
 # What pictures of the stream `video` are, the default first -> their media type.
 PICTURES: dict[str, str] = {"jpeg": "image/jpeg", "png": "image/png", "webp": "image/webp"}
 

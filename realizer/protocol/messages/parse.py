@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from realizer.protocol.messages.common import MAX_CONTROL, STREAMS
+from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import (
     Anticipate,
@@ -23,6 +23,7 @@ from realizer.protocol.messages.requests import (
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
+from realizer.protocol.streams import STREAMS
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from realizer.protocol.messages.common import PROTOCOL, Reply, Seconds
+from realizer.protocol.messages.common import PROTOCOL, NumericStream, Reply, Seconds
 
 
 class Capabilities(Reply):
@@ -191,7 +191,7 @@ class Pong(Reply):
 class FrameMessage(Reply):
     """One frame of the stream that `type` names, where its encoding is JSON."""
 
-    type: Literal["fap", "au", "arkit"]
+    type: NumericStream
     frame: int = Field(description="k: sampled at k / fps of the session clock")
     time: float = Field(description="seconds on the session clock")
     values: list[float] = Field(description="one for each of the names that `subscribed` told")

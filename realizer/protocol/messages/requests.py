@@ -13,7 +13,7 @@ from realizer.protocol.messages.common import (
     Encoding,
     Message,
     Picture,
-    Stream,
+    StreamName,
     Whole,
 )
 
@@ -71,7 +71,7 @@ class Subscribe(Message):
     )
 
     type: Literal["subscribe"]
-    stream: Stream
+    stream: StreamName
     encoding: Encoding | None = Field(None, description="None: the stream's first")
     fps: float | None = Field(None, gt=0, le=MAX_FPS, description="None: the service's own rate")
     character: str | None = Field(None, max_length=256, description="None: the first")
@@ -99,7 +99,7 @@ class Unsubscribe(Message):
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "unsubscribe", "stream": "fap"}]})
 
     type: Literal["unsubscribe"]
-    stream: Stream
+    stream: StreamName
     character: str | None = Field(None, max_length=256)
     view: str | None = Field(None, max_length=64, description="of a video that was given one")
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from realizer.animation.axis import AU_NAMES
 from realizer.core.settings import Settings, raises
 from realizer.playback.player import Player
-from realizer.protocol.messages.common import PICTURES, STREAMS, Reply
+from realizer.protocol.messages.common import PICTURES, Reply
 from realizer.protocol.messages.replies import Changed, Subscribed
 from realizer.protocol.messages.requests import Subscribe, Unsubscribe
+from realizer.protocol.streams import STREAMS
 from realizer.server.documents.limits import MAX_CHARACTERS, too_many_pixels
 from realizer.server.session.character_faces import Faces
 from realizer.server.session.control_fields import Wrong, index_of
@@ -27,15 +27,7 @@ from realizer.server.streams.connection import (
     Subscription,
     View,
 )
-from realizer.server.streams.frame_windows import arkit_names
-from realizer.tables import faps
-
-# Stream of numbers -> what they are.
-NAMES = {
-    "fap": lambda: [row.name for row in faps()],
-    "au": lambda: list(AU_NAMES()),
-    "arkit": arkit_names,
-}
+from realizer.server.streams.frame_windows import SOURCES
 
 
 @dataclass(frozen=True)
@@ -94,9 +86,10 @@ class Subscriptions:
             FaceError: its face cannot be loaded.
         """
         stream = message.stream
-        encoding = message.encoding or STREAMS[stream][0]
-        if encoding not in STREAMS[stream]:
-            raise Wrong("encoding", f"wanted {' or '.join(STREAMS[stream])} for {stream}, got {encoding}")
+        encodings = STREAMS[stream].encodings
+        encoding = message.encoding or encodings[0]
+        if encoding not in encodings:
+            raise Wrong("encoding", f"wanted {' or '.join(encodings)} for {stream}, got {encoding}")
         told: dict[str, Any]
         if stream == "feedback":
             elements = None if message.elements is None else frozenset(message.elements)
@@ -165,7 +158,7 @@ class Subscriptions:
     def _frames(self, request: _Request) -> _Answer:
         message, index, old, fps = request.message, request.index, request.old, request.fps
         stream = message.stream
-        told = self._mesh(index) if stream == "mesh" else {"names": NAMES[stream]()}
+        told = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
         made = self._broadcast.frames(stream, request.encoding, index, message.character, fps, request.t)
         made.asked = message.asked
         if isinstance(old, FrameSubscription) and old.timeline is made.timeline:

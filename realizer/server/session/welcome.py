@@ -7,8 +7,9 @@ from typing import Any
 
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
-from realizer.protocol.messages.common import MAX_CONTROL, MAX_FPS, PICTURES, STREAMS
+from realizer.protocol.messages.common import MAX_CONTROL, MAX_FPS, PICTURES
 from realizer.protocol.messages.replies import Capabilities, Limits, Welcome
+from realizer.protocol.streams import STREAMS
 from realizer.server.documents.limits import MAX_CHARACTERS
 
 
@@ -26,7 +27,7 @@ def greeting(id: str, t: float, seq: int, s: Settings, capabilities: Mapping[str
         time=t,
         seq=seq,
         capabilities=Capabilities(
-            streams={stream: list(encodings) for stream, encodings in STREAMS.items()},
+            streams={stream: list(row.encodings) for stream, row in STREAMS.items()},
             pictures=list(PICTURES),
             fps=s.fps,
             **capabilities,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from realizer.protocol.wire import FrameKind, pack
+from realizer.protocol.wire import pack
 from realizer.server.session.effects import Effect, Send
 from realizer.server.streams.audio_stream import AHEAD, PACKET
 from realizer.server.streams.connection import Connection, SoundSubscription
@@ -52,4 +52,4 @@ def _changed(s: SoundSubscription, current: int) -> int | None:
 
 
 def _packet(s: SoundSubscription, number: int, pcm: bytes, *, forget: bool = False) -> bytes:
-    return pack(FrameKind.SOUND, number, number * PACKET, pcm, character=s.index, forget=forget)
+    return pack("audio", number, number * PACKET, pcm, character=s.index, forget=forget)

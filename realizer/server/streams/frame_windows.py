@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
+from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16, Int32
 from realizer.playback.player import Player
-from realizer.protocol.wire import HEADER, PAYLOADS, FrameKind, json_frame, pack, pack_frames
+from realizer.protocol.wire import HEADER, json_frame, pack, pack_frames
+from realizer.tables import faps
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
@@ -26,7 +29,6 @@ if TYPE_CHECKING:
 WINDOW = 10.0  # s
 # Meshes computed in one call: each costs as much as the frames of a whole window, so a few at a time.
 MESHES = 8
-KINDS = {stream: kind for kind, (stream, _) in PAYLOADS.items()}
 # What follows the 52 weights of a frame of the stream arkit, in radians.
 TURNS = (
     *("headYaw", "headPitch", "headRoll"),
@@ -34,6 +36,38 @@ TURNS = (
 )
 # Rounding of k / fps, and of times that go from one clock to another and back, on a clock of days.
 EPSILON = 1e-6  # s
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """What a stream of numbers holds.
+
+    Attributes:
+        names: of the values of a frame.
+        rows: (n, k) the values of n frames, from the AUs, what AUs ask of FAPs, and whether AUs are wanted
+            as they were before the rules of co-occurrence.
+    """
+
+    names: Callable[[], list[str]]
+    rows: Callable[[AUFrames, FapMapping, bool], Float32 | Int32]
+
+
+def _arkit_rows(frames: AUFrames, mapping: FapMapping, asked: bool) -> Float32:
+    shown = arkit(frames, mapping)
+    return np.concatenate([shown.weights, shown.head, shown.eyes.reshape(len(shown.times), 4)], axis=1)
+
+
+SOURCES: Mapping[str, FrameSource] = {
+    "fap": FrameSource(
+        lambda: [row.name for row in faps()],
+        lambda frames, mapping, asked: to_fap(frames, mapping).integers(),
+    ),
+    "au": FrameSource(
+        lambda: list(AU_NAMES()),
+        lambda frames, mapping, asked: frames.asked if asked else frames.aus,
+    ),
+    "arkit": FrameSource(lambda: [*ARKIT_NAMES(), *TURNS], _arkit_rows),
+}
 
 
 def first_at(now: float, fps: float) -> int:
@@ -50,10 +84,10 @@ class Strip:
     """The messages of frames `first` .. `end - 1`, which are numbers, made at once: each is a slice."""
 
     def __init__(
-        self, kind: FrameKind, first: int, times: Float64, rows: Float32 | Int32, character: int
+        self, stream: str, first: int, times: Float64, rows: Float32 | Int32, character: int
     ) -> None:
         self.first, self.end = first, first + len(rows)
-        self._bytes, self._size = pack_frames(kind, first, times, rows, character=character)
+        self._bytes, self._size = pack_frames(stream, first, times, rows, character=character)
         self._dtype: np.dtype[Any] = rows.dtype
 
     def __getitem__(self, frame: int) -> bytes:
@@ -120,15 +154,7 @@ class Window:
         Args:
             asked: AUs as asked for, before the rules of co-occurrence.
         """
-        match stream:
-            case "fap":
-                return self.faps.integers()
-            case "au":
-                return self.aus.asked if asked else self.aus.aus
-            case _:
-                shown = arkit(self.aus, self._mapping)
-                eyes = shown.eyes.reshape(len(shown.times), 4)
-                return np.concatenate([shown.weights, shown.head, eyes], axis=1)
+        return SOURCES[stream].rows(self.aus, self._mapping, asked)
 
     @cached_property
     def poses(self) -> Float32:
@@ -152,7 +178,7 @@ class Window:
         if known is None:
             rows = self.rows(wanted.stream, wanted.asked)
             times = np.arange(self.first, self.end) / self.fps
-            known = Strip(KINDS[wanted.stream], self.first, times, rows, wanted.index)
+            known = Strip(wanted.stream, self.first, times, rows, wanted.index)
             self._strips[wanted.stream, wanted.asked] = known
         return known
 
@@ -161,7 +187,7 @@ class Window:
         n, time = frame - self.first, frame / self.fps
         row = self.mesh(n) if wanted.stream == "mesh" else self.strip(wanted).row(frame)
         if wanted.encoding == "binary":
-            return pack(KINDS[wanted.stream], frame, time, row.tobytes(), character=wanted.index)
+            return pack(wanted.stream, frame, time, row.tobytes(), character=wanted.index)
         values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
         return json_frame(wanted.stream, frame, time, values, wanted.name)
 
@@ -236,8 +262,3 @@ class Wanted(Protocol):
     index: int
     name: str | None
     asked: bool
-
-
-def arkit_names() -> list[str]:
-    """What the values of a frame of the stream arkit are."""
-    return [*ARKIT_NAMES(), *TURNS]

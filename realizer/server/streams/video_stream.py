@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from realizer.protocol.wire import FrameKind, pack
+from realizer.protocol.wire import pack
 from realizer.server.session.character_faces import Faces
 from realizer.server.session.effects import Draw, Effect, Look, Send
 from realizer.server.streams.connection import Connection, PictureSubscription, View
@@ -84,6 +84,6 @@ class Pictures:
                     connection.dropped += 1
                     continue
                 time = view.drawing / view.timeline.fps
-                data = pack(FrameKind.PICTURE, view.drawing, time, picture, character=subscription.index)
+                data = pack("video", view.drawing, time, picture, character=subscription.index)
                 effects.append(Send(connection.id, data))
         return effects, lookers

@@ -9,7 +9,8 @@ import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
 from realizer.client.message_router import KEPT, ClientError, Mail, Until
-from realizer.protocol.wire import FrameKind, WireError, pack
+from realizer.protocol.streams import KINDS
+from realizer.protocol.wire import WireError, pack
 
 
 @pytest.fixture
@@ -43,17 +44,17 @@ def test_an_error_about_what_was_asked_is_raised(mail, where) -> None:
     assert not mail.errors
 
 
-@pytest.mark.parametrize("kind", list(FrameKind))
-def test_frames_are_kept_by_stream_the_newest_ones(mail, kind) -> None:
+@pytest.mark.parametrize("stream", [row.name for row in KINDS.values()])
+def test_frames_are_kept_by_stream_the_newest_ones(mail, stream) -> None:
     for k in range(KEPT + 5):
-        mail.put(pack(kind, k, k / 25, np.zeros(2, "<f4").tobytes()))
+        mail.put(pack(stream, k, k / 25, np.zeros(2, "<f4").tobytes()))
     ((_, frames),) = mail.frames.items()
     assert [frame.frame for frame in frames] == list(range(5, KEPT + 5))
 
 
 def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
     mesh = {"stream": "mesh", "index": 1, "scale": 2.0, "offset": [0.0, 0.0, 1.0]}
-    frame = pack(FrameKind.MESH, 0, 0.0, np.array([1, 2, 3], "<i2").tobytes(), character=1)
+    frame = pack("mesh", 0, 0.0, np.array([1, 2, 3], "<i2").tobytes(), character=1)
     mail.ask("subscribe")
     mail.put(json.dumps({"type": "subscribed", "fps": 25.0, **mesh}))
     mail.put(frame)
@@ -65,7 +66,7 @@ def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
     assert second.vertices.tolist() == [[1.0, 2.0, 4.0]]
     assert second.told["fps"] == 25.0
     assert first == second
-    with pytest.raises(WireError, match="wanted a mesh whose stream was told of, got MESH"):
+    with pytest.raises(WireError, match="wanted a mesh whose stream was told of, got mesh"):
         _ = other.vertices
     assert mail.answer()["scale"] == 2.0
     assert not mail.errors

@@ -15,7 +15,7 @@ from realizer.client.record import RATE
 from realizer.client.record import _each as each
 from realizer.client.record import _sound as sound_of
 from realizer.core.settings import Settings
-from realizer.protocol.wire import FrameKind, WireFrame, pack, unpack
+from realizer.protocol.wire import WireFrame, pack, unpack
 from realizer.server.serve import Server
 
 LIMIT = 120  # s
@@ -83,10 +83,10 @@ def test_a_folder_that_is_not_there_is_said_before_anything_is_played(tmp_path: 
 
 def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
     packets = [
-        unpack(pack(FrameKind.SOUND, k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))
+        unpack(pack("audio", k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))
         for k in range(4)
     ]
-    packets.append(unpack(pack(FrameKind.SOUND, 2, 1.04, b"", forget=True)))
+    packets.append(unpack(pack("audio", 2, 1.04, b"", forget=True)))
     pcm = sound_of(packets, 1.01, 0.1)
     step = RATE // 100
     assert [int(pcm[k * step]) for k in range(5)] == [1, 2, 2, 0, 0]
@@ -96,7 +96,7 @@ def test_a_picture_that_did_not_come_leaves_the_one_before() -> None:
     def picture(frame: int, grey: int) -> WireFrame:
         buffer = io.BytesIO()
         Image.new("RGB", (16, 16), (grey,) * 3).save(buffer, "PNG")
-        return unpack(pack(FrameKind.PICTURE, frame, frame / 10, buffer.getvalue()))
+        return unpack(pack("video", frame, frame / 10, buffer.getvalue()))
 
     shown = each([picture(0, 10), picture(1, 20), picture(4, 50)], 0.1, 10, 5)
     assert [int(one[0, 0, 0]) for one in shown] == [20, 20, 20, 50, 50]

@@ -27,7 +27,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
-from realizer.protocol.wire import FrameKind, unpack
+from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
 from realizer.speech.espeak.voice import EspeakVoice
 from tests.benchmarks.packets import masked
@@ -100,7 +100,7 @@ def test_a_voice_that_is_killed_in_a_text_costs_its_sound_and_one_warning(
             while not rest or 'id="next:end"' not in rest[-1]:
                 message = await client.recv()
                 if isinstance(message, bytes):
-                    heard += unpack(message).kind is FrameKind.SOUND
+                    heard += unpack(message).stream == "audio"
                 elif message.startswith("<"):
                     rest.append(message)
         assert heard

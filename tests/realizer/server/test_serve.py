@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.core.settings import Settings, SettingsError
-from realizer.protocol.wire import FrameKind, unpack
+from realizer.protocol.wire import unpack
 from realizer.server.serve import Server, serve, work
 from realizer.server.session.session import Session
 
@@ -84,7 +84,7 @@ def test_a_document_plays_over_the_wire() -> None:
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         assert all(f["time"] == pytest.approx(f["frame"] / 25) and len(f["values"]) == 68 for f in frames)
         binary = [unpack(m) for m in messages if isinstance(m, bytes)]
-        assert {f.kind for f in binary} == {FrameKind.AU}
+        assert {f.stream for f in binary} == {"au"}
         assert all(f.time == pytest.approx(f.frame / 50) for f in binary)
         assert [f.frame for f in binary] == sorted({f.frame for f in binary})
 

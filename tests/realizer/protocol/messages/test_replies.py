@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from realizer.protocol.messages.common import PICTURES, STREAMS
+from realizer.protocol.messages.common import PICTURES
 from realizer.protocol.messages.replies import (
     Capabilities,
     ErrorMessage,
@@ -15,6 +15,7 @@ from realizer.protocol.messages.replies import (
     StateMessage,
     Welcome,
 )
+from realizer.protocol.streams import STREAMS
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
@@ -28,7 +29,7 @@ def test_welcome_names_version_capabilities_and_limits(driver) -> None:
     (told,) = driver.send({"type": "hello"}).of("welcome")
     welcome = Welcome.model_validate(told, extra="forbid")
     assert welcome.version == 1
-    assert welcome.capabilities.streams == {name: list(known) for name, known in STREAMS.items()}
+    assert welcome.capabilities.streams == {name: list(row.encodings) for name, row in STREAMS.items()}
     assert welcome.capabilities.pictures == list(PICTURES)
     assert (welcome.limits.document, welcome.limits.fps) == (2**20, 240)
     assert isinstance(welcome.capabilities, Capabilities)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.core.errors import VoiceError
-from realizer.protocol.wire import FrameKind
 from realizer.server.documents.tts_requests import PATIENCE
 from realizer.speech.duration_fit import fitted
 from realizer.speech.espeak.voice import EspeakVoice
@@ -57,7 +56,7 @@ def test_the_first_clause_sounds_before_the_rest_is_made_and_all_of_it_is_what_w
     assert [len(o.say.ssml) < 160 for o in driver.spoken] == [True]
     assert answer(driver, voice)
     first = driver.run(0.1)
-    assert [f.kind for f in first.frames] == [FrameKind.SOUND] * len(first.frames)
+    assert [f.stream for f in first.frames] == ["audio"] * len(first.frames)
     assert first.frames, "it sounds"
     while answer(driver, voice):
         driver.run(driver.now + 0.2)
@@ -105,7 +104,7 @@ def test_lips_move_in_every_part_and_do_not_jump_where_the_next_one_comes() -> N
         driver.run(driver.now + 0.31)
     lasts = driver.session.player.speech()[0].utterance
     client = driver.run(lasts.duration + 1)
-    mouth = np.array([f.values[3:5] for f in client.frames if f.kind is FrameKind.FAP])
+    mouth = np.array([f.values[3:5] for f in client.frames if f.stream == "fap"])
     for start, part in lasts.parts:
         own = mouth[round(start * 25) : round((start + part.duration) * 25)]
         assert np.abs(own).max() > 100
@@ -113,7 +112,7 @@ def test_lips_move_in_every_part_and_do_not_jump_where_the_next_one_comes() -> N
     one.send({"type": "subscribe", "stream": "fap", "fps": 25})
     one.send(BLOCK.format("b", "", SENTENCE.format(1), ""))
     one.say(1, SilentVoice().say(one.spoken[0].say))
-    usual = np.array([f.values[3:5] for f in one.run(10).frames if f.kind is FrameKind.FAP])
+    usual = np.array([f.values[3:5] for f in one.run(10).frames if f.stream == "fap"])
     assert np.abs(np.diff(mouth, axis=0)).max() < 1.5 * np.abs(np.diff(usual, axis=0)).max()
 
 

@@ -5,23 +5,23 @@ from __future__ import annotations
 import pytest
 
 from realizer.face.load import load_face
-from realizer.protocol.messages.common import STREAMS
+from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import unpack
-from realizer.server.session.subscriptions import NAMES
+from realizer.server.streams.frame_windows import SOURCES
 
 
 @pytest.mark.parametrize("stream", sorted(STREAMS))
 def test_each_stream_is_given_in_each_of_its_encodings_and_in_no_other(driver, stream: str) -> None:
-    for encoding in STREAMS[stream]:
+    for encoding in STREAMS[stream].encodings:
         told = driver.send({"type": "subscribe", "stream": stream, "encoding": encoding}).of("subscribed")[-1]
         assert (told["stream"], told["encoding"]) == (stream, encoding)
-    other = next(word for word in ("binary", "json", "text") if word not in STREAMS[stream])
+    other = next(word for word in ("binary", "json", "text") if word not in STREAMS[stream].encodings)
     (error,) = driver.send({"type": "subscribe", "stream": stream, "encoding": other}).of("error")
     assert error["where"] == "subscribe.encoding"
     assert f"for {stream}, got {other}" in error["message"]
 
 
-@pytest.mark.parametrize("stream", sorted(NAMES))
+@pytest.mark.parametrize("stream", sorted(SOURCES))
 def test_what_numbers_are_is_told_one_by_one(driver, stream: str) -> None:
     driver.send({"type": "subscribe", "stream": stream})
     client = driver.run(0.1)

@@ -14,7 +14,7 @@ from websockets.asyncio.client import connect
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback, parse_feedback
 from realizer.core.settings import Settings
 from realizer.protocol.messages.parse import parse_control
-from realizer.protocol.wire import ClipPiece, FrameKind, pack_clip, unpack
+from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.speech import audio_clips
 from realizer.server.speech.audio_clips import ClipError, Clips
@@ -173,7 +173,7 @@ def test_a_document_speaks_a_clip_with_the_times_that_were_told() -> None:
     packets = [unpack(m) for m in got if isinstance(m, bytes)]
     start = next(f for f in told if isinstance(f, BlockProgress)).global_time
     late = packets[1]  # the first one has silence before the start, or comes when the start is past
-    assert late.kind is FrameKind.SOUND
+    assert late.stream == "audio"
     first = round(late.time * RATE) - round(start * RATE)
     assert np.array_equal(late.values, SOUND[first : first + len(late.values)])
 

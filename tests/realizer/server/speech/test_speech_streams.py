@@ -20,7 +20,7 @@ from bml_schema.feedback import (
     parse_feedback,
 )
 from realizer.core.settings import Settings
-from realizer.protocol.wire import ClipPiece, FrameKind, pack_clip, unpack
+from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.speech import speech_streams
@@ -227,7 +227,7 @@ def test_an_interruption_stops_the_sound_in_50_ms_says_what_was_said_and_lets_no
     driver.append("And more. ", close=True)
     client = driver.run(6.0)
     heard = np.zeros(RATE * 6)
-    for frame in (f for f in client.frames if f.kind is FrameKind.SOUND):
+    for frame in (f for f in client.frames if f.stream == "audio"):
         first = round(frame.time * RATE)
         heard[first : None if frame.forget else first + len(frame.values)] = (
             0 if frame.forget else frame.values
@@ -387,7 +387,7 @@ def told_at(messages: list[str | bytes]) -> dict[str, float]:
 
 
 def packets(messages: list[str | bytes]):
-    return [f for f in (unpack(m) for m in messages if isinstance(m, bytes)) if f.kind is FrameKind.SOUND]
+    return [f for f in (unpack(m) for m in messages if isinstance(m, bytes)) if f.stream == "audio"]
 
 
 @pytest.mark.espeak

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.playback.player import Player
-from realizer.protocol.wire import FrameKind, unpack
+from realizer.protocol.wire import unpack
 from realizer.server.streams.connection import FrameSubscription
 from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import Strip, Timeline
@@ -21,7 +21,7 @@ def run(until: float = float("inf"), following: int = 0) -> tuple[Run, FrameSubs
     timeline = Timeline(player, 0, FPS, lambda: pytest.fail("no face is wanted"))
     subscription = FrameSubscription("fap", "binary", timeline, 0, None, following)
     rows = np.arange(FRAMES * 68, dtype="<i4").reshape(FRAMES, 68)
-    strip = Strip(FrameKind.FAP, 0, np.arange(FRAMES) / FPS, rows, 0)
+    strip = Strip("fap", 0, np.arange(FRAMES) / FPS, rows, 0)
     return Run(7, subscription, strip, ZERO, until), subscription
 
 

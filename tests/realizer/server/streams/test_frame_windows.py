@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
-from realizer.protocol.wire import FrameKind
+from realizer.protocol.streams import STREAMS
 from realizer.server.streams.audio_stream import Sound
 from realizer.server.streams.frame_windows import TURNS, Timeline
 
@@ -24,7 +24,7 @@ def test_arkit_frames_are_the_weights_of_the_file_then_head_and_eyes(driver) -> 
     assert told["names"] == [*ARKIT_NAMES(), *TURNS]
     driver.send(TURN)
     frames = driver.run(1.5).frames
-    assert {frame.kind for frame in frames} == {FrameKind.ARKIT}
+    assert {frame.stream for frame in frames} == {"arkit"}
     times = np.array([frame.time for frame in frames])
     shown = arkit(driver.session.player.frames(times))
     values = np.stack([frame.values for frame in frames])
@@ -50,11 +50,13 @@ def test_arkit_as_json_says_the_same(driver) -> None:
 def test_all_streams_run_side_by_side_on_one_connection(driver) -> None:
     for stream, rate in (("fap", 25), ("au", 50), ("arkit", 10), ("mesh", 5)):
         driver.send(subscribe(stream, fps=rate))
-    counts = dict.fromkeys(FrameKind, 0)
+    counts = dict.fromkeys(STREAMS, 0)
     for frame in driver.run(1.0).frames:
-        counts[frame.kind] += 1
-    rates = {FrameKind.FAP: 25, FrameKind.AU: 50, FrameKind.ARKIT: 10, FrameKind.MESH: 5}
-    assert {kind: count for kind, count in counts.items() if count} == {k: n + 1 for k, n in rates.items()}
+        counts[frame.stream] += 1
+    rates = {"fap": 25, "au": 50, "arkit": 10, "mesh": 5}
+    assert {stream: count for stream, count in counts.items() if count} == {
+        k: n + 1 for k, n in rates.items()
+    }
 
 
 def test_rates_that_nobody_gets_any_more_are_forgotten(driver) -> None:

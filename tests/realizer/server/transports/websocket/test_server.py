@@ -24,7 +24,7 @@ from websockets.asyncio.client import connect as dial
 from websockets.exceptions import InvalidStatus
 
 from realizer.core.settings import Settings
-from realizer.protocol.wire import FrameKind, unpack
+from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
 from tests.benchmarks.packets import masked
 
@@ -92,19 +92,19 @@ def test_one_who_sends_and_three_who_watch_see_the_same() -> None:
             seen: list[dict[tuple[int, int], bytes]] = []
             heard: list[list[str]] = []
             for viewer in viewers:
-                mine: dict[tuple[int, int], bytes] = {}
+                mine: dict[tuple[str, int], bytes] = {}
                 said: list[str] = []
                 while not said or 'id="b:end"' not in said[-1]:
                     message = await viewer.recv()
                     if isinstance(message, bytes):
                         frame = unpack(message)
-                        mine[frame.kind, frame.frame] = frame.payload
+                        mine[frame.stream, frame.frame] = frame.payload
                     else:
                         said.append(message)
                 seen.append(mine)
                 heard.append(said)
             shared = set.intersection(*map(set, seen))
-            assert {kind for kind, _ in shared} == {FrameKind.FAP, FrameKind.AU, FrameKind.ARKIT}
+            assert {stream for stream, _ in shared} == {"fap", "au", "arkit"}
             assert len(shared) > 3 * 10
             assert all(one[key] == seen[0][key] for one in seen for key in shared)
             assert heard[0] == heard[1] == heard[2]

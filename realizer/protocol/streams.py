@@ -1,0 +1,77 @@
+"""The table of streams: names, encodings, options of `subscribe`, and what binary messages hold.
+
+The models of messages, the binary format, the documentation and the constants of realizer.js are made from
+it. A new stream of numbers is a row here and a source in `realizer.server.streams.frame_windows`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A row of the table.
+
+    Attributes:
+        name: as `subscribe` takes it.
+        encodings: the default first.
+        options: fields of `subscribe` that it takes beside `encoding`.
+        kind: the first byte of its binary messages; None if it has none.
+        dtype: NumPy's name of the numbers in a binary message; None if they are no numbers.
+        width: how many numbers belong together, as the three coordinates of a vertex do.
+        payload: what follows the header of a binary message, for the documentation.
+        flushes: whether a binary message can have the flag FORGET.
+    """
+
+    name: str
+    encodings: tuple[str, ...]
+    options: tuple[str, ...]
+    kind: int | None = None
+    dtype: str | None = None
+    width: int = 1
+    payload: str = ""
+    flushes: bool = False
+
+    @property
+    def numeric(self) -> bool:
+        """Whether a frame is a row of numbers, each with a name."""
+        return self.dtype is not None and "json" in self.encodings
+
+
+_ROWS = (
+    Stream("feedback", ("text",), ("character", "elements")),
+    Stream(
+        "fap", ("binary", "json"), ("fps", "character"),
+        kind=1, dtype="<i4", payload="68 int32 in FAPU, column = FAP - 1",
+    ),
+    Stream(
+        "au", ("binary", "json"), ("fps", "character", "asked"),
+        kind=2, dtype="<f4", payload="float32, 0..1, as `names` of `subscribed` has them",
+    ),
+    Stream(
+        "arkit", ("binary", "json"), ("fps", "character"),
+        kind=6, dtype="<f4",
+        payload="59 float32: ARKit's 52 weights, 0..1, then turns of head and eyes in radians",
+    ),
+    Stream(
+        "mesh", ("binary",), ("fps", "character"),
+        kind=5, dtype="<i2", width=3,
+        payload="three int16 a vertex; metres = int16 x `scale` + `offset` of `subscribed`",
+    ),
+    Stream(
+        "audio", ("binary",), ("character", "rate"),
+        kind=4, dtype="<i2", flushes=True,
+        payload="20 ms of mono int16 PCM, at most 100 ms ahead; none in silence",
+    ),
+    Stream(
+        "video", ("binary",),
+        ("fps", "character", "size", "camera", "light", "background", "format", "view", "quality"),
+        kind=3, payload="a JPEG, PNG or WebP file",
+    ),
+    Stream("schedule", ("json",), ("character",)),
+)  # fmt: skip
+STREAMS: Mapping[str, Stream] = {row.name: row for row in _ROWS}
+# First byte of a binary message -> its stream.
+KINDS: Mapping[int, Stream] = {row.kind: row for row in sorted(_ROWS, key=lambda r: r.kind or 0) if row.kind}
