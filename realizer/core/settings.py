@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from realizer.core.errors import RealizerError
+from realizer.core.options import PlayOptions
 
 T = TypeVar("T")
 PREFIX = "REALIZER_"
@@ -344,6 +345,15 @@ class Settings:
             raise SettingsError(
                 f"setting {open_doors[0]}: wanted none, or host 127.0.0.1: its clients cannot bring the token"
             )
+
+    def play_options(self, scene: Mapping[str, tuple[float, float, float]] | None = None) -> PlayOptions:
+        """Return how documents are played.
+
+        Args:
+            scene: what is in the file `scene`.
+        """
+        names = (f.name for f in fields(PlayOptions) if f.name != "scene")
+        return PlayOptions(**{name: getattr(self, name) for name in names}, scene=scene)
 
     @classmethod
     def read(

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings, SettingsError
 
 
@@ -202,3 +203,11 @@ def test_pages_elsewhere_are_named_in_one_word_or_several() -> None:
     settings = Settings.read(environment={"REALIZER_ORIGINS": "https://a.example, http://b.example:8000"})
     assert settings.origins == ("https://a.example", "http://b.example:8000")
     assert Settings(origins=["*"]).origins == ("*",)  # type: ignore[arg-type]
+
+
+def test_play_options_have_the_defaults_and_the_values_of_the_settings() -> None:
+    assert Settings().play_options() == PlayOptions()
+    cup = {"cup": (0.0, 0.0, 1.0)}
+    settings = Settings(fps=50, idle=False, cooccurrence="off", prosody=False, seed=3)
+    expected = PlayOptions(fps=50, idle=False, cooccurrence="off", prosody=False, seed=3, scene=cup)
+    assert settings.play_options(cup) == expected

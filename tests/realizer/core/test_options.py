@@ -1,0 +1,15 @@
+"""Options of playing documents."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from realizer.core.options import PlayOptions
+
+
+@pytest.mark.parametrize("fps", [0.0, -1.0, math.nan, math.inf])
+def test_play_options_refuse_a_rate_that_is_not_above_0(fps: float) -> None:
+    with pytest.raises(ValueError, match="fps: wanted a number above 0"):
+        PlayOptions(fps=fps)
