@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ from click.testing import CliRunner
 from realizer.cli import cli
 from realizer.core.settings import Settings
 from realizer.server.journal import JournalError, playback
-from realizer.server.journal.entry import Entry
 from realizer.server.journal.journal_writer import Notes
 from realizer.server.journal.playback import played
 from realizer.server.journal.recordings import FolderJournal, head, read_record
@@ -123,24 +121,6 @@ def test_a_line_that_is_no_entry_is_told_of_with_its_number(tmp_path: Path) -> N
     path.write_text("\n".join([*lines[:3], "?", *lines[3:], ""]))
     with pytest.raises(JournalError, match=r"jsonl:4: wanted an entry"):
         read_record(path)
-
-
-def test_a_record_on_a_full_disk_has_whole_lines_and_nothing_that_was_refused(tmp_path: Path) -> None:
-    journal = FolderJournal(tmp_path, {})
-    journal.begin("s", 0.0)
-    first, refused, last = (Entry(at, "text", 1, "x" * 100) for at in (1.0, 2.0, 3.0))
-    journal.add("s", first)
-    (path,) = tmp_path.iterdir()
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 50, hard))  # room for half a line
-    try:
-        with pytest.raises(JournalError, match="the record"):
-            journal.add("s", refused)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    journal.add("s", last)
-    journal.close()
-    assert read_record(path).entries == (first, last)
 
 
 def test_the_command_prints_the_feedback_and_writes_any_output(tmp_path: Path) -> None:

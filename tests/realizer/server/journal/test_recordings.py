@@ -19,7 +19,7 @@ HEAD = {"settings": {"fps": 25.0}, "scene": None}
 HOLDS = """
 import sys
 from pathlib import Path
-from realizer.server.journal.folder import FolderJournal
+from realizer.server.journal.recordings import FolderJournal
 record = FolderJournal(Path(sys.argv[1]), {"settings": {"fps": 25.0}, "scene": None})
 record.begin("s", 1e9)
 print("holds", flush=True)
@@ -111,6 +111,24 @@ def test_one_that_another_process_still_writes_is_not_touched(tmp_path: Path) ->
         other.kill()
     assert read_record(first).entries == ()
     assert read_record(second).entries == (*ENTRIES, Entry(9.0, "tick"))
+
+
+def test_a_record_on_a_full_disk_has_whole_lines_and_nothing_that_was_refused(tmp_path: Path) -> None:
+    journal = FolderJournal(tmp_path, {})
+    journal.begin("s", 0.0)
+    first, refused, last = (Entry(at, "text", 1, "x" * 100) for at in (1.0, 2.0, 3.0))
+    journal.add("s", first)
+    (path,) = tmp_path.iterdir()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 50, hard))  # room for half a line
+    try:
+        with pytest.raises(JournalError, match="the record"):
+            journal.add("s", refused)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    journal.add("s", last)
+    journal.close()
+    assert read_record(path).entries == (first, last)
 
 
 def test_a_record_that_cannot_begin_leaves_no_file(tmp_path: Path) -> None:
