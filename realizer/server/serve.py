@@ -42,8 +42,8 @@ async def serve(settings: Settings | None = None) -> None:
         with _told(settings):
             workers = await Workers(settings).start()
         asked = _asked(signal.SIGINT, signal.SIGTERM)
-        print(*lines(settings, workers.port), sep="\n", flush=True)
         try:
+            print(*lines(settings, workers.port), sep="\n", flush=True)
             await asked
         finally:
             await workers.close()

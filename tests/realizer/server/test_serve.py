@@ -23,6 +23,7 @@ from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.wire import unpack
 from realizer.server.serve import Server, serve, work
 from realizer.server.session.session import Session
+from tests.programs import SERVE, running
 
 DOCUMENT = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
   <speech id="s"><text>One <sync id="m"/>two</text></speech>
@@ -223,17 +224,6 @@ def test_an_address_in_use_is_an_os_error() -> None:
     serving(test)
 
 
-def command(*arguments: str, **variables: str) -> subprocess.Popen[str]:
-    """`realizer serve` in a process of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *arguments],
-        env={**os.environ, **variables},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_host_that_is_no_machine_is_named(workers: int) -> None:
     settings = Settings(host="nowhere.invalid", port=0, workers=workers)
@@ -246,7 +236,9 @@ def test_each_open_door_prints_a_line_and_one_that_waits_for_somebody_stops_none
         nobody.bind(("127.0.0.1", 0))  # bound, but nobody listens
         there = f"127.0.0.1:{nobody.getsockname()[1]}"
         ours = ("--asap-ports", "0", "7501", "--xface-port", "0")
-        with command(*ours, "--stomp", there, "--xface-player", there) as serving:
+        with running(
+            [*SERVE, *ours, "--stomp", there, "--xface-player", there], stderr=subprocess.PIPE
+        ) as serving:
             assert serving.stdout is not None
             assert serving.stderr is not None
             lines = [serving.stdout.readline() for _ in range(4)]
@@ -262,7 +254,8 @@ def test_each_open_door_prints_a_line_and_one_that_waits_for_somebody_stops_none
 
 def test_a_door_that_needs_something_names_it_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "stomp.py").write_text("raise ImportError")
-    with command("--stomp", "127.0.0.1:61613", PYTHONPATH=str(tmp_path)) as serving:
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    with running([*SERVE, "--stomp", "127.0.0.1:61613"], stderr=subprocess.PIPE, env=environment) as serving:
         out, error = serving.communicate(timeout=LIMIT)
     assert (serving.returncode, out) == (3, "")
     assert error == "realizer: --stomp needs stomp.py: pip install 'bml-realizer[stomp]'\n"
@@ -379,3 +372,29 @@ def test_first_arkit_subscription_loads_nothing() -> None:
         [sys.executable, "-c", FIRST_ARKIT], capture_output=True, text=True, check=True, timeout=LIMIT
     )
     assert json.loads(done.stdout) == [[], 0]
+
+
+def test_workers_end_where_their_address_cannot_be_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[Settings] = []
+
+    class Workers:
+        port = 0
+
+        def __init__(self, settings: Settings) -> None:
+            self._settings = settings
+
+        async def start(self) -> Workers:
+            return self
+
+        async def close(self) -> None:
+            closed.append(self._settings)
+
+    def gone(*_: object, **__: object) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr("realizer.server.serve.Workers", Workers)
+    monkeypatch.setattr("builtins.print", gone)
+    settings = Settings(workers=2, port=0)
+    with pytest.raises(BrokenPipeError):
+        asyncio.run(serve(settings))
+    assert closed == [settings]

@@ -8,10 +8,6 @@ import json
 import re
 import resource
 import sqlite3
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +22,7 @@ from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.journal.playback import told
 from realizer.server.journal.recordings import read_record
 from realizer.server.serve import Server
+from tests.programs import serving
 from tests.told import feedback, numbers
 
 LIMIT = 60  # s; a hung test ends
@@ -101,18 +98,6 @@ def test_a_replay_shows_each_frame_as_a_viewer_of_the_live_session_got_it(tmp_pa
     assert len(again) - max(live) > 2, "what is let go of fades, though nobody looks any more"
     held = np.array(list(live.values()))
     assert len({tuple(row) for row in held[:, 2:].tolist()}) > 60
-
-
-@contextmanager
-def serving(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """A service of its own, and its address."""
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:
-        assert service.stdout is not None
-        try:
-            yield service.stdout.readline().split()[2], service
-        finally:
-            service.kill()
 
 
 async def until(url: str, last: str, *messages: str) -> list[str]:

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from realizer.cli import cli
 from realizer.server.journal import Entry, JournalError, Kept
 from realizer.server.journal.recordings import FolderJournal, read_record
+from tests.programs import running
 
 ENTRIES = [Entry(0.1 * k, "text", 1, f"message {k}") for k in range(6)]
 HEAD = {"settings": {"fps": 25.0}, "scene": None}
@@ -104,11 +105,10 @@ def test_one_of_other_settings_or_that_is_none_stays_and_another_begins(tmp_path
 
 def test_one_that_another_process_still_writes_is_not_touched(tmp_path: Path) -> None:
     command = [sys.executable, "-c", HOLDS, str(tmp_path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+    with running(command, stdin=subprocess.PIPE) as other:
         assert other.stdout is not None
-        assert other.stdout.readline() == b"holds\n"
+        assert other.stdout.readline() == "holds\n"
         first, second = gone_on(tmp_path, Kept(1e9, ENTRIES))
-        other.kill()
     assert read_record(first).entries == ()
     assert read_record(second).entries == (*ENTRIES, Entry(9.0, "tick"))
 

@@ -8,9 +8,8 @@ import errno
 import json
 import sqlite3
 import subprocess
-import sys
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -26,6 +25,7 @@ from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
 from realizer.server.transports.websocket import writer
+from tests.programs import serving
 from tests.realizer.server.conftest import Clock
 from tests.told import feedback, numbers
 
@@ -36,18 +36,6 @@ FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
 POINTS = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")
 SCENE = json.dumps({"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}})
-
-
-@contextmanager
-def serving(where: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """A service of its own with that journal, and its address."""
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
-    with subprocess.Popen([*command, "--journal", where], stdout=subprocess.PIPE, text=True) as service:
-        assert service.stdout is not None
-        try:
-            yield service.stdout.readline().split()[2], service
-        finally:
-            service.kill()
 
 
 def points(told: list[str]) -> list[str]:
@@ -80,10 +68,10 @@ def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(w
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=killed&seen={seen}") as client:
             return await feedback(client, "b:end")
 
-    with serving(where) as (url, service):
+    with serving("--journal", where) as (url, service):
         first = asyncio.run(before(url, service))
     seen = numbers(first)[-1]
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         rest = asyncio.run(after(url, seen))
     seqs = numbers(first + rest)
     assert seqs == list(range(1, len(seqs) + 1))
@@ -98,7 +86,7 @@ def test_a_client_that_resumes_after_a_kill_has_all_feedback_once_and_in_order(w
             await client.send(NEXT)
             return await feedback(client, "b:end")
 
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         undisturbed = asyncio.run(whole(url))
     # Which is told first of two that have nothing to do with each other depends on when messages came.
     assert sorted(points(first + rest)) == sorted(points(undisturbed))
@@ -143,9 +131,9 @@ def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outli
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=long&seen=0") as client:
             return rest, await feedback(client, "b:end"), state["characters"][0]["aus"]
 
-    with serving(where) as (url, service):
+    with serving("--journal", where) as (url, service):
         first = asyncio.run(before(url, service))
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         rest, again, held = asyncio.run(after(url, numbers(first)[-1]))
     assert numbers(first + rest) == list(range(1, len(first + rest) + 1))
     assert again == first + rest
@@ -206,10 +194,10 @@ def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_
         async with asyncio.timeout(LIMIT):
             await asyncio.gather(*map(one, told))
 
-    with serving(where) as (url, service):
+    with serving("--journal", where) as (url, service):
         asyncio.run(before(url, service))
     assert any("b:end" not in text for texts in told.values() for text in texts[-1:])
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         asyncio.run(after(url))
     for texts in told.values():
         seqs = numbers(texts)
@@ -233,10 +221,10 @@ def test_what_is_held_is_held_afterwards(where: str) -> None:
                     return aus
         raise AssertionError("no state")
 
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         asyncio.run(hold(url))
     for _again in range(2):  # the one that went on with it is killed too
-        with serving(where) as (url, _):
+        with serving("--journal", where) as (url, _):
             assert asyncio.run(state(url))["12L"] == 0.5
 
 
@@ -257,7 +245,7 @@ def test_a_session_belongs_to_whoever_took_it_last(where: str) -> None:
         assert closed.value.rcvd.code == 1012
         assert "torn" in closed.value.rcvd.reason
 
-    with serving(where) as (one, _), serving(where) as (other, _):
+    with serving("--journal", where) as (one, _), serving("--journal", where) as (other, _):
         asyncio.run(test(one, other))
 
 
@@ -443,7 +431,7 @@ def test_a_hello_does_not_begin_a_session_anew_that_is_in_the_journal(where: str
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=kept&seen=0") as client:
             return await feedback(client, "b:end")
 
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         told = asyncio.run(play(url))
-    with serving(where) as (url, _):
+    with serving("--journal", where) as (url, _):
         assert asyncio.run(resume(url)) == told

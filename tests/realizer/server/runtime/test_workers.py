@@ -18,10 +18,12 @@ from typing import TypeVar
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 
 from realizer.core.settings import Settings
 from realizer.server.runtime import worker_aggregation
 from realizer.server.runtime.workers import Workers, worker_of
+from tests.programs import SERVE, running
 
 T = TypeVar("T")
 LIMIT = 60  # s; a hung test ends
@@ -135,6 +137,7 @@ def test_one_scrape_tells_the_sum_of_all_workers(workers: Workers) -> None:
                 await client.send(NOD.format(f"m{number}"))
             for number, client in enumerate(clients):
                 await told(client, f'"m{number}:start"')
+            await until(workers, connections=3)
             each = [await asyncio.to_thread(metrics, workers, f"?worker={number}") for number in (0, 1)]
             whole = await asyncio.to_thread(metrics, workers)
         for name in ("realizer_sessions", "realizer_connections", "realizer_messages_total"):
@@ -162,8 +165,21 @@ def test_a_worker_that_there_is_not_is_not_found(workers: Workers, path: str, na
 
 
 def health(workers: Workers, query: str = "") -> dict[str, object]:
-    with urllib.request.urlopen(f"http://127.0.0.1:{workers.port}/healthz{query}", timeout=LIMIT) as answer:
-        told: dict[str, object] = json.loads(answer.read())
+    try:
+        with urllib.request.urlopen(
+            f"http://127.0.0.1:{workers.port}/healthz{query}", timeout=LIMIT
+        ) as answer:
+            told: dict[str, object] = json.loads(answer.read())
+    except urllib.error.HTTPError as none:  # none of them has answered in time
+        with none:
+            return {}
+    return told
+
+
+async def until(workers: Workers, **wanted: object) -> dict[str, object]:
+    """Wait until the health of all workers is as wanted; a busy machine keeps them waiting."""
+    while not wanted.items() <= (told := await asyncio.to_thread(health, workers)).items():
+        pass
     return told
 
 
@@ -175,18 +191,16 @@ def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Wor
         async with contextlib.AsyncExitStack() as stack:
             for name in names:
                 await stack.enter_async_context(connect(f"{url}?session={name}"))
+            whole = await until(workers, status="ok", connections=2)
+            assert whole["workers"] == 2
             each = [await asyncio.to_thread(health, workers, f"?worker={k}") for k in (0, 1)]
-            assert all(one["connections"] for one in each)
-            whole = await asyncio.to_thread(health, workers)
-            assert (whole["status"], whole["workers"]) == ("ok", 2)
-            assert whole["connections"] == sum(int(str(one["connections"])) for one in each)
+            assert [one["connections"] for one in each] == [1, 1]
             os.kill(workers.processes[1], signal.SIGSTOP)
             try:
-                left = await asyncio.to_thread(health, workers)
+                left = await until(workers, silent=[1])
             finally:
                 os.kill(workers.processes[1], signal.SIGCONT)
-            assert (left["status"], left["silent"]) == ("partly", [1])
-            assert left["connections"] == each[0]["connections"]
+            assert (left["status"], left["connections"]) == ("partly", 1)
 
     played(test())
 
@@ -194,14 +208,16 @@ def test_health_is_that_of_all_workers_also_while_one_of_them_hangs(workers: Wor
 def test_one_worker_that_hangs_is_left_out_of_the_sum(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker_aggregation, "PATIENCE", 2.0)
+    monkeypatch.setattr(worker_aggregation, "PATIENCE", 0.5)
     os.kill(workers.processes[1], signal.SIGSTOP)
     try:
-        whole = metrics(workers)
+        whole: dict[str, float] = {}
+        while 'realizer_worker_sessions{worker="0"}' not in whole:  # a busy machine may keep it waiting too
+            with contextlib.suppress(urllib.error.HTTPError):
+                whole = metrics(workers)
+            assert 'realizer_worker_sessions{worker="1"}' not in whole
     finally:
         os.kill(workers.processes[1], signal.SIGCONT)
-    assert 'realizer_worker_sessions{worker="0"}' in whole
-    assert 'realizer_worker_sessions{worker="1"}' not in whole
 
 
 def test_the_sum_is_for_those_who_have_the_token() -> None:
@@ -231,13 +247,15 @@ def test_a_worker_that_was_killed_is_started_again_while_the_other_plays_on(work
             async with connect(f"{url}?session={one_of(1)}") as client:
                 await client.send(NOD.format("b"))
                 await told(client, '"b:start"')
-                os.kill(workers.processes[1], signal.SIGKILL)
-                with contextlib.suppress(Exception):
-                    async for _ in client:
-                        pass
+                killed = workers.processes[1]
+                os.kill(killed, signal.SIGKILL)
+                with contextlib.suppress(ConnectionClosed):
+                    await told(client, '"b:end"')
+            while workers.processes[1] == killed:
+                await asyncio.sleep(0)
             await stays.send(NOD.format("c"))
             await told(stays, '"c:end"')
-            async with connect(f"{url}?session={one_of(1)}") as client:
+            async with connect(f"{url}?session={one_of(1)}", open_timeout=LIMIT) as client:
                 await client.send(NOD.format("d"))
                 await told(client, '"d:end"')
 
@@ -269,19 +287,7 @@ def test_sessions_of_other_doors_are_where_these_doors_are() -> None:
 
 
 def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "realizer",
-        "serve",
-        "--port",
-        "0",
-        "--voice",
-        "silent",
-        "--workers",
-        "2",
-    ]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as service:
+    with running([*SERVE, "--workers", "2"]) as service:
         assert service.stdout is not None
         url = service.stdout.readline().split()[2]
         page = service.stdout.readline().split()[2]
@@ -320,7 +326,7 @@ def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
 def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> None:
     command = [sys.executable, "-m", "realizer", "-v", "serve", "--port", "0", "--voice", "silent"]
     command += ["--workers", "2", "--token", "a-token-nobody-knows"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as service:
+    with running(command, stderr=subprocess.PIPE) as service:
         assert service.stdout is not None
         page = service.stdout.readline() and service.stdout.readline().split()[2]
         with pytest.raises(urllib.error.HTTPError) as refused:
@@ -333,8 +339,7 @@ def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> N
 
 def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
-        command += ["--workers", "2", "--xface-port", str(taken.getsockname()[1])]
+        command = [*SERVE, "--workers", "2", "--xface-port", str(taken.getsockname()[1])]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
     assert done.returncode == 3
     (line,) = done.stderr.splitlines()

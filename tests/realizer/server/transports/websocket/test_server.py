@@ -9,7 +9,6 @@ import signal
 import socket as sockets
 import struct
 import subprocess
-import sys
 import urllib.request
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
@@ -27,6 +26,7 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
 from tests.benchmarks.packets import masked
+from tests.programs import SERVE, running
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.3"/></bml>'
 LIMIT = 60  # s; a hung test ends
@@ -302,8 +302,7 @@ def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
 
 
 def test_one_who_asks_and_resets_the_connection_leaves_no_traceback() -> None:
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as service:
+    with running(SERVE, stderr=subprocess.PIPE) as service:
         assert service.stdout is not None
         port = urlsplit(service.stdout.readline().split()[2]).port
         for _ in range(20):
