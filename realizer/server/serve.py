@@ -40,7 +40,7 @@ async def serve(settings: Settings | None = None) -> None:
         write_json()
     if settings.workers > 1:
         with _told(settings):
-            workers = await Workers(settings).start()
+            workers = await Workers(settings, run_worker).start()
         asked = _asked(signal.SIGINT, signal.SIGTERM)
         try:
             print(*lines(settings, workers.port), sep="\n", flush=True)
@@ -91,6 +91,11 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
     loop.add_reader(control, take)
     await loop.sock_sendall(control, READY)
     await _serve(server, ending)
+
+
+def run_worker(settings: Settings, number: int, control: socket.socket) -> None:
+    """Run `work` in an event loop of its own."""
+    run(work(settings, number, control))
 
 
 async def _serve(server: Server, asked: Awaitable[None]) -> None:

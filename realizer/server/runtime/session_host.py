@@ -16,10 +16,9 @@ from realizer.server.journal.replay import caught_up
 from realizer.server.runtime.engines import Studio
 from realizer.server.runtime.gc_policy import Cycles
 from realizer.server.runtime.session_factory import Origin
-from realizer.server.runtime.session_registry import ANYBODY, Hub, Visitor
+from realizer.server.runtime.session_registry import ANYBODY, Hub, Visitor, worker_of
 from realizer.server.runtime.takeovers import taken_over
 from realizer.server.runtime.timer_wheel import Alarms
-from realizer.server.runtime.workers import worker_of
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import secrets
+import zlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +17,17 @@ from realizer.server.session.effects import Close, Effect, Move, Send
 from realizer.server.session.session import Session
 
 SESSION_ID = re.compile(r"[A-Za-z0-9._~-]{1,64}")
+
+
+# Sessions that other doors than the WebSocket make; these doors are open in the first worker.
+OF_DOORS = re.compile("(asap|xface|stomp)-")
+
+
+def worker_of(session: str, workers: int, settings: Settings) -> int:
+    """Return the number of the worker that has the session of that name."""
+    if workers == 1 or OF_DOORS.match(session) or session == settings.xface_player_session:
+        return 0
+    return zlib.crc32(session.encode()) % workers
 
 
 class HubError(RealizerError):

@@ -11,11 +11,9 @@ import contextlib
 import itertools
 import logging
 import multiprocessing
-import re
 import signal
 import socket
-import zlib
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from urllib.parse import parse_qs
@@ -23,6 +21,7 @@ from urllib.parse import parse_qs
 from realizer.core.errors import RealizerError
 from realizer.core.logs import write_words
 from realizer.core.settings import Settings
+from realizer.server.runtime.session_registry import worker_of
 from realizer.server.runtime.worker_aggregation import gathered, is_for_all
 
 log = logging.getLogger(__name__)
@@ -35,29 +34,28 @@ GRACE = 5.0  # s
 STEP = 0.005  # s
 # What a worker says when its doors are open; and, before the words, when they cannot be.
 READY, FAULT = b"r", b"!"
-# Sessions that other doors than the WebSocket make; these doors are open in the first worker.
-OF_DOORS = re.compile("(asap|xface|stomp)-")
+
+
+Serve = Callable[[Settings, int, socket.socket], None]
 
 
 class WorkerError(RealizerError):
     """A worker that cannot be started, and why."""
 
 
-def worker_of(session: str, workers: int, settings: Settings) -> int:
-    """Which of the workers has the session of that name."""
-    if workers == 1 or OF_DOORS.match(session) or session == settings.xface_player_session:
-        return 0
-    return zlib.crc32(session.encode()) % workers
-
-
 class Workers:
     """The parent of `settings.workers` processes: `start`, then `close`.
+
+    Args:
+        serve: (settings, number, control) -> serves in a worker's own process the connections that come
+            through `control`; a function of a module, which that process imports.
 
     Attributes:
         port: the one that is open after `start`.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, serve: Serve) -> None:
+        self._serve = serve
         self._settings = settings
         self.port = settings.port
         self._listening: asyncio.Server | None = None
@@ -140,7 +138,7 @@ class Workers:
         ours, theirs = socket.socketpair()
         child = multiprocessing.get_context("spawn").Process(
             target=_work,
-            args=(self._settings, number, self.port, theirs, logging.getLogger().level),
+            args=(self._serve, self._settings, number, self.port, theirs, logging.getLogger().level),
             name=f"worker-{number}",
         )
         child.start()
@@ -249,13 +247,13 @@ def handed(control: socket.socket) -> list[socket.socket]:
     return sockets
 
 
-def _work(settings: Settings, number: int, port: int, control: socket.socket, level: int) -> None:
-    """A worker, in its own process; it says as much as its parent."""
-    from realizer.server.serve import run, work
-
+def _work(
+    serve: Serve, settings: Settings, number: int, port: int, control: socket.socket, level: int
+) -> None:
+    """Run a worker in its own process, with the log level of its parent."""
     write_words(level, f"worker {number}: ")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends us, also from a terminal
     if number:  # doors that have a port or a broker of their own are open once
         settings = replace(settings, asap_ports=None, xface_port=None, xface_player=None, stomp=None)
     control.setblocking(False)
-    run(work(replace(settings, port=port), number, control))
+    serve(replace(settings, port=port), number, control)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from realizer.core.settings import Settings
 from realizer.server.documents import limits
-from realizer.server.runtime.session_registry import Hub, HubError, Visitor
+from realizer.server.runtime.session_registry import Hub, HubError, Visitor, worker_of
 from realizer.server.session.effects import Close
 from realizer.server.session.session import Session
 
@@ -289,3 +289,9 @@ def test_whatever_they_do_nobody_has_more_than_their_share(
     assert not hub.sessions
     assert not hub._openers
     assert not hub._opened
+
+
+def test_sessions_of_other_doors_are_where_these_doors_are() -> None:
+    for name in ("asap-127.0.0.1", "xface-127.0.0.1", "stomp-json", "xface-player"):
+        assert worker_of(name, 7, Settings()) == 0
+    assert {worker_of(f"session-{k}", 7, Settings()) for k in range(100)} == set(range(7))

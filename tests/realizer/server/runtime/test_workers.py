@@ -22,7 +22,9 @@ from websockets.exceptions import ConnectionClosed
 
 from realizer.core.settings import Settings
 from realizer.server.runtime import worker_aggregation
-from realizer.server.runtime.workers import Workers, worker_of
+from realizer.server.runtime.session_registry import worker_of
+from realizer.server.runtime.workers import Workers
+from realizer.server.serve import run_worker
 from tests.programs import SERVE, running
 
 T = TypeVar("T")
@@ -40,7 +42,7 @@ def workers() -> Iterator[Workers]:
     def wait(coroutine: Coroutine[None, None, T]) -> T:
         return asyncio.run_coroutine_threadsafe(coroutine, loop).result(LIMIT)
 
-    there = wait(Workers(Settings(port=0, voice="silent", workers=2)).start())
+    there = wait(Workers(Settings(port=0, voice="silent", workers=2), run_worker).start())
     yield there
     wait(there.close())
     loop.call_soon_threadsafe(loop.stop)
@@ -222,7 +224,9 @@ def test_one_worker_that_hangs_is_left_out_of_the_sum(
 
 def test_the_sum_is_for_those_who_have_the_token() -> None:
     async def test() -> None:
-        there = await Workers(Settings(port=0, voice="silent", workers=2, token="Xk-secret-7")).start()
+        there = await Workers(
+            Settings(port=0, voice="silent", workers=2, token="Xk-secret-7"), run_worker
+        ).start()
         try:
             with pytest.raises(urllib.error.HTTPError, match="401") as refused:
                 await asyncio.to_thread(metrics, there)
@@ -280,12 +284,6 @@ def test_a_client_that_says_nothing_or_half_a_line_keeps_nobody_waiting(workers:
     played(test())
 
 
-def test_sessions_of_other_doors_are_where_these_doors_are() -> None:
-    for name in ("asap-127.0.0.1", "xface-127.0.0.1", "stomp-json", "xface-player"):
-        assert worker_of(name, 7, Settings()) == 0
-    assert {worker_of(f"session-{k}", 7, Settings()) for k in range(100)} == set(range(7))
-
-
 def test_the_command_serves_with_workers_and_ends_with_what_plays() -> None:
     with running([*SERVE, "--workers", "2"]) as service:
         assert service.stdout is not None
@@ -311,7 +309,7 @@ def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
     monkeypatch.setattr("realizer.server.runtime.workers.GRACE", 0.2)
 
     async def test() -> None:
-        service = await Workers(Settings(port=0, voice="silent", workers=2, drain=0.0)).start()
+        service = await Workers(Settings(port=0, voice="silent", workers=2, drain=0.0), run_worker).start()
         children = service.processes
         os.kill(children[1], signal.SIGSTOP)
         await service.close()
@@ -348,4 +346,4 @@ def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback
 
 def test_an_address_that_is_taken_is_said_before_a_worker_starts() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
-        asyncio.run(Workers(Settings(port=taken.getsockname()[1], workers=2)).start())
+        asyncio.run(Workers(Settings(port=taken.getsockname()[1], workers=2), run_worker).start())
