@@ -26,7 +26,6 @@ from unittest.mock import patch
 from realizer.core.settings import Settings
 from realizer.server.journal import Entry, Journal, Kept, Log, journal_at
 from realizer.server.journal import journal_writer as thresholds
-from realizer.server.journal.checkpoint import checkpoint
 from realizer.server.journal.journal_writer import Notes
 from realizer.server.journal.recordings import FolderJournal
 from realizer.server.journal.replay import restored
@@ -68,17 +67,20 @@ def _timed(spent: list[float]) -> Iterator[None]:
     spent.append(time.perf_counter() - began)
 
 
-class Checkpoints:
-    """How long each took, from looking at the session to its end on the disk."""
+@contextmanager
+def timed_checkpoints() -> Iterator[list[float]]:
+    """Collect the seconds of each checkpoint, from looking at the session to its end on the disk."""
+    seconds: list[float] = []
+    compact = Session._compact
 
-    def __init__(self) -> None:
-        self.seconds: list[float] = []
-
-    def __call__(self, session: Session, t: float) -> bool:
+    def timed(session: Session, t: float) -> bool:
         began = time.perf_counter()
-        if done := checkpoint(session, t):
-            self.seconds.append(time.perf_counter() - began)
+        if done := compact(session, t):
+            seconds.append(time.perf_counter() - began)
         return done
+
+    with patch.object(Session, compact.__name__, timed):
+        yield seconds
 
 
 def spoken(order: Speak) -> Utterance:
@@ -121,8 +123,7 @@ def size(kept: Kept) -> int:
 
 def report(name: str, where: str, documents: int, apart: float, bare: float) -> None:
     journal = Watched(journal_at(where))
-    checkpoints = Checkpoints()
-    with patch("realizer.server.session.session.checkpoint", checkpoints):
+    with timed_checkpoints() as taken:
         cost = played(documents, apart, journal)
     began = time.process_time()
     kept = journal.take("long")
@@ -132,7 +133,7 @@ def report(name: str, where: str, documents: int, apart: float, bare: float) -> 
     took = time.process_time() - began
     entries = len(journal.adds) / documents
     compacts = ""
-    if taken := checkpoints.seconds:
+    if taken:
         compacts = f"; {len(taken)} checkpoints, {1000 * statistics.median(taken):.1f} ms each (median),"
         compacts += f" {1000 * max(taken):.1f} at most"
     print(
