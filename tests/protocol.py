@@ -1,7 +1,6 @@
-"""The models of the messages in; realizer/server/asyncapi.json and the tables of docs/protocol.md out.
+"""The generated descriptions of the protocol: asyncapi.json, docs/protocol.md and constants of realizer.js.
 
-`python -m tests.protocol` writes both. All of it is read from the models, the streams and the kinds of binary
-messages, so that nothing is described twice.
+`python -m tests.protocol` writes them, from the models of messages and the table of streams.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 import realizer
-from realizer.protocol.messages.common import PROTOCOL
+from realizer.protocol.messages.common import ANSWERS, PROTOCOL
 from realizer.protocol.messages.parse import SUPPORTED, Control
 from realizer.protocol.messages.replies import (
     Changed,
@@ -34,13 +33,14 @@ from realizer.protocol.messages.replies import (
 from realizer.protocol.messages.requests import Subscribe
 from realizer.protocol.streams import KINDS, STREAMS
 from realizer.protocol.wire import FINAL, FORGET, VERSION
-
-__all__ = ["BEGIN", "END", "FILE", "PAGE", "asyncapi", "render", "tables", "within"]
+from realizer.protocol.wire import HEADER as BYTES
 
 FILE = Path(realizer.__path__[0]) / "server" / "asyncapi.json"
 PAGE = Path(__file__).parent.parent / "docs" / "protocol.md"
 BEGIN = "<!-- protocol: written by python -m tests.protocol -->"
 END = "<!-- end of protocol -->"
+SCRIPT = FILE.parent / "web" / "src" / "realizer.js"
+SCRIPT_MARKS = ("// protocol: written by python -m tests.protocol", "// end of protocol")
 
 REQUESTS: dict[str, type[BaseModel]] = {
     model.model_fields["type"].annotation.__args__[0]: model  # type: ignore[union-attr]
@@ -57,7 +57,8 @@ REPLIES: dict[str, type[BaseModel]] = {
     "frame": FrameMessage,
     "schedule": ScheduleMessage,
 }
-ANSWERS = {"hello": ["welcome", "gap"], "subscribe": ["subscribed"], "state": ["state"], "ping": ["pong"]}
+# A client that has missed feedback gets a gap before the answer.
+BESIDE = {"hello": ["gap"]}
 BML = (
     "One or more BML documents, in any text that starts with `<`. A broken stretch is one warning, and "
     "reading goes on at the next `<bml>`."
@@ -145,7 +146,7 @@ def _operations() -> Iterator[tuple[str, dict[str, Any]]]:
     for name in ("bml", "clip", *REQUESTS):
         operation = {"action": "receive", "channel": channel, "messages": refs([name])}
         if name in ANSWERS:
-            answers = [_out(answer) for answer in (*ANSWERS[name], "error")]
+            answers = [_out(answer) for answer in (ANSWERS[name], *BESIDE.get(name, []), "error")]
             operation["reply"] = {"channel": channel, "messages": refs(answers)}
         yield f"receive-{name}", operation
     for name in (
@@ -231,24 +232,41 @@ def _cell(text: str) -> str:
     return re.sub(r"(?<!\\)\|", r"\\|", text)
 
 
-def within(text: str) -> str:
-    """A page with the tables between its markers.
+def constants() -> str:
+    """The part of realizer.js: the version, binary messages, answers of control messages."""
+    arrays = {"<i4": "Int32Array", "<f4": "Float32Array", "<i2": "Int16Array", None: "Uint8Array"}
+    kinds = [f'  {kind}: ["{row.name}", {arrays[row.dtype]}],' for kind, row in KINDS.items()]
+    answers = ", ".join(f'{question}: "{answer}"' for question, answer in ANSWERS.items())
+    return "\n".join(
+        [
+            "/** Version of the protocol; a service that speaks another one refuses `hello`. */",
+            f"export const VERSION = {PROTOCOL};",
+            f"const HEADER = {BYTES.size}; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time",
+            f"const FORGET = {FORGET:#x}; // flag: forget everything from this time on",
+            "const KINDS = {",
+            *kinds,
+            "};",
+            f"const ANSWERS = {{ {answers} }};",
+            "",
+        ]
+    )
+
+
+def within(text: str, part: str, begin: str = BEGIN, end: str = END) -> str:
+    """Return a text with *part* between its markers.
 
     Raises:
         ValueError: it has no markers.
     """
-    before, found, rest = text.partition(BEGIN)
-    _, ends, after = rest.partition(END)
+    before, found, rest = text.partition(begin)
+    _, ends, after = rest.partition(end)
     if not found or not ends:
-        raise ValueError(f"wanted the lines {BEGIN} and {END}")
-    return f"{before}{BEGIN}\n{tables()}{END}{after}"
+        raise ValueError(f"wanted the lines {begin} and {end}")
+    return f"{before}{begin}\n{part}{end}{after}"
 
 
 if __name__ == "__main__":
     FILE.write_text(render(), "utf-8")
-    print(f"{FILE}: written")
-    try:
-        PAGE.write_text(within(PAGE.read_text("utf-8")), "utf-8")
-        print(f"{PAGE}: written")
-    except ValueError as error:
-        print(f"{PAGE}: {error}")
+    PAGE.write_text(within(PAGE.read_text("utf-8"), tables()), "utf-8")
+    SCRIPT.write_text(within(SCRIPT.read_text("utf-8"), constants(), *SCRIPT_MARKS), "utf-8")
+    print(f"written: {FILE}, {PAGE}, {SCRIPT}")

@@ -11,19 +11,22 @@ import pytest
 from websockets.asyncio.client import connect
 
 from realizer.core.settings import Settings
+from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.messages.parse import SUPPORTED, parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.streams import KINDS, STREAMS
 from realizer.server.serve import Server
 from tests.protocol import (
-    ANSWERS,
     BEGIN,
     END,
     FILE,
     PAGE,
     REPLIES,
     REQUESTS,
+    SCRIPT,
+    SCRIPT_MARKS,
     asyncapi,
+    constants,
     render,
     tables,
     within,
@@ -64,14 +67,21 @@ def test_the_file_is_current() -> None:
 def test_the_tables_are_current() -> None:
     if not PAGE.is_file() or BEGIN not in (text := PAGE.read_text("utf-8")):
         pytest.skip("no docs/protocol.md with tables of the protocol beside the tests")
-    assert within(text) == text, "run: python -m tests.protocol"
+    assert within(text, tables()) == text, "run: python -m tests.protocol"
+
+
+def test_script_of_the_page_is_current() -> None:
+    if not SCRIPT.is_file():
+        pytest.skip("no sources of the page beside the tests")
+    text = SCRIPT.read_text("utf-8")
+    assert within(text, constants(), *SCRIPT_MARKS) == text, "run: python -m tests.protocol"
 
 
 def test_tables_go_between_their_markers_alone() -> None:
     text = f"before\n{BEGIN}\nold\n{END}\nafter\n"
-    assert within(text) == f"before\n{BEGIN}\n{tables()}{END}\nafter\n"
+    assert within(text, tables()) == f"before\n{BEGIN}\n{tables()}{END}\nafter\n"
     with pytest.raises(ValueError, match="wanted the lines"):
-        within("nothing")
+        within("nothing", tables())
 
 
 def test_everything_that_is_named_is_there_and_everything_there_is_named() -> None:
@@ -83,7 +93,7 @@ def test_everything_that_is_named_is_there_and_everything_there_is_named() -> No
         assert f"#/channels/ws/messages/{message}" in named
     assert set(SUPPORTED) == set(REQUESTS) == set(REQUESTS) & set(DOCUMENT["components"]["messages"])
     assert ANSWERS.keys() < REQUESTS.keys()
-    assert {answer for answers in ANSWERS.values() for answer in answers} < REPLIES.keys()
+    assert set(ANSWERS.values()) < REPLIES.keys()
 
 
 @pytest.mark.parametrize("name", sorted(DOCUMENT["components"]["schemas"]))

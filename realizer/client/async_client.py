@@ -11,8 +11,9 @@ from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
-from realizer.client.message_router import ANSWERS, ClientError, Frame, Mail, Until, blank
+from realizer.client.message_router import ClientError, Frame, Mail, Until, blank
 from realizer.client.speech import Speech
+from realizer.protocol.messages.common import ANSWERS
 
 
 class Client:

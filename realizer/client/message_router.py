@@ -11,13 +11,12 @@ from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.errors import RealizerError
+from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.wire import WireFrame, unpack
 
 # Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
 KEPT = 1_000
 KEPT_FEEDBACK = 10_000
-# Type of a control message -> type of its answer; the others have none.
-ANSWERS = {"hello": "welcome", "subscribe": "subscribed", "state": "state", "ping": "pong"}
 _COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 

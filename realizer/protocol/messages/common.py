@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
@@ -10,6 +11,14 @@ from realizer.protocol.streams import STREAMS
 
 # Version of the protocol that `hello` and `welcome` name.
 PROTOCOL = 1
+
+# Type of a control message -> type of its answer; the others have none.
+ANSWERS: Mapping[str, str] = {
+    "hello": "welcome",
+    "subscribe": "subscribed",
+    "state": "state",
+    "ping": "pong",
+}
 
 # Longest control message: a scene of a few thousand objects.
 MAX_CONTROL = 256 * 1024  # bytes

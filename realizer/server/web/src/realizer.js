@@ -21,20 +21,23 @@
  * What the messages are: asyncapi.json beside this file.
  */
 
-/** Version of the protocol that this file speaks; a service that speaks another one refuses `hello`. */
+// protocol: written by python -m tests.protocol
+/** Version of the protocol; a service that speaks another one refuses `hello`. */
 export const VERSION = 1;
-
-const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const HEADER = 16; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time
+const FORGET = 0x100; // flag: forget everything from this time on
 const KINDS = {
   1: ["fap", Int32Array],
   2: ["au", Float32Array],
-  3: ["video", Uint8Array], // the bytes of a JPEG, PNG or WebP file
+  3: ["video", Uint8Array],
   4: ["audio", Int16Array],
   5: ["mesh", Int16Array],
   6: ["arkit", Float32Array],
 };
 const ANSWERS = { hello: "welcome", subscribe: "subscribed", state: "state", ping: "pong" };
+// end of protocol
+
+const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
 const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
@@ -277,7 +280,7 @@ export function frameOf(buffer) {
     stream,
     kind,
     character: view.getUint16(2, true) & 0xff,
-    forget: Boolean(view.getUint16(2, true) & 0x100),
+    forget: Boolean(view.getUint16(2, true) & FORGET),
     frame: view.getUint32(4, true),
     time: view.getFloat64(8, true),
     values: () => new Values(buffer, HEADER),
