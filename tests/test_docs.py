@@ -66,3 +66,15 @@ def test_named_tests_exist(page: Path) -> None:
     # A name may be shortened: `test_a_flood_...` stands for all tests that begin so.
     missing = [test for test in TEST.findall(code(page)) if f"\n{test}" not in f"\n{known_tests()}"]
     assert not missing
+
+
+def test_architecture_names_every_folder() -> None:
+    page = ROOT / "docs" / "architecture.md"
+    if not page.is_file():
+        pytest.skip("no docs beside the tests")
+    named = set(PATH.findall(code(page)))
+    packages = [
+        path.parent for root in ("bml_schema", "realizer") for path in (ROOT / root).rglob("__init__.py")
+    ]
+    missing = {f"{name(package)}/" for package in packages} - named - {"realizer/"}
+    assert not missing
