@@ -19,7 +19,7 @@ from realizer.protocol.messages.requests import (
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
-from realizer.server.documents.submission import Intake
+from realizer.server.documents.document_queue import Intake
 from realizer.server.session.character_faces import Faces
 from realizer.server.session.control_fields import Wrong, feeling_of, held, index_of
 from realizer.server.session.subscriptions import Subscriptions

@@ -5,10 +5,11 @@ from __future__ import annotations
 import zlib
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
-from bml_schema import Feedback
+from bml_schema import Feedback, parse_feedback
 
 # What is kept in any case, and how many messages at most; of what is older only so many characters.
 FRESH = 60.0  # s
@@ -29,6 +30,25 @@ class _Pack(NamedTuple):
     characters: int
     told: float
     data: bytes
+
+
+@dataclass(frozen=True)
+class FeedbackFilter:
+    """Which feedback a connection gets; the numbers of what it does not get are missing in what it gets.
+
+    Attributes:
+        elements: names of feedback elements; None takes all.
+        character: of whom; None takes all. What is of no character comes always.
+    """
+
+    elements: frozenset[str] | None = None
+    character: str | None = None
+
+    def takes(self, text: str) -> bool:
+        """Whether a message is to be sent."""
+        if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
+            return False
+        return self.character is None or parse_feedback(text).character_id in (None, self.character)
 
 
 class FeedbackLog:

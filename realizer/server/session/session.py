@@ -26,9 +26,8 @@ from realizer.protocol.messages.replies import (
 )
 from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
 from realizer.protocol.wire import WireError, unpack_clip
-from realizer.server.documents.document_queue import name_of
+from realizer.server.documents.document_queue import Intake, name_of
 from realizer.server.documents.limits import too_long
-from realizer.server.documents.submission import Intake
 from realizer.server.journal import JournalError, Lost, checkpoint
 from realizer.server.journal.checkpoint import SessionState
 from realizer.server.journal.entry import Kind
@@ -37,7 +36,6 @@ from realizer.server.session.character_faces import Faces
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.effects import Close, Effect, Move, Send
 from realizer.server.session.feedback_log import FeedbackLog
-from realizer.server.session.feedback_publisher import Telling
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.wakeup_plan import Rhythm
 from realizer.server.session.welcome import greeting
@@ -116,7 +114,6 @@ class Session:
         self.intake = Intake(id, settings, self.player, self._owe)
         self._connections: dict[int, Connection] = {}
         self.log = log or FeedbackLog(epoch)
-        self._telling = Telling(self.player, self.intake, self.log)
         self._effects: list[Effect] = []
         self._rhythm = Rhythm(self.player, self.intake, self.broadcast, self._connections)
         self.subscriptions = Subscriptions(
@@ -513,8 +510,22 @@ class Session:
     # feedback -----------------------------------------------------------------------------------
 
     def _publish(self, t: float) -> None:
-        """Tell all that is due to everybody who has not switched it off."""
-        self._effects += self._telling.publish(t, self._connections.values())
+        """Number the feedback that is due, and send it to all connections that take it."""
+        texts: list[str] = []
+        while due := self.player.due(t + EPSILON):
+            for feedback in due:
+                told, ends = self.intake.speeches.told(feedback)
+                texts.append(self.log.add(told, t))
+                if ends:
+                    self.intake.end(ends, t)
+        if texts:
+            for connection in self._connections.values():
+                self._send_feedback(connection, texts)
+
+    def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
+        connection.place = self.log.newest + 1
+        if (wanted := connection.feedback) is not None:
+            self._effects += [Send(connection.id, text) for text in texts if wanted.takes(text)]
 
     def tell(self, feedback: str) -> None:
         """Send everybody who takes it feedback that has no number: nobody who comes back gets it again."""
@@ -530,7 +541,7 @@ class Session:
             seen = first - 1
         known = self._connections[connection]
         known.place = seen + 1
-        self._effects += self._telling.catch_up(known)
+        self._send_feedback(known, self.log.since(known.place))
 
     def welcome(self, connection: int, now: float) -> None:
         """Tell a client where it is and what there is."""

@@ -16,10 +16,10 @@ from realizer.server.documents.limits import MAX_CHARACTERS, too_many_pixels
 from realizer.server.session.character_faces import Faces
 from realizer.server.session.control_fields import Wrong, index_of
 from realizer.server.session.effects import Look
+from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import (
     Connection,
-    FeedbackFilter,
     FrameSubscription,
     PictureSubscription,
     PlanSubscription,

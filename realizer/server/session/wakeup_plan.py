@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from realizer.playback.player import Player
-from realizer.server.documents.submission import Intake
+from realizer.server.documents.document_queue import Intake
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import Connection
 from realizer.server.streams.frame_fast_path import Run

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from bml_schema import parse_feedback
 from realizer.server.session.effects import Look
+from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.audio_stream import Sound
 from realizer.server.streams.frame_windows import Timeline
 
@@ -81,25 +81,6 @@ class PlanSubscription:
 Subscription = FrameSubscription | SoundSubscription | PictureSubscription | PlanSubscription
 
 
-@dataclass(frozen=True)
-class FeedbackFilter:
-    """Which feedback a connection gets; the numbers of what it does not get are missing in what it gets.
-
-    Attributes:
-        elements: names of feedback elements; None takes all.
-        character: of whom; None takes all. What is of no character comes always.
-    """
-
-    elements: frozenset[str] | None = None
-    character: str | None = None
-
-    def takes(self, text: str) -> bool:
-        """Whether a message is to be sent."""
-        if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
-            return False
-        return self.character is None or parse_feedback(text).character_id in (None, self.character)
-
-
 @dataclass(eq=False)
 class Connection:
     """One client of a session.
@@ -114,7 +95,7 @@ class Connection:
 
     id: int
     place: int
-    feedback: FeedbackFilter | None = FeedbackFilter()
+    feedback: FeedbackFilter | None = field(default_factory=FeedbackFilter)
     backlog: int = 0
     dropped: int = 0
     subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)

@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.documents.submission import Intake
+from realizer.server.documents.document_queue import Intake
 from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server

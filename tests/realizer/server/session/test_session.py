@@ -800,6 +800,19 @@ def test_the_speech_of_one_who_leaves_ends_though_nothing_else_is_due() -> None:
     assert "turn:end" in viewer.ids
 
 
+def test_a_feedback_stream_that_is_asked_for_again_begins_with_what_follows(driver) -> None:
+    driver.send({"type": "unsubscribe", "stream": "feedback"})
+    driver.send(NOD.format("a"))
+    client = driver.run(10)
+    assert not client.feedback
+    told = driver.session.log.newest
+    driver.send({"type": "subscribe", "stream": "feedback"})
+    assert not client.feedback
+    driver.send(NOD.format("b"))
+    driver.run(20)
+    assert [f.seq for f in client.feedback] == list(range(told + 1, driver.session.log.newest + 1))
+
+
 def test_a_feedback_stream_can_be_narrowed_to_some_elements(driver) -> None:
     viewer = driver.join(2)
     asked = {"type": "subscribe", "stream": "feedback", "elements": ["blockProgress"]}
