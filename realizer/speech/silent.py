@@ -11,9 +11,9 @@ from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts,
 from realizer.speech.ssml import Mark, read_script
 from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
 from realizer.speech.words import Item, Pause, Spelled, items
+from realizer.tables.phonemes import vowels
 
 SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
-VOWELS = "aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ"
 
 
 class SilentVoice:
@@ -87,9 +87,10 @@ def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tupl
 
 def _phonemes(word: Spelled, language: str, start: float, length: float, consonant: float) -> list[Phoneme]:
     ipa = letters_to_phonemes(word.text, language) or ("",)
-    times = [1.0 if sound[:1] in VOWELS else consonant for sound in ipa]
+    vowel = [not sound or sound[0] in vowels() for sound in ipa]  # what has no sound counts as one
+    times = [1.0 if is_vowel else consonant for is_vowel in vowel]
     share = length / sum(times)
-    stressed = next((k for k, sound in enumerate(ipa) if sound[:1] in VOWELS), None)
+    stressed = vowel.index(True) if any(vowel) else None
     phonemes = []
     for k, (sound, time) in enumerate(zip(ipa, times, strict=True)):
         # Short words are mostly unstressed; in longer ones the first vowel stands out, for want of better.

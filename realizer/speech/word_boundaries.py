@@ -6,7 +6,8 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-VOWELS = set("aeiouyæøœɶɑɒɐɔəɚɛɜɝɞɘɵɤɯɨʉɪʏʊʌᵻ")
+from realizer.tables.phonemes import vowels
+
 MOST_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
 SKIP, UNLIKE, ALIKE, HINT = 0.7, 1.2, 0.4, -0.5  # costs of the alignment, ours
 
@@ -60,7 +61,7 @@ def bare(ipa: str) -> str:
 
 def is_vowel(ipa: str) -> bool:
     """Whether a bare phoneme begins as a vowel."""
-    return ipa[:1] in VOWELS
+    return ipa[:1] in vowels()
 
 
 def _difference(a: str, b: str) -> float:

@@ -3,33 +3,21 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache, lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Float64
+from realizer.tables.phonemes import PhonemeFeatures, phoneme_features
 
 VISEMES = 15  # 0 none, 1..14: ISO/IEC 14496-2
 ROUNDED = 14  # the viseme of a rounded mouth
 BILABIAL = 1
 SHAPE = ("jaw", "upper", "lower", "width", "push_upper", "push_lower", "corner", "tip", "thrust", "body")
 WEIGHT = ("weight_jaw", "weight_lips", "weight_shape", "weight_tongue")
-
-
-@dataclass(frozen=True, slots=True)
-class PhonemeFeatures:
-    """How one IPA symbol is made; `height` of vowels only, 0 close .. 1 open."""
-
-    ipa: str
-    kind: Literal["vowel", "consonant"]
-    place: str
-    manner: str
-    height: float | None
-    rounded: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +62,6 @@ class Sound:
     mix: tuple[tuple[int, float], ...]
     vowel: bool
     share: float
-
-
-@cache
-def phoneme_features() -> Mapping[str, PhonemeFeatures]:
-    """IPA symbol -> features."""
-    rows = tables.read_csv(tables.text_of("phonemes.csv"), PhonemeFeatures, "phonemes.csv")
-    return {row.ipa: row for row in rows}
 
 
 @cache

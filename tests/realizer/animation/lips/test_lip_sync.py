@@ -13,9 +13,10 @@ from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.lips.lip_sync import lip_channels
-from realizer.animation.lips.visemes import coarticulation, phoneme_features
+from realizer.animation.lips.visemes import coarticulation
 from realizer.speech.utterance import Phoneme
 from realizer.tables import faps
+from realizer.tables.phonemes import phoneme_features
 
 IPA = sorted(phoneme_features())
 NUMBER = {row.name: row.fap for row in faps()}

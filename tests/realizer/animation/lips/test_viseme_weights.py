@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from realizer.animation.lips.viseme_weights import fap_1, oculus_visemes, oculus_weights, viseme_weights
-from realizer.animation.lips.visemes import phoneme_features
 from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
+from realizer.tables.phonemes import phoneme_features
 
 IPA = sorted(phoneme_features())
 # An example of each viseme that Oculus names, in the order of its numbers.

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.lips.visemes import lip_shapes, phoneme_features, sounds
+from realizer.animation.lips.visemes import lip_shapes, sounds
+from realizer.tables.phonemes import phoneme_features
 
 
 def test_every_symbol_has_a_mouth_or_none_on_purpose() -> None:

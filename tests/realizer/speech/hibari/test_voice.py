@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realizer.animation.lips.visemes import phoneme_features
 from realizer.core.errors import VoiceError
 from realizer.speech import engine_process
 from realizer.speech.duration_fit import fitted
@@ -24,6 +23,7 @@ from realizer.speech.registry import find_voice
 from realizer.speech.ssml import read_script
 from realizer.speech.ssml_prosody import Prosody
 from realizer.speech.utterance import Say, Utterance
+from realizer.tables.phonemes import phoneme_features
 
 hibari = pytest.mark.hibari
 

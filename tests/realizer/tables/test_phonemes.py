@@ -1,0 +1,16 @@
+"""The features of phonemes: vowels have a height, consonants a manner."""
+
+from __future__ import annotations
+
+from realizer.tables.phonemes import phoneme_features, vowels
+
+
+def test_phonemes_vowels_alone_have_a_height() -> None:
+    assert vowels() == {ipa for ipa, row in phoneme_features().items() if row.height is not None}
+
+
+def test_phonemes_vowels_are_one_letter_each() -> None:
+    # `is_vowel` looks at the first letter of a phoneme.
+    assert all(len(ipa) == 1 for ipa in vowels())
+    assert set("aeiouəɪʊɑɔ") < vowels()
+    assert not set("pbtdkgszʃʒlɹmnŋ") & vowels()
