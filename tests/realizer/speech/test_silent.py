@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer import speech
 from realizer.animation.lips.lip_sync import lip_channels
 from realizer.core.errors import VoiceError
 from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, units
@@ -137,9 +136,3 @@ def test_the_best_voice_is_the_one_with_sound() -> None:
 def test_an_unknown_voice_is_refused_with_the_known_ones() -> None:
     with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'hal'"):
         find_voice("hal")
-
-
-def test_the_package_hands_out_what_it_lists() -> None:
-    assert all(getattr(speech, name) for name in speech.__all__)
-    with pytest.raises(AttributeError):
-        _ = speech.nothing
