@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 from realizer.core.errors import VoiceError
-from realizer.speech.letter_to_sound import GENERIC, syllable_facts
-from realizer.speech.silent import SilentVoice
+from realizer.core.registry import Registry
+from realizer.speech.base_voice import BaseVoice
 from realizer.speech.utterance import Voice
+
+# The first that is installed speaks where a document and the settings name none; a plug-in never does.
+VOICES: Registry[type[BaseVoice]] = Registry(
+    "realizer.voices",
+    {
+        "espeak": "realizer.speech.espeak.voice:EspeakVoice",
+        "hibari": "realizer.speech.hibari.voice:HibariVoice",
+        "silent": "realizer.speech.silent:SilentVoice",
+    },
+    wanted="a subclass of realizer.speech.base_voice.BaseVoice",
+    accepts=lambda value: isinstance(value, type) and issubclass(value, BaseVoice),
+)
+OTHER_NAMES = {"espeak-ng": "espeak", "hibari-tts": "hibari"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,63 +44,42 @@ class VoiceInfo:
 
 
 def voices() -> tuple[VoiceInfo, ...]:
-    """The voices, best first; starts no engine."""
-    from realizer.speech.espeak import voice as espeak
-    from realizer.speech.hibari import voice as hibari
-
-    spelled = tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
-    return (
-        VoiceInfo(
-            name="espeak",
-            engine="espeak-ng",
-            languages=(),
-            available=espeak.missing() is None,
-            says=espeak.missing()
-            or "espeak-ng speaks over 100 languages; a variant is named as in espeak:en-gb+f3 or espeak:nl",
-        ),
-        VoiceInfo(
-            name="hibari",
-            engine="hibari-tts",
-            languages=("en-US", "en-GB"),
-            available=hibari.missing() is None,
-            says=hibari.missing()
-            or "a neural voice, English only; its other voices are named as in hibari:emma",
-        ),
-        VoiceInfo(
-            name="silent",
-            engine="rules",
-            languages=spelled,
-            available=True,
-            says="no sound: times and lips by rule, for any language",
-        ),
-    )
+    """Return the voices, best first, without starting an engine."""
+    found = []
+    for name, voice in VOICES.working():
+        fix = voice.missing()
+        found.append(VoiceInfo(name, voice.engine, voice.languages(), fix is None, fix or voice.description))
+    return tuple(found)
 
 
 def find_voice(name: str | None = None) -> Voice:
-    """The voice of that name.
+    """Return the voice of that name.
 
     Args:
         name: "espeak", "espeak:VOICE" (a voice of espeak-ng such as "en-gb+f3"), "hibari", "hibari:VOICE",
-            "silent", or None for the best that is installed.
+            "silent", the name of a plug-in's voice, or None for the best that is installed.
 
     Raises:
         VoiceError: no such voice, or it is not installed; the text says what to do.
+        PluginError: the voice is of a plug-in that cannot be used.
     """
-    from realizer.speech.espeak import voice as espeak
-    from realizer.speech.hibari import voice as hibari
-
     if name is None:
-        name = next(voice.name for voice in voices() if voice.available)
+        name = next(known for known, voice in VOICES.working() if voice.missing() is None)
     engine, _, variant = name.partition(":")
-    if engine == "silent" and not variant:
-        return SilentVoice()
-    if engine in ("espeak", "espeak-ng"):
-        if fix := espeak.missing():
-            raise VoiceError(fix)
-        return espeak.EspeakVoice(voice=variant or None)
-    if engine in ("hibari", "hibari-tts"):
-        if fix := hibari.missing() or (hibari.missing_voice(variant) if variant else None):
-            raise VoiceError(fix)
-        return hibari.HibariVoice(voice=variant or None)
-    known = ", ".join(v.name for v in voices())
-    raise VoiceError(f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to get them")
+    engine = OTHER_NAMES.get(engine, engine)
+    if engine not in VOICES:
+        known = ", ".join(VOICES)
+        raise VoiceError(
+            f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to get them"
+        )
+    voice = VOICES[engine]
+    if fix := voice.missing(variant or None):
+        raise VoiceError(fix)
+    return voice(variant or None)
+
+
+@cache
+def reference_voice() -> Voice:
+    """Return the voice whose phonemes and times recordings are compared with, one for the whole process."""
+    name = "espeak" if VOICES["espeak"].missing() is None else "silent"
+    return find_voice(name)

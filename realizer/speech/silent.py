@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-from realizer.core.errors import VoiceError
-from realizer.speech.duration_fit import fitted
-from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, units
+from realizer.speech.base_voice import BaseVoice
+from realizer.speech.letter_to_sound import GENERIC, letters_to_phonemes, syllable_facts, units
 from realizer.speech.ssml import Mark, read_script
 from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
 from realizer.speech.words import Item, Pause, Spelled, items
@@ -16,10 +14,16 @@ from realizer.tables.phonemes import vowels
 SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
 
 
-class SilentVoice:
+class SilentVoice(BaseVoice):
     """Rule-based durations by vowel units (Wojdel 2005, 6.4.1); the fallback when no engine is installed."""
 
     name = "silent"
+    engine = "rules"
+    description = "no sound: times and lips by rule, for any language"
+
+    @classmethod
+    def languages(cls) -> tuple[str, ...]:
+        return tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
 
     def say(self, request: Say) -> Utterance:
         """Words last as many units (0.2 s at rate 1) as they have vowels; a punctuation mark lasts one.
@@ -33,19 +37,6 @@ class SilentVoice:
             return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)
         rate = min(FASTEST, max(SLOWEST, request.rate))
         return _laid_out(items(script, facts["phrase"]), request.language, rate, script.warnings)
-
-    def close(self) -> None:
-        """Nothing to end."""
-
-
-def without_sound(say: Say, fault: VoiceError | str) -> Utterance:
-    """What the silent voice makes of what another one failed to say, with a warning that says why.
-
-    Raises:
-        VoiceError: the text is too long.
-    """
-    made = fitted(SilentVoice(), say)
-    return replace(made, warnings=(*made.warnings, f"{fault}; this one has no sound"))
 
 
 def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:

@@ -1,7 +1,7 @@
 """How much later than it says a voice is heard: `python tests/benchmarks/calibrate.py NAME [--aligner A]`.
 
 Prints the median of what an aligner finds minus what the voice says, over the word onsets of twelve English
-sentences: what is to be added to the voice's `offset` in realizer/tables/voices.csv.
+sentences: what is to be added to `offset` in realizer/tables/hibari.toml.
 """
 
 from __future__ import annotations

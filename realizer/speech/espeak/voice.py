@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import VoiceError
-from realizer.speech.cache import Kept
-from realizer.speech.engine_process import Engine, EngineProcess
+from realizer.speech.engine_process import Engine
+from realizer.speech.engine_voice import EngineVoice
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import timeline
 from realizer.speech.espeak.protocol import read_answer
-from realizer.speech.ssml import Break, read_script
+from realizer.speech.ssml import Script
 from realizer.speech.utterance import STRETCH, Say, Utterance
 
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
@@ -35,11 +35,8 @@ def missing() -> str | None:
 ENGINE = Engine("espeak-ng", Path(__file__).with_name("worker.py"), missing)
 
 
-class EspeakVoice:
+class EspeakVoice(EngineVoice):
     """espeak-ng in over 100 languages; the same request gives the same samples, in any order and process.
-
-    Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
-    the next one starts it again.
 
     Args:
         voice: a voice of espeak-ng ("nl", "en-gb+f3", "+m3" for the language's own with a variant), or None.
@@ -47,49 +44,23 @@ class EspeakVoice:
         options: for the worker process ("--data", PATH; "--no-fork").
     """
 
+    name = "espeak"
+    engine = "espeak-ng"
+    description = "espeak-ng speaks over 100 languages; a variant is named as in espeak:en-gb+f3 or espeak:nl"
+    worker = ENGINE
+
     def __init__(
         self, voice: str | None = None, *, limit: float = 30.0, options: tuple[str, ...] = ()
     ) -> None:
-        self.name = f"espeak:{voice}" if voice else "espeak"
-        self._voice = voice
-        self._process = EngineProcess(ENGINE, options, limit)
+        super().__init__(voice, limit=limit, options=options)
         self._lock = threading.Lock()
-        self._kept = Kept()
         self._alone: dict[tuple[str, str], tuple[str, ...]] = {}
 
-    def say(self, request: Say) -> Utterance:
-        """Speak; `duration` is exactly the sound's.
+    @classmethod
+    def missing(cls, voice: str | None = None) -> str | None:
+        return missing()
 
-        Wrong SSML is spoken as plain text, control characters and emoji are left out, an unknown language is
-        spoken as English, an empty text is no sound: each with a warning.
-
-        Raises:
-            VoiceError: the text is too long, or the engine is missing, died or hung.
-        """
-        return self._kept.get(request, self._spoken)
-
-    def close(self) -> None:
-        """End the process; may be called twice. A later request starts it again."""
-        self._process.close()
-
-    @property
-    def pid(self) -> int | None:
-        """Id of the engine's process while it runs."""
-        return self._process.pid
-
-    def languages(self) -> tuple[str, ...]:
-        """BCP-47 tags of what it speaks, in alphabetical order.
-
-        Raises:
-            VoiceError: it is not installed or does not start.
-        """
-        return tuple(sorted({tag for v in self._process.hello()["voices"] for _, tag in v["languages"]}))
-
-    def _spoken(self, request: Say) -> Utterance:
-        script = read_script(request)
-        if script.is_silent and not any(isinstance(part, Break) for part in script.parts):
-            marks = dict.fromkeys(script.marks, 0.0)
-            return Utterance(0.0, (), (), marks, 0, None, script.warnings)
+    def _synthesize(self, request: Say, script: Script) -> Utterance:
         hello = self._process.hello()
         voice, warnings = choose_voice(hello, request.voice or self._voice, request.language)
         wpm = round(min(FASTEST, max(SLOWEST, WORDS_A_MINUTE * request.rate)))

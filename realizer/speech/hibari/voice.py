@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,8 @@ import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Int16
-from realizer.speech.cache import Kept
-from realizer.speech.engine_process import Engine, EngineProcess
+from realizer.speech.engine_process import Engine
+from realizer.speech.engine_voice import EngineVoice
 from realizer.speech.hibari.text import Run, runs
 from realizer.speech.hibari.times import (
     Lengths,
@@ -29,7 +29,7 @@ from realizer.speech.hibari.times import (
 )
 from realizer.speech.letter_to_sound import syllable_facts
 from realizer.speech.speech_buffer import Track, cut
-from realizer.speech.ssml import Break, read_script
+from realizer.speech.ssml import Script
 from realizer.speech.utterance import STRETCH, Say, Utterance, Word
 
 INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
@@ -58,32 +58,15 @@ def missing_voice(name: str) -> str | None:
 ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), missing)
 
 
-@dataclass(frozen=True, slots=True)
-class VoiceRow:
-    """A row of the table of voices.
-
-    Attributes:
-        offset: seconds to add to the engine's times so that they are when a sound is heard.
-        slowest, fastest: rates.
-    """
-
-    engine: str
-    offset: float
-    slowest: float
-    fastest: float
-
-
 @cache
-def _facts() -> VoiceRow:
-    rows = tables.read_csv(tables.text_of("voices.csv"), VoiceRow, "voices.csv")
-    return next(row for row in rows if row.engine == "hibari")
+def _facts() -> dict[str, float]:
+    return tables.read_toml(tables.text_of("hibari.toml"), "hibari.toml")
 
 
-class HibariVoice:
+class HibariVoice(EngineVoice):
     """hibari speaks English; the same request gives the same samples.
 
-    Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
-    the next one starts it again. A long text is spoken a sentence at a time, so that others come between.
+    A long text is spoken a sentence at a time, so that others come between.
 
     Args:
         voice: one of hibari's that is on this machine, or None for the one in the package.
@@ -91,39 +74,26 @@ class HibariVoice:
         options: for the worker ("--durations", TENSOR).
     """
 
+    name = "hibari"
+    engine = "hibari-tts"
+    description = "a neural voice, English only; its other voices are named as in hibari:emma"
+    worker = ENGINE
+
     def __init__(
         self, voice: str | None = None, *, limit: float = 30.0, options: tuple[str, ...] = ()
     ) -> None:
-        self.name = f"hibari:{voice}" if voice else "hibari"
         chosen = ("--voice", voice) if voice else ()
-        self._process = EngineProcess(ENGINE, (*chosen, *options), limit)
-        self._kept = Kept()
+        super().__init__(voice, limit=limit, options=(*chosen, *options))
 
-    def say(self, request: Say) -> Utterance:
-        """Speak; `duration` is exactly the sound's.
+    @classmethod
+    def missing(cls, voice: str | None = None) -> str | None:
+        return missing() or (missing_voice(voice) if voice else None)
 
-        Wrong SSML is spoken as plain text, control characters and emoji are left out, another language is
-        read as English, an empty text is no sound: each with a warning.
+    @classmethod
+    def languages(cls) -> tuple[str, ...]:
+        return "en-US", "en-GB"
 
-        Raises:
-            VoiceError: the text is too long, or the engine is missing, died or hung.
-        """
-        return self._kept.get(request, self._spoken)
-
-    def close(self) -> None:
-        """End the process; may be called twice. A later request starts it again."""
-        self._process.close()
-
-    @property
-    def pid(self) -> int | None:
-        """Id of the engine's process while it runs."""
-        return self._process.pid
-
-    def _spoken(self, request: Say) -> Utterance:
-        script = read_script(request)
-        if script.is_silent and not any(isinstance(part, Break) for part in script.parts):
-            marks = dict.fromkeys(script.marks, 0.0)
-            return Utterance(0.0, (), (), marks, 0, None, script.warnings)
+    def _synthesize(self, request: Say, script: Script) -> Utterance:
         hello = self._process.hello()
         rate: int = hello["rate"]
         parts, placed = runs(script)
@@ -200,7 +170,7 @@ class HibariVoice:
     ) -> tuple[Int16, list[Sound]]:
         """Sound, and its phonemes when they are heard; they tile it."""
         facts = _facts()
-        speed = min(facts.fastest, max(facts.slowest, pace * run.prosody.rate))
+        speed = min(facts["fastest"], max(facts["slowest"], pace * run.prosody.rate))
         asked = {"op": "say", "phonemes": written(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
         head, body = self._process.ask(asked)
         volume = 32767 * run.prosody.volume
@@ -208,7 +178,7 @@ class HibariVoice:
         if head["signs"] is None:
             return pcm, sounds(sentence, guessed(sentence, pcm))
         told = sounds(sentence, Lengths(head["lead"], tuple(head["signs"]), head["tail"]))
-        shift = round(facts.offset * rate)
+        shift = round(facts["offset"] * rate)
         borders = [0, *(min(max(0, sound.end + shift), len(pcm)) for sound in told[:-1]), len(pcm)]
         heard = [
             replace(sound, start=start, end=end)

@@ -43,6 +43,46 @@ def test_a_voice_is_found_by_its_name_and_no_engine_starts(name: str, kind: type
 
 
 def test_listing_the_voices_loads_no_engine() -> None:
-    code = "import sys; from realizer.speech import voices; voices(); print(*sys.modules)"
+    code = "import sys; from realizer.speech.registry import voices; voices(); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not {"hibari", "onnxruntime", "espeakng_loader"} & set(loaded.split())
+
+
+def test_every_voice_says_what_it_is_or_what_to_install() -> None:
+    listed = {voice.name: voice for voice in voices()}
+    assert {"espeak", "silent"} <= set(listed)
+    assert listed["silent"].available
+    assert all(len(voice.says) > 20 for voice in listed.values())
+
+
+def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.speech.espeak.voice.missing", lambda: "pip install 'bml-realizer[speech]'")
+    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: None)
+    assert find_voice(None).name == "hibari"
+    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: "pip install 'bml-realizer[neural]'")
+    assert find_voice(None).name == "silent"
+    assert not voices()[0].available
+    assert "pip install" in voices()[0].says
+    with pytest.raises(VoiceError, match="pip install"):
+        find_voice("espeak:nl")
+
+
+@pytest.mark.espeak
+def test_the_best_voice_is_the_one_with_sound() -> None:
+    assert find_voice(None).name == "espeak"
+    assert find_voice("espeak:en-gb+f3").name == "espeak:en-gb+f3"
+
+
+def test_an_unknown_voice_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'hal'"):
+        find_voice("hal")
+
+
+@pytest.mark.parametrize("name", ["espeak-ng:nl", pytest.param("hibari-tts", marks=pytest.mark.hibari)])
+def test_find_voice_takes_the_name_of_an_engine(name: str) -> None:
+    assert find_voice(name).name == name.replace("-ng", "").replace("-tts", "")
+
+
+def test_find_voice_refuses_a_variant_of_a_voice_that_has_none() -> None:
+    with pytest.raises(VoiceError, match="voice silent: wanted nothing after its name, got 'loud'"):
+        find_voice("silent:loud")

@@ -7,9 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.lips.lip_sync import lip_channels
-from realizer.core.errors import VoiceError
 from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, units
-from realizer.speech.registry import find_voice, voices
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Say
 
@@ -106,33 +104,3 @@ def test_any_text_has_times_in_order(text: str, language: str) -> None:
     assert all(a.end == b.start for a, b in zip(said.phonemes, said.phonemes[1:], strict=False))
     assert all(a.end <= b.start + 1e-9 for a, b in zip(said.words, said.words[1:], strict=False))
     lip_channels(said.phonemes, 0.0)
-
-
-def test_every_voice_says_what_it_is_or_what_to_install() -> None:
-    listed = {voice.name: voice for voice in voices()}
-    assert {"espeak", "silent"} <= set(listed)
-    assert listed["silent"].available
-    assert all(len(voice.says) > 20 for voice in listed.values())
-
-
-def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.speech.espeak.voice.missing", lambda: "pip install 'bml-realizer[speech]'")
-    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: None)
-    assert find_voice(None).name == "hibari"
-    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: "pip install 'bml-realizer[neural]'")
-    assert find_voice(None).name == "silent"
-    assert not voices()[0].available
-    assert "pip install" in voices()[0].says
-    with pytest.raises(VoiceError, match="pip install"):
-        find_voice("espeak:nl")
-
-
-@pytest.mark.espeak
-def test_the_best_voice_is_the_one_with_sound() -> None:
-    assert find_voice(None).name == "espeak"
-    assert find_voice("espeak:en-gb+f3").name == "espeak:en-gb+f3"
-
-
-def test_an_unknown_voice_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(VoiceError, match="wanted one of espeak, hibari, silent, got 'hal'"):
-        find_voice("hal")

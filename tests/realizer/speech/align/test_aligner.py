@@ -128,7 +128,7 @@ def test_words_that_no_dictionary_has_are_said_as_espeak_says_them(voice) -> Non
 def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) -> None:
     from realizer.speech.align import aligner, sphinx
 
-    monkeypatch.setattr(aligner, "_reference_voice", SilentVoice)
+    monkeypatch.setattr(aligner, "reference_voice", SilentVoice)
     monkeypatch.setattr(sphinx, "missing", lambda: "not here")
     times = np.arange(32_000) / 16_000
     tone = np.where((times > 0.5) & (times < 1.5), 0.3 * np.sin(2 * np.pi * 300 * times), 0.0)

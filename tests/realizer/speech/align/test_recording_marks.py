@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.speech.align.recording_marks import played, recorded
+from realizer.speech.align.recording_marks import align_recording, recorded
 from realizer.speech.duration_fit import fitted
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Recording, Say
@@ -40,7 +40,7 @@ def test_a_request_with_a_recording_asks_no_voice_and_stays_as_long_as_it_is(sen
 
 def test_a_recording_that_cannot_be_aligned_sounds_all_the_same() -> None:
     silence = Recording(8000, np.zeros(8000, np.int16))
-    said = played(Say("Hello", recording=silence), silence)
+    said = align_recording(Say("Hello", recording=silence), silence)
     assert said.pcm is silence.pcm
     assert (said.duration, said.words, said.phonemes) == (1.0, (), ())
     assert "lips do not move with the recording" in said.warnings[0]
