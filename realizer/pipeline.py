@@ -17,7 +17,7 @@ from realizer.face.fap_mapping import mapping_of
 from realizer.playback.player import Player
 from realizer.realization import Realization, seen
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech.duration_fit import fitted, stretched
+from realizer.speech.duration_fit import fitted, stretched, without_sound
 from realizer.speech.utterance import Say, Utterance, Voice
 
 if TYPE_CHECKING:
@@ -204,7 +204,5 @@ def speak(says: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
         try:
             utterances[behaviour] = fitted(voice, say)
         except VoiceError as error:
-            from realizer.speech.silent import without_sound
-
             utterances[behaviour] = without_sound(say, error)
     return utterances

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from realizer.core.errors import VoiceError
 from realizer.speech.utterance import WARP, Say, Utterance, Voice
 from realizer.speech.volume import with_volumes
 
@@ -30,6 +31,18 @@ def fitted(voice: Voice, say: Say) -> Utterance:
 
         return with_volumes(say, played(say, say.recording))
     return with_volumes(say, _spoken(voice, say))
+
+
+def without_sound(say: Say, fault: VoiceError | str) -> Utterance:
+    """What the silent voice makes of what another one failed to say, with a warning that says why.
+
+    Raises:
+        VoiceError: the text is too long.
+    """
+    from realizer.speech.silent import SilentVoice
+
+    made = fitted(SilentVoice(), say)
+    return replace(made, warnings=(*made.warnings, f"{fault}; this one has no sound"))
 
 
 def _spoken(voice: Voice, say: Say) -> Utterance:

@@ -11,7 +11,7 @@ from realizer.scheduling.timing import Warning
 from realizer.server.documents.pending_blocks import Preparation, Waiting
 from realizer.server.session.effects import Speak
 from realizer.server.speech.long_text import Growing, shortened
-from realizer.speech.silent import without_sound
+from realizer.speech.duration_fit import without_sound
 from realizer.speech.utterance import Say, Utterance
 
 # A voice that has not answered by then is taken for silent.

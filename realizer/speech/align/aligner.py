@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from functools import cache
 from typing import Literal
 from xml.sax.saxutils import escape
 
@@ -17,6 +16,7 @@ from realizer.speech.align.dtw_align import by_sound
 from realizer.speech.align.model_align import by_model
 from realizer.speech.align.recording import mono, to_aligner
 from realizer.speech.align.uniform_align import even
+from realizer.speech.registry import reference_voice
 from realizer.speech.utterance import Say, Utterance, Voice
 
 Aligner = Literal["pocketsphinx", "espeak"]
@@ -78,7 +78,7 @@ def aligned(
     fix = _unable(aligner, voice)
     if fix:
         raise AlignError(fix)
-    speaker = voice or _reference_voice()
+    speaker = voice or reference_voice()
     plain = replace(request, voice=None, rate=1.0, seconds=None, recording=None)
     reference = speaker.say(plain)
     if not reference.words:
@@ -117,15 +117,6 @@ def _unable(aligner: str | None, voice: Voice | None) -> str | None:
     if aligner == "pocketsphinx":
         return sphinx.missing()
     return espeak.missing() if aligner == "espeak" and voice is None else None
-
-
-@cache
-def _reference_voice() -> Voice:
-    """What says the same: espeak-ng, or else rules without a sound. One for the whole process."""
-    from realizer.speech.espeak.voice import EspeakVoice, missing
-    from realizer.speech.silent import SilentVoice
-
-    return SilentVoice() if missing() else EspeakVoice()
 
 
 def _english(language: str) -> bool:

@@ -47,7 +47,7 @@ def recorded(pcm: npt.ArrayLike, rate: float, request: Say, *, aligner: Aligner 
 
 
 @lru_cache(KEPT)
-def played(request: Say, recording: Recording) -> Utterance:
+def align_recording(request: Say, recording: Recording) -> Utterance:
     """As `recorded`; it sounds also where it cannot be aligned, with a warning."""
     try:
         return recorded(recording.pcm, recording.rate, request)

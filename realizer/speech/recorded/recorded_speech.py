@@ -28,11 +28,11 @@ def played(request: Say, recording: Recording) -> Utterance:
         VoiceError: the text is too long, or the voice died that knows what its phonemes are.
     """
     # Imported here: what it needs takes longer to load than most texts to speak.
-    from realizer.speech.align.recording_marks import played as aligned
+    from realizer.speech.align.recording_marks import align_recording
 
     if not recording.words and not recording.phonemes:
         if request.ssml.strip():
-            found = aligned(request, recording)
+            found = align_recording(request, recording)
             return found if found.phonemes else replace(found, phonemes=_opening(recording))
         return _utterance(recording, (), _opening(recording), {})
     words, phonemes = recording.words, recording.phonemes
@@ -90,9 +90,9 @@ def _opening(recording: Recording) -> tuple[Phoneme, ...]:
 
 def _reference(request: Say) -> Utterance:
     """What a voice makes of the same text; its times are those of nobody."""
-    from realizer.speech.align.aligner import _reference_voice
+    from realizer.speech.registry import reference_voice
 
-    return _reference_voice().say(replace(request, voice=None, rate=1.0, seconds=None, recording=None))
+    return reference_voice().say(replace(request, voice=None, rate=1.0, seconds=None, recording=None))
 
 
 def _whole(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:
