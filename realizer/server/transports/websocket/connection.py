@@ -6,12 +6,17 @@ import asyncio
 import contextlib
 import http
 import logging
+from collections import Counter
+from functools import lru_cache
+from urllib.parse import urlsplit
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import Frame, Opcode
 from websockets.http11 import Request
+from websockets.protocol import State
 
-from realizer.core.settings import Settings
+from realizer.core.settings import Settings, raises
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.http import access
 from realizer.server.http.access import Guard, Pace
@@ -20,9 +25,12 @@ from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.websocket.request import address_of, headers_of, session_of, visitor_of
-from realizer.server.transports.websocket.writer import WebSocketClient
 
 log = logging.getLogger(__name__)
+
+# A client that has not answered the close by then is gone.
+GOODBYE = 2.0  # s
+REASON = 123  # bytes that a close frame has room for behind its code
 
 
 class Visits:
@@ -32,8 +40,44 @@ class Visits:
         self._shell = shell
         self._settings = settings
         self._guard = guard
+        self._checking = asyncio.Lock()
+        self._from: Counter[str] = Counter()  # address -> WebSockets that are open
 
-    async def begin(self, socket: ServerConnection, request: Request) -> None:
+    def check_room(self, socket: ServerConnection) -> None:
+        """Whether one more may come from its address: nobody can take the room of all others.
+
+        Raises:
+            HubError: there are too many.
+        """
+        most = self._settings.max_connections
+        if self._from[address_of(socket)] >= most:
+            words = (
+                f"{most} connections from {address_of(socket)} are open: wanted fewer "
+                f"{raises('max_connections')}"
+            )
+            raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
+
+    async def handle(self, socket: ServerConnection) -> None:
+        """One WebSocket, from its opening to its end."""
+        assert socket.request is not None
+        address = address_of(socket)
+        try:
+            self.check_room(socket)  # again: many may have been let in at the same moment
+        except HubError as error:
+            await WebSocketClient(socket).close(1013, str(error))
+            return
+        self._from[address] += 1
+        try:
+            if urlsplit(socket.request.path).path == "/check":
+                await self._check(socket)
+            else:
+                await self._visit(socket, socket.request)
+        finally:
+            self._from[address] -= 1
+            if not self._from[address]:
+                del self._from[address]
+
+    async def _visit(self, socket: ServerConnection, request: Request) -> None:
         """One visit, to its end; who may not come in is told why."""
         client = WebSocketClient(socket)
         greeting = None
@@ -103,3 +147,62 @@ class Visits:
             with contextlib.suppress(ConnectionClosed):
                 await socket.send(told.text())
         await client.close(1008 if unknown else 1013, str(error))
+
+    async def _check(self, socket: ServerConnection) -> None:
+        """An editor's own WebSocket: a text in, its faults out, one after the other."""
+        from realizer.server.http.page_tools import faults
+
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(ConnectionClosed):
+            async for text in socket:
+                if isinstance(text, bytes):
+                    await socket.close(1003, "wanted text")
+                    return
+                # One text at a time, whoever asks: those that play come first.
+                async with self._checking:
+                    told = await loop.run_in_executor(None, faults, text, self._settings)
+                await socket.send(told)
+
+
+class WebSocketClient:
+    """The way out to one WebSocket: what is sent is written at once, or waits in the socket's own buffer."""
+
+    def __init__(self, socket: ServerConnection) -> None:
+        self._socket = socket
+        self._end: asyncio.Task[None] | None = None
+
+    @property
+    def waiting(self) -> int:
+        transport = self._socket.transport
+        return 0 if transport is None else transport.get_write_buffer_size()
+
+    def send(self, data: str | bytes) -> None:
+        # Without a task that wakes for every frame; a socket that closes is left out.
+        if self._end is None and self._socket.protocol.state is State.OPEN:
+            text = isinstance(data, str)
+            payload = data.encode() if isinstance(data, str) else data
+            self._socket.transport.write(_head(text, len(payload)) + payload)
+
+    def end(self, code: int, reason: str) -> None:
+        if self._end is None:
+            self._end = asyncio.get_running_loop().create_task(self.close(code, reason))
+
+    async def close(self, code: int, reason: str) -> None:
+        """Let it go, and wait until it is gone; one that does not read will never hear of it.
+
+        Args:
+            reason: as much of it is told as there is room for.
+        """
+        reason = reason.encode()[:REASON].decode(errors="ignore")
+        try:
+            async with asyncio.timeout(GOODBYE):
+                await self._socket.close(code, reason)
+        except TimeoutError:
+            self._socket.transport.abort()
+
+
+@lru_cache(maxsize=1024)
+def _head(text: bool, length: int) -> bytes:
+    """What goes before a message of so many bytes."""
+    whole = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
+    return whole[: len(whole) - length]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import http
 import logging
 import os
 import socket
 import tempfile
-from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlsplit
@@ -18,18 +16,17 @@ from weakref import WeakSet
 from websockets.asyncio.server import Server as SocketServer
 from websockets.asyncio.server import ServerConnection
 from websockets.asyncio.server import serve as listen
-from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
-from realizer.core.settings import Settings, raises
+from realizer.core.settings import Settings
 from realizer.server.http.access import Guard
 from realizer.server.http.http_site import TEXT, Answer, Site
 from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
-from realizer.server.transports.websocket.connection import Visits
+from realizer.server.transports.websocket.connection import GOODBYE, Visits
 from realizer.server.transports.websocket.request import (
     address_of,
     headers_of,
@@ -38,7 +35,6 @@ from realizer.server.transports.websocket.request import (
     session_of,
     visitor_of,
 )
-from realizer.server.transports.websocket.writer import GOODBYE, WebSocketClient
 
 log = logging.getLogger(__name__)
 
@@ -68,8 +64,6 @@ class WebSocketDoor:
         self._socket: SocketServer | None = None
         self._opened = WeakSet[ServerConnection]()
         self._closing: set[asyncio.Task[None]] = set()
-        self._checking = asyncio.Lock()
-        self._from: Counter[str] = Counter()  # address -> WebSockets that are open
 
     @property
     def url(self) -> str:
@@ -95,7 +89,7 @@ class WebSocketDoor:
             where = {"unix": True, "sock": _nowhere()}
         where["create_connection"] = self._open
         self._socket = await listen(
-            self._handle,
+            self._visits.handle,
             process_request=self._http,
             compression=None,  # frames are dense and late is worse than large
             max_size=self._settings.max_message,
@@ -151,7 +145,7 @@ class WebSocketDoor:
         if path in ("/ws", "/check") and upgrade:
             try:
                 allowed = self._guard.request(request.path, headers_of(request), later=path == "/ws")
-                self._room(connection)
+                self._visits.check_room(connection)
                 if path == "/check":
                     self._guard.room()
                 else:
@@ -188,55 +182,6 @@ class WebSocketDoor:
         log.info("refused: %s", error, extra={"address": address_of(connection), "status": error.status})
         headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
         return response_to(Answer(error.status, TEXT, f"{error}\n".encode(), headers))
-
-    def _room(self, socket: ServerConnection) -> None:
-        """Whether one more may come from its address: nobody can take the room of all others.
-
-        Raises:
-            HubError: there are too many.
-        """
-        most = self._settings.max_connections
-        if self._from[address_of(socket)] >= most:
-            words = (
-                f"{most} connections from {address_of(socket)} are open: wanted fewer "
-                f"{raises('max_connections')}"
-            )
-            raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
-
-    async def _handle(self, socket: ServerConnection) -> None:
-        """One WebSocket, from its opening to its end."""
-        assert socket.request is not None
-        address = address_of(socket)
-        try:
-            self._room(socket)  # again: many may have been let in at the same moment
-        except HubError as error:
-            await WebSocketClient(socket).close(1013, str(error))
-            return
-        self._from[address] += 1
-        try:
-            if urlsplit(socket.request.path).path == "/check":
-                await self._check(socket)
-            else:
-                await self._visits.begin(socket, socket.request)
-        finally:
-            self._from[address] -= 1
-            if not self._from[address]:
-                del self._from[address]
-
-    async def _check(self, socket: ServerConnection) -> None:
-        """An editor's own WebSocket: a text in, its faults out, one after the other."""
-        from realizer.server.http.page_tools import faults
-
-        loop = asyncio.get_running_loop()
-        with contextlib.suppress(ConnectionClosed):
-            async for text in socket:
-                if isinstance(text, bytes):
-                    await socket.close(1003, "wanted text")
-                    return
-                # One text at a time, whoever asks: those that play come first.
-                async with self._checking:
-                    told = await loop.run_in_executor(None, faults, text, self._settings)
-                await socket.send(told)
 
 
 def _nowhere() -> socket.socket:
