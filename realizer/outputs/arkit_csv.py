@@ -64,4 +64,5 @@ ARKIT_CSV = Output(
     "text/csv",
     "a row a frame: ARKit's 52 weights as Live Link Face writes them",
     _encode,
+    reader="openfacefx",
 )

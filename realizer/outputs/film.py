@@ -215,7 +215,7 @@ def _output(suffix: str, media_type: str, says: str) -> Output:
             write_film(realization, path, drawing)
             return path.read_bytes()
 
-    return Output(suffix, media_type, says, encode, ("render", "film"), _draws, save=write_film)
+    return Output(suffix, media_type, says, encode, ("render", "film"), _draws, save=write_film, reader="av")
 
 
 MP4 = _output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC")

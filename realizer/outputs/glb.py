@@ -106,4 +106,6 @@ def _material(name: str, roughness: float) -> dict[str, Any]:
     }
 
 
-GLB = Output(".glb", "model/gltf-binary", "the head, animated: morph targets, head and eyes", _encode)
+GLB = Output(
+    ".glb", "model/gltf-binary", "the head, animated: morph targets, head and eyes", _encode, reader="trimesh"
+)

@@ -97,6 +97,7 @@ class Output:
         draws: width and height of its pictures, and whether they may be transparent; None: there are none.
         everybody: whether it holds what all characters do; others hold the face of the first.
         save: (realization, path, drawing) -> None, of what may be too long to be held: writes it bit by bit.
+        reader: the program of others that reads it in the tests; "" if there is none.
     """
 
     suffix: str
@@ -107,6 +108,7 @@ class Output:
     draws: Callable[[Drawing], tuple[tuple[int, int], bool]] | None = None
     everybody: bool = False
     save: Callable[[Realization, Path, Drawing], None] | None = None
+    reader: str = ""
 
     def write(self, realization: Realization, path: Path, drawing: Drawing) -> None:
         """Write the file, whole or not at all; `path` may be any place that can be written."""

@@ -106,4 +106,12 @@ def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
     return {frame: tuple(names) for frame, names in found.items()}
 
 
-PNG = Output(".png", "image/png", "a contact sheet over time, or one instant", _encode, ("render",), _draws)
+PNG = Output(
+    ".png",
+    "image/png",
+    "a contact sheet over time, or one instant",
+    _encode,
+    ("render",),
+    _draws,
+    reader="PIL",
+)

@@ -117,4 +117,5 @@ TALKINGHEAD = Output(
     "application/json",
     "words, visemes, face and sound for TalkingHead",
     _encode,
+    reader="talkinghead.html",
 )

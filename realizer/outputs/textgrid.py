@@ -109,4 +109,5 @@ TEXTGRID = Output(
     "words, phonemes and sync points for Praat",
     _encode,
     everybody=True,
+    reader="praatio",
 )

@@ -142,4 +142,6 @@ def _table() -> dict[str, Any]:
     return read_toml(text_of(FILE), FILE)
 
 
-VRMA = Output(".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", _encode)
+VRMA = Output(
+    ".vrma", "model/gltf-binary", "expressions, head and gaze for VRM avatars", _encode, reader="vrma.mjs"
+)

@@ -64,4 +64,11 @@ def _clock(seconds: float) -> str:
     return f"{minutes // 60:02}:{minutes % 60:02}:{milliseconds // 1000:02}.{milliseconds % 1000:03}"
 
 
-VTT = Output(".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", _encode, everybody=True)
+VTT = Output(
+    ".vtt",
+    "text/vtt",
+    "words, phonemes and sync points as WebVTT cues",
+    _encode,
+    everybody=True,
+    reader="webvtt",
+)

@@ -30,4 +30,4 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
     return encode_wav(realization.sound(RATE), RATE)
 
 
-WAV = Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", _encode, everybody=True)
+WAV = Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", _encode, everybody=True, reader="wave")

@@ -74,4 +74,6 @@ def _chunk(name: bytes, content: bytes) -> bytes:
     return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
 
 
-WEBP = Output(".webp", "image/webp", "animated picture without sound", _encode, ("render",), _draws)
+WEBP = Output(
+    ".webp", "image/webp", "animated picture without sound", _encode, ("render",), _draws, reader="PIL"
+)
