@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema import Block, parse
 from realizer import playback
-from realizer.behaviours import VOCABULARY
+from realizer.behaviours.registry import VOCABULARY
 from realizer.playback import block_states
 from realizer.playback.block_states import TRANSITIONS, BlockEvent, State, TransitionError, next_state
 from realizer.playback.player import Player
