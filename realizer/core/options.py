@@ -22,7 +22,7 @@ class PlayOptions:
         language: BCP-47 of speech that does not name its own.
         media: the folder of the files that documents may name; None: they may name none.
         expressions: a folder of the user's own expressions, before those that ship; None: there are none.
-        cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file of rules.
+        cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
         prosody: nods, brows, blinks and looks that go with what is said; none without `idle`.
         mapping: a file of what AUs ask of FAPs; it goes before what the face says.
 
