@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from realizer.core.settings import Settings
     from realizer.face.load import load_face
     from realizer.face.model import Face
-    from realizer.pipeline import realize, schedule
+    from realizer.offline import realize, schedule
     from realizer.playback.player import Player
     from realizer.realization import Realization
     from realizer.scheduling.timing import Schedule
@@ -47,8 +47,8 @@ _HOMES = {
     "TableError": "realizer.core.errors",
     "VoiceError": "realizer.core.errors",
     "load_face": "realizer.face.load",
-    "realize": "realizer.pipeline",
-    "schedule": "realizer.pipeline",
+    "realize": "realizer.offline",
+    "schedule": "realizer.offline",
     "serve": "realizer.server.serve",
 }
 

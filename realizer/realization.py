@@ -12,11 +12,11 @@ import numpy as np
 from bml_schema import Feedback, WarningFeedback
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
-from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.core.errors import RealizerError
+from realizer.core.options import PlayOptions
 from realizer.core.units import frame_count
 from realizer.playback.active_block import HUSH, Speaking
 from realizer.playback.audio_mix import heard
@@ -205,49 +205,50 @@ class Realization:
         return out
 
 
-def seen(
+def realization_of(
     player: Player,
-    told: Sequence[Feedback],
-    accepted: Sequence[Schedule],
-    refused: Sequence[Warning] = (),
-    *,
-    fps: float,
-    face: str,
-    deformer: str | None = None,
+    options: PlayOptions,
     mapping: FapMapping,
+    characters: Mapping[str | None, Performance],
+    feedback: Sequence[Feedback],
+    accepted: Sequence[Schedule],
+    refused: Sequence[Warning],
 ) -> Realization:
-    """What a player has played to its end, of which it has forgotten nothing.
+    """Return what a player has played to its end, of which it has forgotten nothing.
 
     Args:
-        told: all its feedback.
-        accepted: the schedules that it gave.
+        mapping: of AUs to FAPs, by which `characters` were made.
+        feedback: all that it gave.
+        accepted: the schedules as they were when their blocks were accepted.
         refused: what it did not take.
-
-    Raises:
-        RealizerError: it lasts too long.
     """
-    schedules = [player.latest(s) for s in accepted]
-    end = player.end
-    times = np.arange(counted(end, fps)) / fps
-    characters: dict[str | None, Performance] = {}
-    for index, name in enumerate(player.characters):
-        step = max(1, int(WINDOW * fps))
-        windows = [player.frames(times[i : i + step], index) for i in range(0, len(times), step)]
-        aus = AUFrames.joined(windows)
-        characters[name] = Performance(aus, to_fap(aus, mapping))
+    from realizer.face.load import face_name
+
+    schedules = [player.latest(schedule) for schedule in accepted]
     return Realization(
-        fps=fps,
-        duration=end,
-        face_name=face,
+        fps=options.fps,
+        duration=player.end,
+        face_name=face_name(options.face),
         characters=characters,
         schedules=tuple(schedules),
-        told=tuple(told),
-        warnings=warned(told, schedules, refused),
-        refused=tuple(w.text for w in refused),
+        told=tuple(feedback),
+        warnings=warned(feedback, schedules, refused),
+        refused=tuple(warning.text for warning in refused),
         speaking=player.speech(),
-        deformer=deformer,
+        deformer=options.deformer,
         mapping=mapping,
     )
+
+
+def frame_times(duration: float, fps: float) -> list[Float64]:
+    """Return the times of all frames, in stretches short enough to be blended at once.
+
+    Raises:
+        RealizerError: there are too many.
+    """
+    times = np.arange(counted(duration, fps)) / fps
+    step = max(1, int(WINDOW * fps))
+    return [times[i : i + step] for i in range(0, len(times), step)]
 
 
 def counted(duration: float, fps: float) -> int:

@@ -31,10 +31,11 @@ from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
+from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings
 from realizer.outputs.fap_text import encode
-from realizer.pipeline import submitted
 from realizer.playback.player import Player
+from realizer.playback.speaking import submit_with_speech
 from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.session.effects import Send
@@ -131,10 +132,10 @@ def documents(seed: int, mutant: bytes) -> None:
 
 def plays(items: list[Block | BMLError], *, faces: bool) -> None:
     """Submit what is a block, and let time jump from deadline to deadline until nothing moves any more."""
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     for item in items:
         if isinstance(item, Block):
-            schedule = submitted(player, item, SilentVoice())
+            schedule = submit_with_speech(player, item, SilentVoice())
             for points in schedule.times.values():
                 assert np.isfinite(points).all()
                 assert (np.diff(points) >= 0).all()

@@ -15,9 +15,11 @@ from bml_schema import Block, BMLError, Feedback, PredictionFeedback, WarningFee
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
-from realizer.pipeline import speak, warning_of
+from realizer.core.options import PlayOptions
 from realizer.playback.active_block import Speaking
+from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
+from realizer.playback.speaking import synthesize
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice
 from realizer.tables import faps
@@ -115,9 +117,7 @@ def play(
     wanted = case.wanted
     scene = {name: (x, y, z) for name, (x, y, z) in wanted.get("scene", {}).items()}
     player = Player(
-        scene=scene if "scene" in wanted else None,
-        idle=wanted.get("idle", False),
-        media=MEDIA,
+        PlayOptions(scene=scene if "scene" in wanted else None, idle=wanted.get("idle", False), media=MEDIA),
         history=math.inf,
     )
     items = list(read(case.document if document is None else document, VOCABULARY))
@@ -140,9 +140,9 @@ def play(
                 player.announce(item, time)
             case Step.PLAN, Block():
                 played.blocks.append(item)
-                played.schedules[item.id] = player.submit(item, time, speak(player.wants(item), voice))
+                played.schedules[item.id] = player.submit(item, time, synthesize(player.wants(item), voice))
             case Step.SEND, BMLError():
-                player.refuse(warning_of(item), time)
+                player.refuse(parse_warning(item), time)
     hear(player, played, now, math.inf, punctual)
     for id, schedule in played.schedules.items():
         played.schedules[id] = player.latest(schedule)

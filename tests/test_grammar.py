@@ -23,8 +23,9 @@ from bml_schema import (
     write,
 )
 from realizer.animation.fap.conversion import to_fap
-from realizer.pipeline import submitted
+from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
+from realizer.playback.speaking import submit_with_speech
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import STRETCH
@@ -54,7 +55,7 @@ SOUND = """<bml id="b"><head id="n" lexeme="NOD"/><wait id="w" start="n:end" dur
 
 
 def feedback_of(text: str) -> tuple[Block, Schedule, list[Feedback]]:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     (block,) = read(text)
     assert isinstance(block, Block)
     schedule = player.submit(block, 0.0)
@@ -79,7 +80,7 @@ def test_feedback_that_lacks_a_message_or_tells_it_twice_or_too_late_is_noticed(
 
 def plays(text: str) -> None:
     """Read, submit, play to the end; all that must hold of any valid text."""
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     blocks: list[Block] = []
     schedules: list[Schedule] = []
     told: list[Feedback] = []
@@ -90,7 +91,7 @@ def plays(text: str) -> None:
         assert list(read(write(item), VOCABULARY)) == [item], "written back, it means the same"
         told += run(player, now)
         blocks.append(item)
-        schedules.append(submitted(player, item, SilentVoice(), now))
+        schedules.append(submit_with_speech(player, item, SilentVoice(), now))
         now += APART
     assert blocks
     if not schedules[0].failed and can_be_asked_for(blocks[0], schedules[0]):
@@ -116,7 +117,7 @@ def can_be_asked_for(block: Block, schedule: Schedule) -> bool:
 
     A voice that speaks a text faster shortens some of its parts more than `STRETCH` lets a document ask.
     """
-    for id, say in Player(idle=False).wants(block).items():
+    for id, say in Player(PlayOptions(idle=False)).wants(block).items():
         if id not in schedule.times:
             continue
         spoken = SilentVoice().say(say)
@@ -131,8 +132,8 @@ def stays(block: Block, schedule: Schedule) -> None:
     """A block that is written back with its times is scheduled to the same times."""
     (again,) = read(write(timed(block, schedule.behaviours)), VOCABULARY)
     assert isinstance(again, Block)
-    player = Player(idle=False)
-    second = submitted(player, again, SilentVoice())
+    player = Player(PlayOptions(idle=False))
+    second = submit_with_speech(player, again, SilentVoice())
     assert second.times.keys() == schedule.times.keys()
     for behaviour, times in schedule.times.items():
         assert np.abs(second.times[behaviour] - times).max() < 1e-6

@@ -29,6 +29,7 @@ LAYERS = (
     "realizer.playback",
     "realizer.realization",
     "realizer.pipeline",
+    "realizer.offline",
     "realizer.outputs realizer.charts realizer.checking",
     "realizer.protocol",
     "realizer.server",

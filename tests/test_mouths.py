@@ -13,7 +13,7 @@ from realizer.animation.lips.visemes import coarticulation
 from realizer.animation.pose import poses
 from realizer.core.array_types import Float64
 from realizer.face.load import load_face
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.speech.utterance import Phoneme, Say, Utterance, Word
 from tests.mouths import Mouth
 

@@ -11,9 +11,9 @@ from typing import Any
 
 from realizer.batch.task import Options, Task, fingerprint
 from realizer.core.errors import RealizerError, VoiceError
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.pipeline import realize
 from realizer.realization import Realization
 from realizer.render import Renderer
 from realizer.speech.utterance import Say, Utterance, Voice

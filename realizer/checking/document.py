@@ -12,8 +12,9 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.checking.explain import finding_of
 from realizer.checking.finding import Finding
 from realizer.checking.masked_faults import hidden, told_of, without_faults
-from realizer.pipeline import speak, submitted, warning_of
+from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
+from realizer.playback.speaking import submit_with_speech, synthesize
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
@@ -47,13 +48,13 @@ def checked(file: str, source: Source, text: bytes | str, player: Player) -> Ite
     items = list(read(text, VOCABULARY))
     for item, whole in zip(items, without_faults(source, items), strict=True):
         if isinstance(item, Block):
-            said = speak(player.wants(item), voice)
+            said = synthesize(player.wants(item), voice)
             schedule, warnings = examine(item, player, said)
             if whole is not None:
                 warnings += hidden(item, whole, player, replace(player.world, utterances=dict(said)))
             yield Checked(_explained(file, source, warnings), item, schedule, said)
         else:
-            yield Checked(_explained(file, source, [warning_of(item)]))
+            yield Checked(_explained(file, source, [parse_warning(item)]))
 
 
 def _explained(file: str, source: Source, warnings: list[Warning]) -> tuple[Finding, ...]:
@@ -78,7 +79,7 @@ def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tupl
             bad.add(node.id)
     # Reported faults must not end the block before its constraints are checked.
     whole = replace(block, problems=(), children=tuple(_loosened(block, bad)))
-    schedule = submitted(player, whole, SilentVoice())
+    schedule = submit_with_speech(player, whole, SilentVoice())
     told = {(warning.id, warning.text) for warning in warnings}
     return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in told]
 

@@ -13,6 +13,7 @@ import click
 from realizer.cli import options
 from realizer.cli.enrich import language, languages_in, mood, role, tell_unknown, words, words_for
 from realizer.cli.timeline import advice_on, faults_in, is_timeline
+from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -86,11 +87,13 @@ def check(
             continue
         # A player a file: what one document says must not colour the next one's report.
         player = Player(
-            scene=options.read_scene(scene),
-            idle=False,
-            media=chosen.media,
-            expressions=chosen.expressions,
-            language=lists.language,
+            PlayOptions(
+                scene=options.read_scene(scene),
+                idle=False,
+                media=chosen.media,
+                expressions=chosen.expressions,
+                language=lists.language,
+            )
         )
         source = Source(text)
         blocks = found = 0

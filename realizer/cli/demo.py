@@ -39,9 +39,9 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
     """All examples one after the other into demo.fap and demo.mp4."""
     from realizer.cli.options import tell_silence
     from realizer.core.errors import RealizerError
+    from realizer.offline import realize
     from realizer.outputs.output import Drawing
     from realizer.outputs.registry import output_for
-    from realizer.pipeline import realize
 
     appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
     realization = realize(appended, face=face, voice=voice)

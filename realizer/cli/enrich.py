@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
+from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
     from bml_schema import Block
@@ -255,11 +256,11 @@ def _heard(block: Block, language: str) -> list[Heard]:
     from bml_schema import Speech
     from realizer.knowledge.enrich import Heard
     from realizer.knowledge.word_languages import language_of
-    from realizer.pipeline import submitted
     from realizer.playback.player import Player
+    from realizer.playback.speaking import submit_with_speech
     from realizer.speech.silent import SilentVoice
 
-    times = submitted(Player(language=language), block, SilentVoice()).times
+    times = submit_with_speech(Player(PlayOptions(language=language)), block, SilentVoice()).times
     said = [
         Heard(str(node.text), float(times[node.id][0]), language_of(node, block, language))
         for node in block.behaviours

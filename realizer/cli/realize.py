@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
+from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -153,7 +154,7 @@ def perform(
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)
     # What planning needs is imported while the drawing process gets ready.
-    from realizer.pipeline import realize as run
+    from realizer.offline import realize as run
 
     realization = run(
         texts,
@@ -230,7 +231,7 @@ def schedule(
     A plot has a row for each behaviour: its sync points, its gaps coloured by how far they are from the
     length they would like, what ties them, how much room before and after leave, and what was dropped.
     """
-    from realizer.pipeline import play
+    from realizer.pipeline import plan
     from realizer.playback.player import Player
 
     if as_json and as_bml:
@@ -241,14 +242,16 @@ def schedule(
         _check_plot(plot)
     chosen = options.settings(voice=voice, scene=scene, media=media, expressions=expressions)
     player = Player(
-        scene=options.read_scene(chosen.scene),
-        idle=False,
-        language=chosen.language,
-        media=chosen.media,
-        expressions=chosen.expressions,
+        PlayOptions(
+            scene=options.read_scene(chosen.scene),
+            idle=False,
+            language=chosen.language,
+            media=chosen.media,
+            expressions=chosen.expressions,
+        )
     )
     texts = options.read_documents(documents)
-    accepted, refused = play(texts, player, chosen.voice)
+    accepted, refused = plan(texts, player, chosen.voice)
     schedules = [_moved(player, planned) for planned in accepted]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
         options.tell_silence(chosen.voice)

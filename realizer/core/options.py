@@ -46,3 +46,6 @@ class PlayOptions:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fps) and self.fps > 0):
             raise ValueError(f"fps: wanted a number above 0, got {self.fps}")
+
+
+DEFAULTS = PlayOptions()

@@ -35,6 +35,8 @@ class Drawing:
 
         Close it where not all of them are taken.
         """
+        from realizer.pipeline import pictures
+
         faces = realization.faces
         ends = [*(first for first, _ in faces[1:]), realization.frames]
         with ExitStack() as stack:
@@ -47,7 +49,7 @@ class Drawing:
                     renderers[part.face_name] = stack.enter_context(
                         self.renderer(realization, size, face=part.face_name)
                     )
-                yield from renderers[part.face_name].frames(part.poses[rows])
+                yield from pictures(part, renderers[part.face_name], rows)
 
     def renderer(
         self,

@@ -65,19 +65,14 @@ def plan(
     work = _Work(block, kinds, world)
     try:
         work.take_problems()
-        work.check()
+        work.time()
         schedule, *moved = work.schedule(start, outside, tuple(held), others)
     except _Bends as bends:
         return Plan(block, Schedule(block.id, {}, {}, start=start, lengths=bends.lengths))
     except _Failed as failed:
         warning = replace(failed.warning, id=block.id)
         return Plan(block, Schedule(block.id, {}, {}, start=start, warnings=(warning,), failed=True))
-    channels = {
-        node.id: kinds[node.tag].expand(node, schedule.times[node.id], world)
-        for node in work.block.behaviours
-        if node.id in schedule.times
-    }
-    return Plan(work.block, schedule, channels, work.claims, work.timings, moved)
+    return Plan(work.block, schedule, work.expand(schedule), work.claims, work.timings, moved)
 
 
 class _Failed(Exception):
@@ -115,8 +110,8 @@ class _Work:
                 raise _Failed(warning)
             self.warnings.append(warning)
 
-    def check(self) -> None:
-        """What the behaviours' kinds have against them, and what the others want of time."""
+    def time(self) -> None:
+        """Step 2: what the behaviours' kinds have against them, and what the others want of time."""
         gone: list[tuple[str, Warning]] = []
         world, utterances = self.world, self.world.utterances
         for node in self.block.behaviours:
@@ -144,7 +139,7 @@ class _Work:
         held: Sequence[Claim],
         others: Sequence[Member],
     ) -> list[Schedule]:
-        """The times of what can be had together, and of the others; solved again without what cannot."""
+        """Step 3: the times of what fits together, and of the others; solved again without what does not."""
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
             own = Member(self.block, self.timings, priorities=priorities)
@@ -165,6 +160,14 @@ class _Work:
                 return [found, *moved]
             losers = ((loss.claim.behaviour, str(loss)) for loss in lost)
             self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, said)) for id, said in losers)
+
+    def expand(self, schedule: Schedule) -> dict[str, tuple[Channel, ...]]:
+        """Step 4: what the scheduled behaviours show, in seconds from block start."""
+        return {
+            node.id: self.kinds[node.tag].expand(node, schedule.times[node.id], self.world)
+            for node in self.block.behaviours
+            if node.id in schedule.times
+        }
 
     def try_bending(
         self,

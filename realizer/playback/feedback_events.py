@@ -10,6 +10,7 @@ from bml_schema import (
     Block,
     BlockPrediction,
     BlockProgress,
+    BMLError,
     Feedback,
     PredictionFeedback,
     SyncPointProgress,
@@ -55,6 +56,11 @@ class Event(NamedTuple):
 
 # A NamedTuple is made in a third of the time without its own `__new__`, which is Python.
 made = tuple.__new__
+
+
+def parse_warning(error: BMLError) -> Warning:
+    """Return the BML warning of a document that gave no block."""
+    return Warning(error.block or "<no id>", "PARSING_FAILURE", str(error))
 
 
 def acknowledgement(block: Block, start: float) -> PredictionFeedback:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends,
 from realizer.behaviours.kind import Kind, Position, World
 from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64
+from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
 from realizer.playback.active_block import Speaking
 from realizer.playback.block_manager import Ensemble
@@ -43,17 +43,10 @@ class Player:
     """The blocks of one session and what they show.
 
     Args:
+        options: how documents are played. The face, its mapping and the rate are for those who draw.
         kinds: tag -> Kind, what behaviours there are.
-        scene: target name -> (x, y, z) metres; None while no scene was declared.
-        seed: for idle motion and anything else random.
-        idle: blinks and small head motion between and under the behaviours.
-        language: BCP-47 of speech that does not name its own.
-        media: the folder of the files that documents may name; None: they may name none.
         clips: id -> sound that documents may name as `clip:ID`; it may change while the player plays.
-        expressions: a folder of expressions of the user's own, before those that ship; None: there are none.
         history: seconds before the last `due` for which frames can still be asked for.
-        cooccurrence: which AUs a face can show together: "on" (the rules that ship), "off", or a file.
-        prosody: nods, brows, blinks and looks that go with what is said; part of what is idle.
         takes: index of a character -> what moves its face (`Face.takes`); None: that is not known.
         refuses: (block, what was planned) -> why it is not to be played; None where it is.
 
@@ -63,36 +56,28 @@ class Player:
 
     def __init__(
         self,
+        options: PlayOptions = DEFAULTS,
         *,
         kinds: Mapping[str, Kind] = KINDS,
-        scene: Mapping[str, Position] | None = None,
-        seed: int = 0,
-        idle: bool = True,
-        language: str = "en-US",
-        media: Path | None = None,
         clips: Mapping[str, Recording] | None = None,
-        expressions: Path | None = None,
         history: float = HISTORY,
-        cooccurrence: str = "on",
-        prosody: bool = True,
         takes: Callable[[int], Sequence[str]] | None = None,
         refuses: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
         self.kinds = kinds
         self._takes = takes
-        library = library_of(expressions)
         self.world = World(
-            scene=scene,
-            seed=seed,
-            language=language,
-            media=media,
+            scene=options.scene,
+            seed=options.seed,
+            language=options.language,
+            media=options.media,
             clips={} if clips is None else clips,
-            library=library,
+            library=library_of(options.expressions),
         )
-        self.idle = idle
-        self.prosody = prosody
+        self.idle = options.idle
+        self.prosody = options.prosody
         self.history = history
-        self.rules = chosen(cooccurrence)
+        self.rules = chosen(options.cooccurrence)
         self._characters: list[Character] = [Character(None)]
         self._blocks = Ensemble(kinds, self._characters, refuses)
 
@@ -284,11 +269,16 @@ class Player:
         times = np.asarray(times, np.float64)
         if not len(times):
             return blend([], times, self.rules)
-        channels, idle = self._moving(float(times[0]), float(times[-1]), character)
+        channels, idle = self.motion(times, character)
         return blend(channels, times, self.rules, idle)
 
-    def _moving(self, first: float, last: float, character: int) -> tuple[list[Channel], Idle | None]:
-        """All that moves a face between two times, and perhaps some more."""
+    def motion(self, times: Float64, character: int = 0) -> tuple[list[Channel], Idle | None]:
+        """All that moves a face at these times, and perhaps some more.
+
+        Args:
+            times: as `frames`, at least one.
+        """
+        first, last = float(times[0]), float(times[-1])
         blocks = self._blocks.cast.of(character)
         own = self._characters[character].channels()
         channels = [c for p in blocks for c in p.moving()] + own
@@ -341,7 +331,7 @@ class Player:
 
     def _face_state(self, now: float, character: int) -> dict[str, Any]:
         times = np.array([now])
-        channels, idle = self._moving(now, now, character)
+        channels, idle = self.motion(times, character)
         fap_names = list(axis())[len(AU_NAMES()) : len(AU_NAMES()) + 68]
         layers = {}
         for layer in Layer:

@@ -23,7 +23,8 @@ from realizer.charts.chart_data import lines_of
 from realizer.charts.picture import timeline
 from realizer.charts.raster import png
 from realizer.charts.svg import svg
-from realizer.pipeline import play
+from realizer.core.options import PlayOptions
+from realizer.pipeline import plan
 from realizer.playback.player import Player
 from realizer.server.streams.schedule_stream import Plans
 
@@ -37,8 +38,8 @@ def faces(count: int) -> str:
 
 
 def stream(count: int) -> None:
-    player = Player(idle=False)
-    play([f'<bml id="b{i}"><head id="n" lexeme="NOD" start="1"/></bml>' for i in range(count)], player)
+    player = Player(PlayOptions(idle=False))
+    plan([f'<bml id="b{i}"><head id="n" lexeme="NOD" start="1"/></bml>' for i in range(count)], player)
     known = Plans(player.cast)
     known.changes()
     quiet = median(known.have_changed, 30)
@@ -47,8 +48,8 @@ def stream(count: int) -> None:
 
 
 def picture(count: int) -> None:
-    player = Player(idle=False)
-    schedules, _ = play([faces(count)], player)
+    player = Player(PlayOptions(idle=False))
+    schedules, _ = plan([faces(count)], player)
     blocks = lines_of(player.cast, schedules)
     drawn = timeline(blocks)
     few = 20 if count < 100 else 3

@@ -30,7 +30,8 @@ from realizer.charts.diverging_scale import FAINT, INK, PAPER
 from realizer.charts.shapes import Box, Picture, Text
 from realizer.charts.write_chart import writer_for
 from realizer.core.array_types import Float64
-from realizer.pipeline import play
+from realizer.core.options import PlayOptions
+from realizer.pipeline import plan
 from realizer.playback.player import Player
 
 FPS = 25
@@ -81,8 +82,8 @@ def block(count: int, seconds: float = SECONDS) -> str:
 
 
 def player(text: str) -> Player:
-    made = Player(scene={"cup": (0.2, -0.1, 0.5)})
-    play([text], made, "silent")
+    made = Player(PlayOptions(scene={"cup": (0.2, -0.1, 0.5)}))
+    plan([text], made, "silent")
     return made
 
 

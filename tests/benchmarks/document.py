@@ -29,6 +29,7 @@ from stopwatch import helped
 
 from bml_schema import Block, read
 from realizer.behaviours.registry import KINDS, VOCABULARY
+from realizer.core.options import PlayOptions
 from realizer.playback.block_planner import plan
 from realizer.playback.player import Player
 from realizer.server.session.feedback_log import FeedbackLog
@@ -82,7 +83,7 @@ class Costs:
 
 def play(count: int) -> tuple[Costs, int]:
     """What documents of a size cost, and how many messages tell of one."""
-    player, log, costs = Player(scene=SCENE), FeedbackLog(epoch=1e9), Costs()
+    player, log, costs = Player(PlayOptions(scene=SCENE)), FeedbackLog(epoch=1e9), Costs()
     now, told = 0.0, 0
     gc.collect()
     gc.disable()  # a service looks for cycles seldom, and not while it plans

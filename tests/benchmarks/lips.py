@@ -17,7 +17,7 @@ import numpy as np
 from realizer.animation.lips.visemes import coarticulation
 from realizer.animation.pose import poses
 from realizer.face.load import load_face
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.speech.registry import find_voice
 from realizer.speech.utterance import Say, Utterance, Voice
 from tests.mouths import Mouth

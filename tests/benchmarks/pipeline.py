@@ -17,6 +17,7 @@ from stopwatch import helped, measure, noise
 from bml_schema import parse
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
+from realizer.core.options import PlayOptions
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.playback.player import Player
@@ -51,7 +52,7 @@ def main() -> None:
         return median
 
     row("parse, 20 behaviours", lambda: parse(text, VOCABULARY))
-    row("plan (timing, schedule, expand), 20", lambda: Player(idle=False).submit(block, 0.0))
+    row("plan (timing, schedule, expand), 20", lambda: Player(PlayOptions(idle=False)).submit(block, 0.0))
     player = Player()
     player.submit(block, 0.0)
     times = np.arange(250) / 25

@@ -33,6 +33,7 @@ from plot import exponent
 from stopwatch import helped, noise
 
 from bml_schema import MOST_BEHAVIOURS, Block, parse
+from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.scheduling import Timing, schedule_block
 
@@ -194,7 +195,7 @@ def faces(id: str, tied: str = "") -> Block:
 
 def session() -> tuple[Spent, Spent]:
     """To submit one block: around the 20th of a session and around the 2,000th."""
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     runs: list[Spent] = []
     for k in range(2041):
         one, now = faces(f"b{k}"), 4.0 * k
@@ -207,7 +208,7 @@ def added(chained: bool) -> Spent:
     """To submit a block that is tied to one of 50 that play, which are tied to each other or not."""
     runs: list[Spent] = []
     for _ in range(15):
-        player = Player(idle=False)
+        player = Player(PlayOptions(idle=False))
         for k in range(50):
             player.submit(faces(f"b{k}", f'start="b{k - 1}:f0:start + 0.05"' if chained and k else ""), 0.0)
         player.due(0.1)

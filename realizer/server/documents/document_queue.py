@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from bml_schema import Block, BMLError, BMLSizeError, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings, raises
-from realizer.pipeline import as_it_is, warning_of, warped
+from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
+from realizer.playback.speaking import stretch_to_fit, without_stretch
 from realizer.scheduling.timing import Warning
 from realizer.server.documents.limits import beyond, too_large
 from realizer.server.documents.pending_blocks import Preparation, Waiting
@@ -82,7 +83,7 @@ class Inbox:
                 stopped = number <= max(self._all_stopped, self._stopped.get(item.id, 0))
                 return Stopped(item) if stopped else item
             if item is not None:
-                refused = warning_of(item)
+                refused = parse_warning(item)
                 if isinstance(item, BMLSizeError):  # of behaviours: the bytes were counted before
                     refused = replace(refused, text=f"{refused.text} {raises('max_behaviours')}")
                 return refused
@@ -191,7 +192,7 @@ class Intake:
             schedule = self._player.submit(waiting.block, t, waiting.utterances)
             if schedule.lengths and waiting.final:
                 # Time has passed while the voice spoke, and it never comes exactly: what is left is little.
-                waiting.utterances = warped(waiting.utterances, schedule.lengths)
+                waiting.utterances = stretch_to_fit(waiting.utterances, schedule.lengths)
                 schedule = self._player.submit(waiting.block, t, waiting.utterances)
         except Exception:
             self.preparation.remove([waiting])
@@ -214,7 +215,7 @@ class Intake:
         wants = self._player.wants(waiting.block)
         again = {b: wants[b] for b in self.orders.unfinished(waiting)}
         again |= {b: replace(wants[b], seconds=times["end"]) for b, times in lengths.items()}
-        waiting.utterances = {b: as_it_is(u) for b, u in waiting.utterances.items()}
+        waiting.utterances = {b: without_stretch(u) for b, u in waiting.utterances.items()}
         waiting.since, waiting.final = t, True
         self._speak(waiting, again)
 

@@ -8,6 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError
+from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def faults(text: str, settings: Settings) -> str:
         return json.dumps({"faults": [], "skipped": said})
     source = Source(text)
     found: list[Finding] = []
-    player = Player(idle=False, media=settings.media, expressions=settings.expressions)
+    player = Player(PlayOptions(idle=False, media=settings.media, expressions=settings.expressions))
     for part in checked("document", source, text, player):
         found += part.findings
         if part.block is not None and part.schedule is not None:

@@ -96,16 +96,9 @@ class Session:
         self.faces = Faces(settings)
         self.clips = Clips()
         self.player = Player(
+            settings.play_options(scene),
             kinds=KINDS,
-            scene=scene,
-            seed=settings.seed,
-            idle=settings.idle,
-            language=settings.language,
-            media=settings.media,
             clips=self.clips.recordings,
-            expressions=settings.expressions,
-            cooccurrence=settings.cooccurrence,
-            prosody=settings.prosody,
             takes=lambda index: self.faces.of(index).takes,
             refuses=lambda block, schedule: too_long(block, schedule, settings),
         )

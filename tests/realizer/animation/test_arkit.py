@@ -8,7 +8,7 @@ import pytest
 from realizer.animation.arkit import ARKIT_NAMES, arkit, arkit_faps
 from realizer.animation.axis import AU_NAMES, axis, fap
 from realizer.animation.frames import AUFrames
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.tables import faps
 
 SAYS = "Hello my beautiful world, four blue boats have a very good view of the sea."

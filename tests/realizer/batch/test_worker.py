@@ -13,9 +13,9 @@ import pytest
 
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Worker, perform
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.pipeline import realize
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.realization import Realization
 from realizer.speech.silent import SilentVoice
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import templates
 

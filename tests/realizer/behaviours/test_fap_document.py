@@ -10,7 +10,7 @@ import pytest
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours.fap_document import document_of
 from realizer.core.errors import RealizerError
-from realizer.pipeline import realize
+from realizer.offline import realize
 
 
 def clip(values: np.ndarray, *used: int, fps: float = 25) -> FAPClip:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from realizer.animation.fap.fap_clip import FAPClip
+from realizer.offline import realize
 from realizer.outputs.fap_text import encode
-from realizer.pipeline import realize
 
 AT = 'start="0" attackPeak="0.5" relax="1.5" end="2"'
 

@@ -8,15 +8,16 @@ import pytest
 
 from realizer.charts.chart_data import lines_of
 from realizer.charts.timeline import BlockLine
-from realizer.pipeline import play
+from realizer.core.options import PlayOptions
+from realizer.pipeline import plan
 from realizer.playback.player import Player
 
 
 @pytest.fixture
 def lines() -> Callable[..., list[BlockLine]]:
     def of(*documents: str) -> list[BlockLine]:
-        player = Player(idle=False)
-        schedules, _ = play(documents, player, "silent")
+        player = Player(PlayOptions(idle=False))
+        schedules, _ = plan(documents, player, "silent")
         return lines_of(player.cast, schedules)
 
     return of

@@ -10,6 +10,7 @@ import pytest
 from bml_schema import parse
 from realizer.behaviours.registry import VOCABULARY
 from realizer.charts.chart_data import lines_of
+from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 
 TALK = """<bml id="b">
@@ -45,7 +46,7 @@ def test_gaps_say_how_far_they_are_from_what_they_would_like(lines) -> None:
 
 
 def test_the_costs_of_gaps_add_up_to_what_the_scheduler_paid() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     block = parse('<bml id="b"><head id="n" lexeme="NOD" start="0" end="4"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
     assert schedule.cost > 0
@@ -117,7 +118,7 @@ def test_what_was_ended_before_it_began_is_told_as_cut_off(lines) -> None:
 
 
 def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is_revoked() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     preplan = 'xmlns:bmla="http://www.asap-project.org/bmla" bmla:preplan="true"'
     block = parse(f'<bml id="a" {preplan}><head id="n" lexeme="NOD"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
@@ -128,7 +129,7 @@ def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is
 
 
 def test_a_behaviour_that_is_cut_off_keeps_what_has_passed() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     block = parse('<bml id="b"><gaze id="g" target="x" start="0" end="4"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
     player.due(2.0)

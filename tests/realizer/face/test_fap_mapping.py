@@ -13,7 +13,7 @@ from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import folder_of, takes
 from realizer.facebuild.check import check_face
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.server.session.session import Session
 
 

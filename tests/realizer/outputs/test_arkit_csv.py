@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS, output_for
-from realizer.pipeline import realize
 
 SAYS = "Hello my beautiful world, four blue boats have a very good view of the sea."
 SPEECH = (

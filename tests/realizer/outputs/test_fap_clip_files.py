@@ -13,10 +13,10 @@ from hypothesis.extra.numpy import arrays
 
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
+from realizer.offline import realize
 from realizer.outputs.csv_table import encode_csv
 from realizer.outputs.fap_clip_files import ENCODINGS, limited, read_clip
 from realizer.outputs.json_text import encode_json
-from realizer.pipeline import realize
 from realizer.tables import faps
 
 

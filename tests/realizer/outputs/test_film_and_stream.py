@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.pipeline import realize
 from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Draw, Speak
 from tests.realizer.server.conftest import Driver

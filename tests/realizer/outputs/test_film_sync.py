@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer.offline import realize
 from realizer.outputs.film import FORMATS, RATE, write_film
 from realizer.outputs.output import Drawing
-from realizer.pipeline import realize
 
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")
 

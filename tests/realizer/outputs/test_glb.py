@@ -14,11 +14,11 @@ from realizer.face.deform import deform
 from realizer.face.glb import to_glb
 from realizer.face.load import load_face
 from realizer.facebuild.arkit.gltf import Gltf
+from realizer.offline import realize
 from realizer.outputs.glb import encode_glb
 from realizer.outputs.morph_targets import TRUE, morphs
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.pipeline import realize
 
 FPS = 12.5
 EYES = ("left_eye", "right_eye")

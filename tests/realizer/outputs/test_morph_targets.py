@@ -8,8 +8,8 @@ import pytest
 from realizer.animation.axis import fap
 from realizer.face.deform import deform
 from realizer.face.load import load_face
+from realizer.offline import realize
 from realizer.outputs.morph_targets import TRUE, morphs
-from realizer.pipeline import realize
 
 
 @pytest.fixture(scope="module", params=["mpeg4", "au"])

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS, output_for
-from realizer.pipeline import realize
 from realizer.tables.arkit_names import shapes
 
 READERS = Path(__file__).parent / "readers"

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import pytest
 
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.pipeline import realize
 from realizer.speech.utterance import Word
 
 textgrid = pytest.importorskip("praatio.textgrid", reason="pip install praatio")

@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 from realizer.animation.arkit import arkit
 from realizer.animation.axis import axis
 from realizer.animation.frames import AUFrames
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.vrma import encode_vrma, expressions
-from realizer.pipeline import realize
 from realizer.tables.lexemes import face_lexemes
 
 PRESETS = {"aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "angry", "sad", "surprised"}

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.pipeline import realize
 
 webvtt = pytest.importorskip("webvtt", reason="pip install webvtt-py")
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.webp import encode_webp
-from realizer.pipeline import realize
 
 
 def pictures(count, size=(61, 80)):

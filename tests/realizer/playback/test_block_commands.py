@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bml_schema import parse
-from realizer.pipeline import realize
+from realizer.core.options import PlayOptions
+from realizer.offline import realize
 from realizer.playback.audio_mix import heard
 from realizer.playback.player import Player
 from realizer.realization import Realization
@@ -145,7 +146,7 @@ def test_the_volume_of_a_speech_falls() -> None:
 
     voice = find_voice("espeak")
     try:
-        player = Player(idle=False, history=float("inf"))
+        player = Player(PlayOptions(idle=False), history=float("inf"))
         quiet = change("volume", 'type="linear" targetValue="0"', 'start="0.5" end="1"')
         for text in ('<speech id="s"><text>one two three four five six</text></speech>', quiet):
             name = "a" if "speech" in text else "b"

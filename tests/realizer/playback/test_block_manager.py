@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse
+from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
 from realizer.speech.silent import SilentVoice
@@ -19,7 +20,7 @@ class Stage:
     """A player and the log of what it told: "a:start 0.0", "a IN_PREP 0.0-", "! a:b TYPE"."""
 
     def __init__(self) -> None:
-        self.player = Player(idle=False)
+        self.player = Player(PlayOptions(idle=False))
         self.log: list[str] = []
         self.texts: list[str] = []
         self.now = 0.0

@@ -7,7 +7,7 @@ import pytest
 from bml_schema import parse
 from realizer.behaviours.kind import World
 from realizer.behaviours.registry import KINDS, VOCABULARY
-from realizer.pipeline import realize
+from realizer.offline import realize
 from realizer.playback.block_planner import Plan, plan
 from realizer.speech.silent import SilentVoice
 

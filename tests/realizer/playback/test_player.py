@@ -17,6 +17,7 @@ from bml_schema.feedback import (
 )
 from realizer.animation.axis import AU_NAMES
 from realizer.behaviours.registry import VOCABULARY
+from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.speech.silent import SilentVoice
 
@@ -141,7 +142,7 @@ def test_an_id_that_still_plays_is_refused_with_one_warning() -> None:
 
 
 def test_stop_ends_a_block_without_a_jump_of_the_face() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     submit(player, SMILE)
     player.due(1.0)
     before = au(player, "12L", 1.0)[0]
@@ -156,7 +157,7 @@ def test_stop_ends_a_block_without_a_jump_of_the_face() -> None:
 
 
 def test_a_nod_lands_on_its_word() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     made = block(
         '<speech id="say"><text>Yes I <sync id="really"/>really do</text></speech>'
         '<head id="nod" lexeme="NOD" stroke="say:really"/>'
@@ -168,7 +169,7 @@ def test_a_nod_lands_on_its_word() -> None:
 
 
 def test_a_shift_stays_and_the_next_shift_takes_it_over() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     shift = '<faceShift id="{}" start="0" end="1"><faceLexeme lexeme="SMILE" amount="{}"/></faceShift>'
     submit(player, shift.format("f", 0.6), "one")
     player.due(5.0)
@@ -181,7 +182,7 @@ def test_a_shift_stays_and_the_next_shift_takes_it_over() -> None:
 
 
 def test_the_first_name_heard_is_the_first_characters_and_others_stand_beside() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     submit(player, SMILE, "a", 'characterId="Ann"')
     submit(player, SMILE, "b", 'characterId="Bob" composition="APPEND"')
     assert player.characters == ["Ann", "Bob"]
@@ -217,7 +218,7 @@ def test_a_dropped_behaviour_does_not_hold_up_the_end() -> None:
 
 
 def test_directly_set_values_hold_until_let_go() -> None:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     player.set_direct({"12L": 0.8}, now=1.0)
     assert au(player, "12L", 1.0, 5.0) == pytest.approx([0, 0.8])
     player.set_direct({"12L": None}, now=6.0)
@@ -237,7 +238,7 @@ def test_a_long_session_forgets_what_is_past() -> None:
 
 @given(st.integers(0, 2**31), st.floats(0, 200))
 def test_frames_at_25_fps_are_every_second_of_50(seed: int, start: float) -> None:
-    player = Player(seed=seed)
+    player = Player(PlayOptions(seed=seed))
     submit(player, SMILE, now=start)
     slow = player.frames(start + np.arange(40) / 25)
     fast = player.frames(start + np.arange(80) / 50)
@@ -264,7 +265,11 @@ TALK = f'<speech id="t"><text>{WORDS}</text></speech>'
 def test_without_prosody_a_face_that_speaks_is_as_idle_as_one_that_is_silent() -> None:
     times = np.arange(0.0, 8.0, 0.04)
     own = np.array([name in OWN for name in AU_NAMES()])
-    silent, still, lively = Player(seed=4), Player(seed=4, prosody=False), Player(seed=4)
+    silent, still, lively = (
+        Player(PlayOptions(seed=4)),
+        Player(PlayOptions(seed=4, prosody=False)),
+        Player(PlayOptions(seed=4)),
+    )
     submit(still, TALK)
     submit(lively, TALK)
     np.testing.assert_array_equal(still.frames(times).aus[:, own], silent.frames(times).aus[:, own])
@@ -273,7 +278,7 @@ def test_without_prosody_a_face_that_speaks_is_as_idle_as_one_that_is_silent() -
 
 def test_without_idle_motion_there_is_no_prosody() -> None:
     times = np.arange(0.0, 8.0, 0.04)
-    one, other = Player(idle=False), Player(idle=False, prosody=False)
+    one, other = Player(PlayOptions(idle=False)), Player(PlayOptions(idle=False, prosody=False))
     submit(one, TALK)
     submit(other, TALK)
     np.testing.assert_array_equal(one.frames(times).values, other.frames(times).values)
@@ -291,7 +296,7 @@ def test_a_face_that_keeps_still_does_so_while_it_speaks() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_a_nod_that_a_document_asks_for_is_the_same_while_the_face_speaks(seed: int) -> None:
     nod = '<head id="n" lexeme="NOD" start="1.5" end="3"/>'
-    lively, still = Player(seed=seed), Player(seed=seed, prosody=False)
+    lively, still = Player(PlayOptions(seed=seed)), Player(PlayOptions(seed=seed, prosody=False))
     for player in (lively, still):
         submit(player, TALK + nod)
     heads = [AU_NAMES().index(str(number)) for number in range(51, 57)]
@@ -306,7 +311,7 @@ def test_a_face_that_is_looked_at_as_it_speaks_moves_as_one_that_is_played_back(
     seed: int, starts: list[float], nod: float
 ) -> None:
     """Blocks that have ended are forgotten by and by; what was shown and what comes stay what they are."""
-    live, played = Player(seed=seed), Player(seed=seed, history=float("inf"))
+    live, played = Player(PlayOptions(seed=seed)), Player(PlayOptions(seed=seed), history=float("inf"))
     todo = sorted([(start, TALK) for start in starts] + [(nod, '<head id="n" lexeme="NOD"/>')])
     own = [AU_NAMES().index(name) for name in OWN]
     seen = []

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bml_schema import Block, PredictionFeedback, SyncPointProgress, parse
+from realizer.core.options import PlayOptions
 from realizer.playback.block_manager import ANTICIPATORS
 from realizer.playback.player import Player
 from realizer.playback.replanning import touched
@@ -15,7 +16,7 @@ from realizer.speech.utterance import Phoneme, Utterance
 
 class Stage:
     def __init__(self) -> None:
-        self.player = Player(idle=False, history=float("inf"))
+        self.player = Player(PlayOptions(idle=False), history=float("inf"))
         self.told: list[SyncPointProgress] = []
         self.predicted: list[PredictionFeedback] = []
 

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 import realizer
 from realizer.cli import cli
+from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.deform import deform
 from realizer.face.load import load_face
@@ -118,7 +119,7 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
     from realizer.face.surface import quantise
 
     face = faces["au"]
-    player = Player(idle=True, seed=3)
+    player = Player(PlayOptions(idle=True, seed=3))
     window = Timeline(player, 0, 25, lambda: face).window(0, 20)
     assert window.poses.shape == (window.count, len(face.takes))
     meshes = quantise(face, deform(face, window.poses[:30]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.protocol.wire import unpack
 from realizer.server.streams.connection import FrameSubscription
@@ -17,7 +18,7 @@ FRAMES = 10
 
 
 def run(until: float = float("inf"), following: int = 0) -> tuple[Run, FrameSubscription]:
-    player = Player(idle=False)
+    player = Player(PlayOptions(idle=False))
     timeline = Timeline(player, 0, FPS, lambda: pytest.fail("no face is wanted"))
     subscription = FrameSubscription("fap", "binary", timeline, 0, None, following)
     rows = np.arange(FRAMES * 68, dtype="<i4").reshape(FRAMES, 68)

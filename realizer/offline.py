@@ -1,0 +1,95 @@
+"""Documents played or scheduled without a clock: `realizer.realize` and `realizer.schedule`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from bml_schema import parse
+from realizer import pipeline
+from realizer.behaviours.kind import Position
+from realizer.behaviours.registry import VOCABULARY
+from realizer.core.options import PlayOptions
+from realizer.playback.player import Player
+from realizer.playback.speaking import open_voice, submit_with_speech
+from realizer.realization import Realization
+from realizer.scheduling.timing import Schedule
+from realizer.speech.utterance import Voice
+
+
+def realize(
+    documents: str | bytes | Iterable[str | bytes],
+    *,
+    face: str = "default",
+    deformer: str | None = None,
+    fps: float = 25.0,
+    voice: Voice | str | None = None,
+    scene: Mapping[str, Position] | None = None,
+    seed: int = 0,
+    idle: bool = True,
+    language: str = "en-US",
+    media: Path | None = None,
+    expressions: Path | None = None,
+    cooccurrence: str = "on",
+    prosody: bool = True,
+    mapping: Path | None = None,
+) -> Realization:
+    """Play BML documents from start to end, without a clock.
+
+    Args:
+        documents: BML text, or several texts; all are submitted at t = 0, in order.
+        face: name of a face folder.
+        deformer: what moves it: "mpeg4" (FAPs) or "au" (its model of action units); None is what it says.
+        fps: frames a second.
+        voice: a voice or its name; None takes espeak-ng where it is installed, otherwise the silent voice.
+        scene: target name -> (x, y, z) metres, origin between the eyes.
+        seed: for idle motion; the same seed gives the same frames.
+        idle: blinks and small head motion.
+        language: BCP-47 of speech that does not name its own.
+        media: the folder of the files that documents may name.
+        expressions: a folder of expressions of the user's own, which documents may name.
+        cooccurrence: which AUs a face can show together: "on", "off", or a file of rules.
+        prosody: nods, brows, blinks and looks that go with what is said; none without `idle`.
+        mapping: a file of what AUs ask of FAPs; it goes before what the face says.
+
+    Raises:
+        FaceError: no such face.
+        TableError: a file of rules, a mapping or an expression that cannot be used.
+        ValueError: `fps` is not a number above 0.
+        VoiceError: the named voice is not installed.
+    """
+    options = PlayOptions(
+        face=face,
+        deformer=deformer,
+        fps=fps,
+        scene=scene,
+        seed=seed,
+        idle=idle,
+        language=language,
+        media=media,
+        expressions=expressions,
+        cooccurrence=cooccurrence,
+        prosody=prosody,
+        mapping=mapping,
+    )
+    texts = [documents] if isinstance(documents, str | bytes) else documents
+    return pipeline.play(texts, options, voice)
+
+
+def schedule(
+    document: str | bytes,
+    *,
+    voice: Voice | str | None = None,
+    scene: Mapping[str, Position] | None = None,
+    media: Path | None = None,
+) -> Schedule:
+    """Return the sync times of one BML document: parse, timing, solve; no animation.
+
+    Raises:
+        BMLError: the document gives no block; with line and path.
+        VoiceError: the named voice is not installed.
+    """
+    player = Player(PlayOptions(scene=scene, idle=False, media=media))
+    block = parse(document, VOCABULARY)
+    with open_voice(voice) as speaker:
+        return submit_with_speech(player, block, speaker)

@@ -1,0 +1,89 @@
+"""The speech of blocks: spoken before a block is planned, and again where the plan asks for other lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+
+from bml_schema import Block
+from realizer.core.errors import VoiceError
+from realizer.playback.player import Player
+from realizer.scheduling.timing import Schedule
+from realizer.speech.duration_fit import fitted, stretched, without_sound
+from realizer.speech.utterance import Say, Utterance, Voice
+
+
+def submit_with_speech(player: Player, block: Block, voice: Voice, now: float = 0.0) -> Schedule:
+    """Submit a block with its speech, spoken at other rates where more of the block fits then."""
+    requests = player.wants(block)
+    utterances = synthesize(requests, voice)
+    planned = player.submit(block, now, utterances)
+    if planned.lengths:
+        again = {b: replace(requests[b], seconds=times["end"]) for b, times in planned.lengths.items()}
+        utterances = {b: without_stretch(u) for b, u in utterances.items()} | synthesize(again, voice)
+        planned = player.submit(block, now, utterances)
+    if planned.lengths:
+        planned = player.submit(block, now, stretch_to_fit(utterances, planned.lengths))
+    return planned
+
+
+def synthesize(requests: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
+    """Speak what a block wants; where the voice fails the silent voice takes over, with a warning."""
+    utterances: dict[str, Utterance] = {}
+    for behaviour, request in requests.items():
+        try:
+            utterances[behaviour] = fitted(voice, request)
+        except VoiceError as error:
+            utterances[behaviour] = without_sound(request, error)
+    return utterances
+
+
+def without_stretch(utterance: Utterance) -> Utterance:
+    """Return an utterance that is not to be spoken again."""
+    return replace(utterance, stretch=(1.0, 1.0))
+
+
+def stretch_to_fit(
+    utterances: Mapping[str, Utterance], lengths: Mapping[str, Mapping[str, float]]
+) -> dict[str, Utterance]:
+    """Stretch utterances to the lengths that were planned for them; none is to be spoken again."""
+    return {
+        b: stretched(u, lengths[b]) if b in lengths else without_stretch(u) for b, u in utterances.items()
+    }
+
+
+@contextmanager
+def open_voice(voice: Voice | str | None) -> Iterator[Voice]:
+    """Open a voice by its name and close it afterwards; a voice that is open already stays open."""
+    if voice is not None and not isinstance(voice, str):
+        yield voice
+        return
+    opened = _NamedVoice(voice)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+class _NamedVoice:
+    """The voice of a name; the default one is looked for when something is to be said."""
+
+    def __init__(self, name: str | None) -> None:
+        self.name = name or "default"
+        self._voice = None if name is None else self._find(name)
+
+    def say(self, request: Say) -> Utterance:
+        if self._voice is None:
+            self._voice = self._find(None)
+        return self._voice.say(request)
+
+    def close(self) -> None:
+        if self._voice is not None:
+            self._voice.close()
+
+    @staticmethod
+    def _find(name: str | None) -> Voice:
+        from realizer.speech.registry import find_voice
+
+        return find_voice(name)
