@@ -23,7 +23,6 @@ from bml_schema import (
     CORE,
     EXTENSIONS,
     OWN,
-    VOCABULARY,
     After,
     Before,
     Behaviour,
@@ -34,7 +33,9 @@ from bml_schema import (
     Sync,
     Synchronize,
 )
+from bml_schema import VOCABULARY as LANGUAGE
 from bml_schema.node_schema import Attribute, shape_of
+from realizer.behaviours.registry import VOCABULARY
 from tests.cases import CASES, CORPUS, Case
 
 __all__ = ["FILE", "Rule", "elsewhere", "gaps", "proofs", "render", "rules"]
@@ -88,7 +89,7 @@ def classes() -> Iterator[type[Any]]:
                 for inner in child.classes:
                     yield from within(inner)
 
-    for cls in (*_FRAME, *VOCABULARY.values()):
+    for cls in (*_FRAME, *{**LANGUAGE, **VOCABULARY}.values()):
         yield from within(cls)
 
 

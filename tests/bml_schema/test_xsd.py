@@ -16,7 +16,6 @@ from bml_schema import (
     CORE,
     EXTENSIONS,
     OWN,
-    VOCABULARY,
     After,
     Before,
     Behaviour,
@@ -36,6 +35,8 @@ from bml_schema import (
     write,
 )
 from bml_schema.node_schema import Attribute, shape_of
+from realizer.behaviours.registry import VOCABULARY
+from tests import schema
 from tests.strategies import blocks
 
 XSD = Path(str(files("bml_schema") / "xsd"))
@@ -101,7 +102,9 @@ def facets(attribute: Element) -> dict[str, Any]:
     qname = attribute.get("type", "")
     if qname.startswith("xs:"):
         return {"base": qname}
-    restriction = referred("simpleType", qname).find(XS + "restriction")
+    inner = attribute.find(XS + "simpleType") if not qname else referred("simpleType", qname)
+    assert inner is not None
+    restriction = inner.find(XS + "restriction")
     assert restriction is not None
     told: dict[str, list[str]] = {}
     for facet in restriction:
@@ -148,6 +151,10 @@ def assert_agrees(spec: Attribute, declared: Element) -> None:
 def own_attributes(cls: type[Any]) -> dict[str, Attribute]:
     """The attributes of a class that are its element's own, not of another namespace."""
     return {name: spec for name, spec in shape_of(cls).attributes.items() if not name.startswith("{")}
+
+
+def test_the_schema_of_our_namespace_is_current() -> None:
+    assert schema.FILE.read_text("utf-8") == schema.render(), "run: python -m tests.schema"
 
 
 def test_bmlas_attributes_of_blocks_and_behaviours_are_declared_and_no_others() -> None:
