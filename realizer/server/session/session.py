@@ -1,4 +1,16 @@
-"""One session: documents and control messages in, effects out. No sockets, no clock: it is told `now`."""
+"""One session: documents and control messages in, effects out. No sockets, no clock: it is told `now`.
+
+A document's way from the socket to its schedule:
+
+    transports.websocket.connection  reads the message, no faster than a client may send
+    runtime.session_host             finds the session of the connection
+    Session.receive                  publishes what is due, writes the journal
+    documents.document_queue         keeps the text; parses one document a tick, checks limits, acknowledges
+    documents.pending_blocks         keeps the block until its speech and the blocks before it are there
+    documents.tts_requests           asks voices for its speech, by effects `Speak` that runtime.engines does
+    Session.spoken                   takes the voice's answer; the next tick submits the block
+    playback.player                  resolves, schedules and places it; its feedback comes due by and by
+"""
 
 from __future__ import annotations
 
@@ -41,7 +53,7 @@ from realizer.server.session.wakeup_plan import Rhythm
 from realizer.server.session.welcome import greeting
 from realizer.server.speech.audio_clips import ClipError, Clips
 from realizer.server.streams.broadcast import Broadcast
-from realizer.server.streams.connection import STUCK, Connection
+from realizer.server.streams.connection import SLOW, STUCK, Connection
 from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
@@ -165,7 +177,7 @@ class Session:
     def backlog(self, connection: int, waiting: int) -> None:
         """How many bytes wait to be sent to a client: a slow one loses frames, a stuck one is closed."""
         if (known := self._connections.get(connection)) is not None:
-            known.backlog = waiting
+            known.slow = waiting > SLOW
             if known.slow:
                 self._rhythm.stir()
             if waiting > STUCK:

@@ -88,7 +88,7 @@ class Connection:
     Attributes:
         place: seq of the next feedback to send.
         feedback: which of it; None for none.
-        backlog: bytes that wait to be sent, as the shell told.
+        slow: more than SLOW bytes wait to be sent, as the shell told.
         dropped: frames, pictures and sound packets it did not get because it was slow.
         subscriptions: (stream, character, view) -> what it gets.
     """
@@ -96,10 +96,6 @@ class Connection:
     id: int
     place: int
     feedback: FeedbackFilter | None = field(default_factory=FeedbackFilter)
-    backlog: int = 0
+    slow: bool = False
     dropped: int = 0
     subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
-
-    @property
-    def slow(self) -> bool:
-        return self.backlog > SLOW
