@@ -62,6 +62,17 @@ def test_paths_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
+def test_functions_exist(page: Path) -> None:
+    named = re.findall(r"`([\w/]+\.py)`\s`(\w+)`", page.read_text("utf-8"))
+    missing = [
+        f"{path}: {function}"
+        for path, function in named
+        if not re.search(rf"^(?:def|class) {function}\b", (ROOT / path).read_text("utf-8"), re.MULTILINE)
+    ]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_named_tests_exist(page: Path) -> None:
     # A name may be shortened: `test_a_flood_...` stands for all tests that begin so.
     missing = [test for test in TEST.findall(code(page)) if f"\n{test}" not in f"\n{known_tests()}"]
