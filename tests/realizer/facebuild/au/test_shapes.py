@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.au.units import units
 from realizer.face.load import list_faces, load_face
 from realizer.facebuild.au.measure import read_shapes
 from realizer.facebuild.au.shapes import measure_shapes
@@ -37,18 +36,6 @@ def test_the_stored_shapes_go_where_their_units_names_say(folder: Path) -> None:
         one = measured[au]
         long = np.where(one.seen, np.linalg.norm(one.moves, axis=1), 0)
         assert sign * one.moves[np.argmax(long), 1] > 0.001, f"AU{au}"
-
-
-def test_the_table_of_units_is_hers() -> None:
-    table = units()
-    assert len(table) == 32
-    assert [unit.au for unit in table.values() if unit.kind == "eyes"] == [61, 62, 63, 64]
-    assert [unit.au for unit in table.values() if unit.kind == "head"] == [51, 52, 53, 54, 55, 56]
-    # Her sub-object action units (4.3.2) are all split.
-    assert all(table[au].split for au in (10, 16, 18, 22, 25, 27, 28))
-    for unit in table.values():
-        assert bool(unit.mixture) == (unit.kind == "displacement")
-        assert (np.linalg.norm(unit.axis) == 1) == (unit.kind != "displacement")
 
 
 @pytest.mark.parametrize("folder", SHAPED, ids=lambda folder: folder.name)

@@ -1,0 +1,52 @@
+"""Tests of the files of models of action units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.core.errors import FaceError
+from realizer.face.au.file import read_model, write_model
+from realizer.face.load import list_faces, load_face
+
+FACES = {info.name: info.path for info in list_faces() if (info.path / "au_extended.toml").is_file()}
+
+
+@pytest.mark.parametrize("form", ["published", "extended"])
+@pytest.mark.parametrize("name", FACES)
+def test_a_model_is_the_same_when_read_again(name: str, form: str, tmp_path: Path) -> None:
+    model = read_model(FACES[name] / f"au_{form}.toml")
+    write_model(tmp_path / "model.toml", model)
+    again = read_model(tmp_path / "model.toml")
+    face = load_face()
+    skin = face.vertices[slice(*face.parts["skin"])].astype(np.float64)
+    for au in model.units:
+        assert again.displacement(au, skin) == pytest.approx(model.displacement(au, skin), abs=3e-5)
+    assert again.head.density(skin) == pytest.approx(model.head.density(skin), abs=1e-4)
+    assert again.degrees == model.degrees
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("{ eta = ", "{ height = ", "eta: wanted a number"),
+        ("A1 = [", 'A1 = ["x", ', "A1: wanted a list of 6 numbers"),
+        ("[mouth]", "[maw]", r"wanted a table \[mouth\]"),
+        ("# licence:", "# ", "licence"),
+        ("B = [", "B = [-9e9, ", "B: wanted"),
+        ("[AU12]", "[AUx]", "such as AU12"),
+        ("gaussians = [", "bells = [", "gaussians: wanted a list"),
+        ("tilt = ", "tilt = nan #", "neck.tilt: wanted a number"),
+    ],
+)
+def test_a_broken_model_is_refused_with_its_place(old: str, new: str, words: str, tmp_path: Path) -> None:
+    text = (FACES[load_face().name] / "au_published.toml").read_text()
+    assert old in text
+    path = tmp_path / "broken.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(FaceError, match=words):
+        read_model(path)
+    with pytest.raises(FaceError, match=r"none\.toml"):
+        read_model(tmp_path / "none.toml")
