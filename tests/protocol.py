@@ -60,32 +60,32 @@ REPLIES: dict[str, type[BaseModel]] = {
 # A client that has missed feedback gets a gap before the answer.
 BESIDE = {"hello": ["gap"]}
 BML = (
-    "One or more BML documents, in any text that starts with `<`. A broken stretch is one warning, and "
-    "reading goes on at the next `<bml>`."
+    "One or more BML documents, in any text that starts with `<`. A broken part causes one warning, and "
+    "reading continues at the next `<bml>`."
 )
 FEEDBACK = (
-    "One element of BML 1.0 feedback a message, with an attribute `seq` (1, 2, ...) in the namespace "
-    "urn:bml-realizer:1; a warning that documents could not be kept, or came too late, has none."
+    "One element of BML 1.0 feedback per message, with an attribute `seq` (1, 2, ...) in the namespace "
+    "urn:bml-realizer:1. A warning about documents that could not be saved, or came too late, has no `seq`."
 )
 HEADER = (
     f"Little-endian: u8 kind, u8 version ({VERSION}), u16 flags, u32 frame, f64 time in seconds on the "
-    "session clock; then what the kind says"
+    "session clock; then the data of the kind"
 )
 _FLUSHED = ", ".join(f"`{row.name}`" for row in STREAMS.values() if row.flushes)
 FLAGS = (
     "The low byte of flags is the `index` of `subscribed`; "
-    f"{FORGET:#x} on {_FLUSHED} means: forget everything from this time on."
+    f"{FORGET:#x} on {_FLUSHED} means: discard everything from this time on."
 )
 CLIP = (
-    f"A piece of a sound clip: u8 kind 4, u8 version {VERSION}, u16 flags ({FINAL:#x}: the last piece), u32 "
-    "number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a sound file), u8 "
-    "length of the id, the id, sound. Documents name it `clip:ID`."
+    f"A part of a sound clip: u8 kind 4, u8 version {VERSION}, u16 flags ({FINAL:#x}: the last part), u32 "
+    "number of the part, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the parts are a sound file), u8 "
+    "length of the id, the id, sound. Documents refer to it as `clip:ID`."
 )
 ABOUT = (
-    "BML in; feedback and a living face out. `hello` names the version of the protocol: one that the "
-    "service does not speak is answered by an error with code `version`, and changes nothing."
+    "Clients send BML and receive feedback and a moving face. `hello` names the version of the protocol. If "
+    "the service has another version, it answers with an error with the code `version`, and changes nothing."
 )
-CHANNEL = "One WebSocket is a connection of a session; sessions are joined or made by name."
+CHANNEL = "A WebSocket is a connection to a session. Sessions are joined or created by name."
 
 
 def asyncapi() -> dict[str, Any]:

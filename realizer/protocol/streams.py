@@ -48,17 +48,17 @@ _ROWS = (
     ),
     Stream(
         "au", ("binary", "json"), ("fps", "character", "asked"),
-        kind=2, dtype="<f4", payload="float32, 0..1, as `names` of `subscribed` has them",
+        kind=2, dtype="<f4", payload="float32, 0..1, in the order of `names` in `subscribed`",
     ),
     Stream(
         "arkit", ("binary", "json"), ("fps", "character"),
         kind=6, dtype="<f4",
-        payload="59 float32: ARKit's 52 weights, 0..1, then turns of head and eyes in radians",
+        payload="59 float32: ARKit's 52 weights, 0..1, then rotations of head and eyes in radians",
     ),
     Stream(
         "mesh", ("binary",), ("fps", "character"),
         kind=5, dtype="<i2", width=3,
-        payload="three int16 a vertex; metres = int16 x `scale` + `offset` of `subscribed`",
+        payload="three int16 per vertex; metres = int16 x `scale` + `offset` of `subscribed`",
     ),
     Stream(
         "audio", ("binary",), ("character", "rate"),

@@ -61,7 +61,7 @@ class Welcome(Reply):
 
 
 class Subscribed(Reply):
-    """A stream runs from `frame` on; what its values mean."""
+    """A stream begins at `frame`; the fields describe its values."""
 
     type: Literal["subscribed"] = "subscribed"
     stream: str
@@ -83,7 +83,7 @@ class Subscribed(Reply):
 
 
 class Changed(Reply):
-    """The character of a `mesh` has another face: what its values mean from `frame` on."""
+    """A character of a `mesh` has another face; the fields describe the values from `frame` on."""
 
     type: Literal["changed"] = "changed"
     stream: str
@@ -134,7 +134,7 @@ class VoiceState(Reply):
 
 
 class StateMessage(Reply):
-    """What plays, what waits, which AUs are up and which layers ask for them."""
+    """The blocks that play or wait, and the values of AUs with the layers that they come from."""
 
     type: Literal["state"] = "state"
     session: str
@@ -163,7 +163,7 @@ ErrorCode = Literal[
 
 
 class ErrorMessage(Reply):
-    """Why a control message was not followed. It changes nothing else."""
+    """A control message was refused, for this reason, and has changed nothing."""
 
     type: Literal["error"] = "error"
     code: ErrorCode
@@ -173,7 +173,7 @@ class ErrorMessage(Reply):
 
 
 class Gap(Reply):
-    """Feedback after `seen` is no longer (or was never) there; the next one is `first`."""
+    """Feedback after `seen` is not stored any more (or never was); the next one is `first`."""
 
     type: Literal["gap"] = "gap"
     seen: int
@@ -189,7 +189,7 @@ class Pong(Reply):
 
 
 class FrameMessage(Reply):
-    """One frame of the stream that `type` names, where its encoding is JSON."""
+    """A frame of the stream that `type` names, in the encoding JSON."""
 
     type: NumericStream
     frame: int = Field(description="k: sampled at k / fps of the session clock")
@@ -199,7 +199,7 @@ class FrameMessage(Reply):
 
 
 class ScheduleMessage(Reply):
-    """Blocks as they are planned: first all that play or wait, then those that change."""
+    """The schedules of blocks: first of all that play or wait, then of those that change."""
 
     type: Literal["schedule"]
     time: float = Field(description="seconds on the session clock")

@@ -23,10 +23,10 @@ Numbered = Annotated[int, Field(ge=0), WHOLE]
 
 
 class Hello(Message):
-    """Says who is there; asks for `welcome`, and for the feedback after `seen` of a named session.
+    """Introduce the client. The answers are `welcome` and, of a named session, the feedback after `seen`.
 
-    Another version is answered by an error with code `version`, which names ours, and by nothing else: the
-    connection goes on as it was.
+    If the version is another one, the only answer is an error with the code `version`, which names the
+    version of the service, and nothing else changes.
     """
 
     model_config = ConfigDict(
@@ -43,10 +43,10 @@ class Hello(Message):
 
 
 class Subscribe(Message):
-    """Asks for a stream; answered by `subscribed`. The same stream of the same character is replaced.
+    """Start a stream. The answer is `subscribed`. The same stream of the same character is replaced.
 
-    Any number of streams run side by side, of one character also several videos, each with a `view` of its
-    own. Every connection gets all feedback until it asks for some of it.
+    A connection can have any number of streams, and several videos of one character, each with a `view` of
+    its own. Every connection gets all feedback until it asks for some of it.
     """
 
     model_config = ConfigDict(
@@ -94,7 +94,7 @@ class Subscribe(Message):
 
 
 class Unsubscribe(Message):
-    """Ends a stream."""
+    """End a stream."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "unsubscribe", "stream": "fap"}]})
 
@@ -113,9 +113,9 @@ class Point(Message):
 
 
 class SceneMessage(Message):
-    """Declares where targets are; null forgets them.
+    """Declare the positions of targets; null removes them.
 
-    Objects come as {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
+    Objects have the form {name: {x, y, z}}, {name: [x, y, z]} or [{id, x, y, z}].
     """
 
     model_config = ConfigDict(
@@ -146,7 +146,7 @@ class SceneMessage(Message):
 
 
 class CharacterMessage(Message):
-    """Gives a character its face and its voice."""
+    """Set the face and the voice of a character."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"type": "character", "id": "Ada", "face": "ada", "voice": "silent"}]}
@@ -170,10 +170,10 @@ class Feeling(Message):
 
 
 class SetMessage(Message):
-    """Holds an emotion, AUs (0..1) and FAPs (FAPU) until told otherwise; null lets go, of one or of all.
+    """Set an emotion, AUs (0..1) and FAPs (FAPU) until they are changed; null releases one of them, or all.
 
-    The emotion lies below, AUs refine it, FAPs come on top, whatever is sent first (Paul 2010, 7.4): an AU
-    that is set is what it is set to, and so is a FAP, whatever AUs and speech ask of it.
+    AUs replace those of the emotion, and FAPs replace those of AUs and speech, in whatever order they are
+    sent (Paul 2010, 7.4).
     """
 
     model_config = ConfigDict(
@@ -199,9 +199,9 @@ SyncName = Annotated[str, Field(pattern=r"^[^\s:]{1,256}$")]
 
 
 class Anticipate(Message):
-    """Says when points in time are expected that behaviours are tied to, as `anticipators:id:sync`.
+    """Announce or move points in time that behaviours refer to as `anticipators:id:sync`.
 
-    It may be sent again and again while the estimate moves; what has not passed follows.
+    It may be sent again whenever the estimate changes; sync points that have not passed follow.
     """
 
     model_config = ConfigDict(
@@ -216,7 +216,7 @@ class Anticipate(Message):
 
 
 class Stop(Message):
-    """Ends blocks gracefully: those named, or all."""
+    """End blocks gracefully: the listed ones, or all."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "stop", "blocks": ["b"]}]})
 
@@ -225,7 +225,7 @@ class Stop(Message):
 
 
 class StateQuery(Message):
-    """Asks for `state`."""
+    """Ask for `state`."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "state"}]})
 
@@ -233,7 +233,7 @@ class StateQuery(Message):
 
 
 class Ping(Message):
-    """Asks for `pong`, which carries the session's time."""
+    """Ask for `pong`, which contains the time of the session."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"type": "ping", "id": 1}]})
 

@@ -30,14 +30,14 @@ class Timed(Message):
 
 
 class SpeechMessage(Message):
-    """Says something piece by piece, as text or clips come; or, without `id`, tells what is in a clip.
+    """Speak text or clips that arrive in parts; without `id`, describe the contents of a clip.
 
-    Text may have <sync id="m"/>, SSML and behaviours in it; a sentence is spoken when it is whole. The speech
-    is block `id`, from its first sound to its last; its pieces are the blocks `id.1`, `id.2`, ..., each with
-    the behaviour `id`, whose syncs are those of the text: documents name them `id:id:m`, before and after
-    they have come. Without `close` the block goes on for ever.
+    Text may contain <sync id="m"/>, SSML and behaviours. A sentence is spoken when it is complete. The speech
+    is block `id`, from its first sound to its last. Its parts are the blocks `id.1`, `id.2`, ..., each with
+    the behaviour `id`, whose syncs are those of the text: documents refer to them as `id:id:m`, before and
+    after they have arrived. Without `close` the block does not end.
 
-    A clip comes as binary messages, little-endian: u8 kind 4, u8 version 1, u16 flags (0x200: the last
+    A clip is sent as binary messages, little-endian: u8 kind 4, u8 version 1, u16 flags (0x200: the last
     piece), u32 number of the piece, f64 0, u32 rate in Hz of raw mono int16 PCM (0: the pieces are a WAV,
     FLAC, Ogg, MP3 or WebM file), u8 length of the id, the id, sound. Documents name it as a file: `clip:ID`.
     """
