@@ -18,10 +18,10 @@ from typing import cast
 from bml_schema import WarningFeedback
 from realizer.core.settings import Settings, raises
 from realizer.server.http.access import Pace
-from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.document_framing import Assembler, Fault
-from realizer.server.transports.tcp_listener import Listener, session_of
+from realizer.server.transports.tcp_listener import TcpTransport, session_of
+from realizer.server.transports.transport import Sessions
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ LONGEST_TAG = 4000  # characters
 _LONG_TAG = re.compile(rf"<[^<>]{{{LONGEST_TAG},}}")
 
 
-class AsapDoor:
+class AsapDoor(TcpTransport):
     """Listens on `settings.host` and the first of `settings.asap_ports`, `port` once it has started.
 
     Asap serves one client at a time. Here each address has a session of its own, named `asap-ADDRESS`, which
@@ -45,40 +45,23 @@ class AsapDoor:
     connection has its own call-back: the later one is called back once the port is its to listen on.
     """
 
-    def __init__(self, shell: Shell, settings: Settings) -> None:
+    def __init__(self, sessions: Sessions, settings: Settings) -> None:
         assert settings.asap_ports is not None
         port, self._feedback_port = settings.asap_ports
-        self._listener = Listener("asap", settings.host, port, self._talk, settings.max_connections)
+        super().__init__("asap", settings.host, port, settings.max_connections)
         self._limit = settings.max_document
         self._rate = settings.max_rate
-        self._shell = shell
+        self._sessions = sessions
 
     @property
     def lines(self) -> tuple[str, ...]:
         back = f"feedback to port {self._feedback_port} of the client"
-        return (f"asap: BML at {self._listener.where}, {back}, session asap-ADDRESS",)
-
-    @property
-    def port(self) -> int:
-        """The one that is open after `start`."""
-        return self._listener.port
-
-    async def start(self) -> None:
-        await self._listener.start()
-
-    async def ready(self) -> None:
-        return
-
-    def shut(self) -> None:
-        self._listener.shut()
-
-    async def close(self) -> None:
-        await self._listener.close()
+        return (f"asap: BML at {self.where}, {back}, session asap-ADDRESS",)
 
     async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         link = CallBack(host, self._feedback_port, writer.transport.abort)
         try:
-            number = self._shell.join(link, session_of("asap", host))
+            number = self._sessions.join(link, session_of("asap", host))
         except HubError as error:
             log.warning("asap: %s is not let in: %s", host, error)
             return
@@ -86,7 +69,7 @@ class AsapDoor:
         try:
             await self._read(reader, number, link)
         finally:
-            self._shell.leave(number)
+            self._sessions.leave(number)
             calling.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await calling
@@ -101,7 +84,7 @@ class AsapDoor:
                     if found.large:
                         text = f"{text} {raises('max_document')}"
                     link.send(WarningFeedback(id=id, type="PARSING_FAILURE", text=text).to_xml())
-                elif not self._shell.receive(number, found):
+                elif not self._sessions.receive(number, found):
                     return
                 # 0 too: a read full of documents must not hold up the frames of others.
                 pause = pace.wait(loop.time())

@@ -14,11 +14,11 @@ from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, raises
 from realizer.server.http.access import Pace
-from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.broker import Link, check_installed
 from realizer.server.transports.message_format import Dialect, Leave, Message, ToSession
 from realizer.server.transports.message_formats import DIALECTS
+from realizer.server.transports.transport import Sessions
 
 log = logging.getLogger(__name__)
 
@@ -36,11 +36,11 @@ class StompDoor:
     while the broker is away. What is said meanwhile is said when it is back.
     """
 
-    def __init__(self, shell: Shell, settings: Settings) -> None:
+    def __init__(self, sessions: Sessions, settings: Settings) -> None:
         assert settings.stomp is not None
         host, _, port = settings.stomp.rpartition(":")
         self._address = (host.strip("[]"), int(port))
-        self._shell = shell
+        self._sessions = sessions
         self._settings = settings
         made = {name: make(settings) for name, make in DIALECTS.items()}
         self._seats = [_Seat(self, name, dialect) for name, dialect in made.items() if dialect is not None]
@@ -231,14 +231,14 @@ class _Seat:
 
     def receive(self, text: str) -> None:
         """To the session, which is made where there is none."""
-        shell = self._door._shell
+        sessions = self._door._sessions
         try:
             if self._number is None:
-                self._number = shell.join(self, self.name)
-            if not shell.receive(self._number, text):
-                shell.leave(self._number)
-                self._number = shell.join(self, self.name)
-                shell.receive(self._number, text)
+                self._number = sessions.join(self, self.name)
+            if not sessions.receive(self._number, text):
+                sessions.leave(self._number)
+                self._number = sessions.join(self, self.name)
+                sessions.receive(self._number, text)
         except HubError as error:
             log.warning("stomp: %s: %s", self.name, error)
 
@@ -259,5 +259,5 @@ class _Seat:
         for message in self.dialect.farewell():
             self._door.put(message)
         if self._number is not None:
-            self._door._shell.leave(self._number)
+            self._door._sessions.leave(self._number)
             self._number = None

@@ -1,4 +1,4 @@
-"""A TCP listener with a conversation per client."""
+"""The base of transports that listen on a TCP port."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import asyncio
 import logging
 import re
 import socket
+from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Awaitable, Callable
 
 from realizer.core.settings import raises
 
@@ -21,27 +21,18 @@ def session_of(door: str, host: str) -> str:
     return (f"{door}-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host))[:LONGEST_NAME]
 
 
-class Listener:
-    """Listens on a host and a port; `port` is the one that is open after `start`.
+class TcpTransport(ABC):
+    """The base of transports that listen on a TCP port; `port` is the one that is open after `start`.
 
     Args:
-        name: of the door, for the log.
-        talk: (address, reader, writer) -> serves one client to its end.
+        name: of the transport, for the log.
         most: connections that may be open from one address.
     """
 
-    def __init__(
-        self,
-        name: str,
-        host: str,
-        port: int,
-        talk: Callable[[str, asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
-        most: int,
-    ) -> None:
+    def __init__(self, name: str, host: str, port: int, most: int) -> None:
         self.port = port
         self._name = name
         self._host = host
-        self._talk = talk
         self._most = most
         self._from: Counter[str] = Counter()  # address -> connections that are open
         self._server: asyncio.Server | None = None
@@ -66,6 +57,10 @@ class Listener:
         self._server = await asyncio.start_server(self._serve, self._host, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
+    async def ready(self) -> None:
+        """Return at once: clients can come in after `start`."""
+        return
+
     def shut(self) -> None:
         """Take no new clients."""
         if self._server is not None:
@@ -77,6 +72,15 @@ class Listener:
         for writer in self._clients.values():
             writer.transport.abort()
         await asyncio.gather(*self._clients, return_exceptions=True)
+
+    @property
+    @abstractmethod
+    def lines(self) -> tuple[str, ...]:
+        """What is printed when it is ready: where it is."""
+
+    @abstractmethod
+    async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Serve the client at an address to its end."""
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One client, from its opening to its end."""

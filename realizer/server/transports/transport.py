@@ -1,8 +1,11 @@
-"""The protocol of transports."""
+"""The protocols between transports and the sessions of the service."""
 
 from __future__ import annotations
 
 from typing import Protocol
+
+from realizer.server.http.metrics import Metrics
+from realizer.server.runtime.session_registry import ANYBODY, Visitor
 
 
 class Client(Protocol):
@@ -19,6 +22,52 @@ class Client(Protocol):
 
     def end(self, code: int, reason: str) -> None:
         """The session lets go of it; the codes are those of a WebSocket close."""
+        ...
+
+
+class Sessions(Protocol):
+    """The sessions of the service, as transports use them."""
+
+    @property
+    def metrics(self) -> Metrics:
+        """The counters of the service."""
+        ...
+
+    def check(self, name: str | None, visitor: Visitor = ANYBODY) -> None:
+        """Check whether a client could join.
+
+        Raises:
+            HubError: a bad name, one that is not for it, or too many sessions.
+        """
+        ...
+
+    async def restore(self, name: str | None, seen: int | None = None) -> None:
+        """Take over a session that another process has had, before a client joins it.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
+        ...
+
+    def join(
+        self, client: Client, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
+    ) -> int:
+        """Add a client to the session of that name, or to one of its own; returns its number.
+
+        Args:
+            seen: seq of the feedback that it had last.
+
+        Raises:
+            HubError: as `check`.
+        """
+        ...
+
+    def receive(self, number: int, message: str | bytes) -> bool:
+        """Pass on a message of a client; False if it is in no session any more."""
+        ...
+
+    def leave(self, number: int) -> None:
+        """Remove a client that is gone."""
         ...
 
 

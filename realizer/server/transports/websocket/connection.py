@@ -22,8 +22,8 @@ from realizer.server.http import access
 from realizer.server.http.access import Guard, Pace
 from realizer.server.http.jwt_tokens import Pass
 from realizer.server.journal import JournalError
-from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
+from realizer.server.transports.transport import Sessions
 from realizer.server.transports.websocket.request import address_of, headers_of, session_of, visitor_of
 
 log = logging.getLogger(__name__)
@@ -36,8 +36,8 @@ REASON = 123  # bytes that a close frame has room for behind its code
 class Visits:
     """Lets clients into sessions as `guard` says, and reads them as fast as `settings` say."""
 
-    def __init__(self, shell: Shell, settings: Settings, guard: Guard) -> None:
-        self._shell = shell
+    def __init__(self, sessions: Sessions, settings: Settings, guard: Guard) -> None:
+        self._sessions = sessions
         self._settings = settings
         self._guard = guard
         self._checking = asyncio.Lock()
@@ -87,9 +87,9 @@ class Visits:
                 greeting, allowed = await self._greeting(socket)
             visitor = visitor_of(socket, allowed)
             name, seen = session_of(request)
-            self._shell.check(name, visitor)  # who greets is known only now
-            await self._shell.restore(name, seen)
-            number = self._shell.join(client, name, seen, visitor)
+            self._sessions.check(name, visitor)  # who greets is known only now
+            await self._sessions.restore(name, seen)
+            number = self._sessions.join(client, name, seen, visitor)
         except HubError as error:
             await self._turn_away(socket, client, error)
             return
@@ -100,7 +100,7 @@ class Visits:
         log.info("joined", extra=told)
         try:
             if greeting is not None:
-                self._shell.receive(number, greeting)
+                self._sessions.receive(number, greeting)
             async with asyncio.timeout(allowed.left):
                 await self._read(socket, number, client)
         except ConnectionClosed:
@@ -108,7 +108,7 @@ class Visits:
         except TimeoutError:
             await client.close(1008, "token: it has expired")
         finally:
-            self._shell.leave(number)
+            self._sessions.leave(number)
             log.info("left", extra={**told, "code": socket.close_code})
 
     async def _read(self, socket: ServerConnection, number: int, client: WebSocketClient) -> None:
@@ -116,7 +116,7 @@ class Visits:
         loop = asyncio.get_running_loop()
         pace = Pace(self._settings.max_rate)
         async for message in socket:
-            if not self._shell.receive(number, message):
+            if not self._sessions.receive(number, message):
                 return
             # 0 too: messages that are there already must not hold up everybody else.
             pause = pace.wait(loop.time())
@@ -138,7 +138,7 @@ class Visits:
 
     async def _turn_away(self, socket: ServerConnection, client: WebSocketClient, error: HubError) -> None:
         """Say why one who is here already may not stay."""
-        self._shell.metrics.counts["refused"] += 1
+        self._sessions.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(socket), "status": error.status})
         unknown = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
         if unknown:

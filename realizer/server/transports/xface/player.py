@@ -8,8 +8,8 @@ import json
 import logging
 
 from realizer.core.settings import Settings
-from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
+from realizer.server.transports.transport import Sessions
 from realizer.server.transports.xface.player_link import PlayerLink, State
 
 log = logging.getLogger(__name__)
@@ -32,12 +32,12 @@ class XfacePlayerDoor:
     What it shows is the first face of the session `settings.xface_player_session`, which is made for it.
     """
 
-    def __init__(self, shell: Shell, settings: Settings) -> None:
+    def __init__(self, sessions: Sessions, settings: Settings) -> None:
         assert settings.xface_player is not None
         host, _, port = settings.xface_player.rpartition(":")
         self._address = (host.strip("[]"), int(port))
         self._settings = settings
-        self._shell = shell
+        self._sessions = sessions
         self._link = PlayerLink(settings.xface_player_interval)
         self._writer: asyncio.StreamWriter | None = None
         self._timer: asyncio.TimerHandle | None = None
@@ -125,16 +125,16 @@ class XfacePlayerDoor:
 
     async def _show(self, reader: asyncio.StreamReader) -> None:
         """Frames of the session, until the player is gone."""
-        number = self._shell.join(self, self._settings.xface_player_session)
+        number = self._sessions.join(self, self._settings.xface_player_session)
         self._up.set()
         try:
             for wants in WANTS:
-                self._shell.receive(number, wants)
+                self._sessions.receive(number, wants)
             while data := await reader.read(READ):
                 self._link.heard(data)
                 self._pump()
         finally:
-            self._shell.leave(number)
+            self._sessions.leave(number)
 
     def _pump(self) -> None:
         """Send what is due, and come back when something will be."""

@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.http.access import Pace
-from realizer.server.runtime.session_host import Shell
 from realizer.server.runtime.session_registry import HubError
 from realizer.server.transports.message_format import Leave, ToSession
-from realizer.server.transports.tcp_listener import Listener, session_of
+from realizer.server.transports.tcp_listener import TcpTransport, session_of
+from realizer.server.transports.transport import Sessions
 from realizer.server.transports.xface.attachments import Brought, prepare
 from realizer.server.transports.xface.reader import Content, Fault, TaskReader
 from realizer.server.transports.xface.tasks import ERROR, Answer, Desk
@@ -32,50 +32,31 @@ FEEDBACK = (
 )
 
 
-class XfaceDoor:
+class XfaceDoor(TcpTransport):
     """Listens on `settings.host` and `settings.xface_port`; `port` is the one that is open after `start`.
 
     Each client has its own number, its own loaded file and its own queue, as several have in the player. The
     clients of one address share a face: that of the session `xface-ADDRESS`, which viewers can join.
     """
 
-    def __init__(self, shell: Shell, settings: Settings) -> None:
+    def __init__(self, sessions: Sessions, settings: Settings) -> None:
         assert settings.xface_port is not None
-        self._listener = Listener(
-            "xface", settings.host, settings.xface_port, self._talk, settings.max_connections
-        )
+        super().__init__("xface", settings.host, settings.xface_port, settings.max_connections)
         self._settings = settings
-        self._shell = shell
+        self._sessions = sessions
         self._count = 0
 
     @property
     def lines(self) -> tuple[str, ...]:
-        return (f"xface: tasks at {self._listener.where}, session xface-ADDRESS",)
-
-    @property
-    def port(self) -> int:
-        """The one that is open after `start`."""
-        return self._listener.port
-
-    async def start(self) -> None:
-        await self._listener.start()
-
-    async def ready(self) -> None:
-        return
-
-    def shut(self) -> None:
-        self._listener.shut()
-
-    async def close(self) -> None:
-        await self._listener.close()
+        return (f"xface: tasks at {self.where}, session xface-ADDRESS",)
 
     async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._count += 1
-        seat = _Seat(self._shell, Desk(self._count), writer)
+        seat = _Seat(self._sessions, Desk(self._count), writer)
         try:
-            if len(self._listener) > MOST_CLIENTS:
+            if len(self) > MOST_CLIENTS:
                 raise HubError(503, f"{MOST_CLIENTS} clients are connected: wanted fewer")
-            number = self._shell.join(seat, session_of("xface", host))
+            number = self._sessions.join(seat, session_of("xface", host))
         except HubError as error:
             log.warning("xface: %s is not let in: %s", host, error)
             writer.write(ERROR)
@@ -86,7 +67,7 @@ class XfaceDoor:
         try:
             await self._read(reader, writer, seat)
         finally:
-            self._shell.leave(number)
+            self._sessions.leave(number)
 
     async def _read(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, seat: _Seat) -> None:
         tasks = TaskReader(min(LIMIT, self._settings.max_message))
@@ -127,17 +108,17 @@ class XfaceDoor:
 class _Seat:
     """One client in its session."""
 
-    def __init__(self, shell: Shell, desk: Desk, writer: asyncio.StreamWriter) -> None:
+    def __init__(self, sessions: Sessions, desk: Desk, writer: asyncio.StreamWriter) -> None:
         self.desk = desk
         self.left = False
-        self._shell = shell
+        self._sessions = sessions
         self._writer = writer
         self._number = 0
 
     def sit(self, number: int) -> None:
         """It has joined its session."""
         self._number = number
-        self._shell.receive(number, FEEDBACK)
+        self._sessions.receive(number, FEEDBACK)
         self._writer.write(self.desk.greeting)
 
     def do(self, answers: Iterable[Answer]) -> None:
@@ -145,7 +126,7 @@ class _Seat:
         for answer in answers:
             match answer:
                 case ToSession(text):
-                    self.left = self.left or not self._shell.receive(self._number, text)
+                    self.left = self.left or not self._sessions.receive(self._number, text)
                 case Leave():
                     self.left = True
                 case note:
