@@ -205,40 +205,6 @@ def test_a_bad_table_is_refused_with_its_place(text: str, says: str) -> None:
 
 # --- lexemes
 
-BROWS = tuple(f"{way}_{brow}" for way in ("RAISE", "LOWER") for brow in ("BROWS", "LEFT_BROW", "RIGHT_BROW"))
-CORNERS = tuple(
-    f"{way}_{corner}"
-    for way in ("RAISE", "LOWER")
-    for corner in ("MOUTH_CORNERS", "LEFT_MOUTH_CORNER", "RIGHT_MOUTH_CORNER")
-)
-STANDARD = (*BROWS, *CORNERS, "OBLIQUE_BROWS", "OPEN_MOUTH", "OPEN_LIPS", "WIDEN_EYES", "CLOSE_EYES")
-EMOTIONS = ("ANGER", "DISGUST", "FEAR", "HAPPINESS", "JOY", "SADNESS", "SURPRISE")
-
-
-def test_the_lexemes_of_the_standard_and_the_emotions_are_there() -> None:
-    assert len(STANDARD) == 17
-    assert {*STANDARD, *EMOTIONS, "SMILE", "BLINK"} <= set(lexemes.face_lexemes())
-    assert {"NOD", "SHAKE", "TILT"} <= set(lexemes.head_lexemes())
-
-
-def test_joy_is_happiness() -> None:
-    known = lexemes.face_lexemes()
-    assert known["JOY"].aus == known["HAPPINESS"].aus
-
-
-@pytest.mark.parametrize("name", sorted(lexemes.face_lexemes()))
-def test_a_lexeme_of_one_side_mirrors_that_of_the_other(name: str) -> None:
-    swapped = {"LEFT": "RIGHT", "RIGHT": "LEFT", "BOTH": "BOTH"}
-    swap = name.replace("LEFT", "?").replace("RIGHT", "LEFT").replace("?", "RIGHT")
-    known = lexemes.face_lexemes()
-    assert known[swap].aus == {(au, swapped[side]): amount for (au, side), amount in known[name].aus.items()}
-
-
-@pytest.mark.parametrize("name", sorted(lexemes.face_lexemes()))
-def test_every_action_unit_of_a_lexeme_moves_a_fap(name: str) -> None:
-    moved = {row.au for row in ROWS}
-    assert {au for au, _ in lexemes.face_lexemes()[name].aus} <= moved
-
 
 # --- timing
 

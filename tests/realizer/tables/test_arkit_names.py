@@ -1,0 +1,40 @@
+"""Tests of the names of ARKit's blend shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from realizer.tables.arkit_names import canonical, gathered, nearest, shapes
+
+
+def test_shapes_are_the_52_of_arkit() -> None:
+    assert len(shapes()) == 52
+    assert shapes()["jawOpen"].faps[:1] == (3,)
+    assert (shapes()["mouthSmileLeft"].au, shapes()["mouthSmileLeft"].side) == (12, "L")
+
+
+@pytest.mark.parametrize(
+    "spell",
+    [lambda n: n.replace("Left", "_L").replace("Right", "_R"), lambda n: n[0].upper() + n[1:],
+     lambda n: f"blendShape1.{n}", lambda n: f"Head_{n}"],
+)  # fmt: skip
+def test_usual_spellings_are_understood(spell: Callable[[str], str]) -> None:
+    assert {canonical(spell(name)) for name in shapes()} == set(shapes())
+
+
+@pytest.mark.parametrize("name", ["viseme_aa", "", "jaw", "open", "L"])
+def test_a_name_of_something_else_is_none_of_arkit_s(name: str) -> None:
+    assert canonical(name) is None
+
+
+def test_a_misspelt_name_has_near_ones() -> None:
+    assert nearest("mouthSmileLeftt")[0] == "mouthSmileLeft"
+    assert nearest("hat") == ()
+
+
+def test_names_are_gathered_by_what_they_mean() -> None:
+    known, foreign = gathered(["mouthSmile_L", "MouthSmileLeft", "hat", "jawOpen"])
+    assert known == {"mouthSmileLeft": ["mouthSmile_L", "MouthSmileLeft"], "jawOpen": ["jawOpen"]}
+    assert foreign == ("hat",)

@@ -1,0 +1,66 @@
+"""Tests of the table of lexemes."""
+
+from __future__ import annotations
+
+import pytest
+
+from realizer.core.errors import TableError
+from realizer.tables import au_to_fap
+from realizer.tables.lexemes import face_lexemes, head_lexemes, read_aus
+
+BROWS = tuple(f"{way}_{brow}" for way in ("RAISE", "LOWER") for brow in ("BROWS", "LEFT_BROW", "RIGHT_BROW"))
+CORNERS = tuple(
+    f"{way}_{corner}"
+    for way in ("RAISE", "LOWER")
+    for corner in ("MOUTH_CORNERS", "LEFT_MOUTH_CORNER", "RIGHT_MOUTH_CORNER")
+)
+STANDARD = (*BROWS, *CORNERS, "OBLIQUE_BROWS", "OPEN_MOUTH", "OPEN_LIPS", "WIDEN_EYES", "CLOSE_EYES")
+
+EMOTIONS = ("ANGER", "DISGUST", "FEAR", "HAPPINESS", "JOY", "SADNESS", "SURPRISE")
+
+
+def test_the_lexemes_of_the_standard_and_the_emotions_are_there() -> None:
+    assert len(STANDARD) == 17
+    assert {*STANDARD, *EMOTIONS, "SMILE", "BLINK"} <= set(face_lexemes())
+    assert {"NOD", "SHAKE", "TILT"} <= set(head_lexemes())
+
+
+def test_joy_is_happiness() -> None:
+    known = face_lexemes()
+    assert known["JOY"].aus == known["HAPPINESS"].aus
+
+
+@pytest.mark.parametrize("name", sorted(face_lexemes()))
+def test_a_lexeme_of_one_side_mirrors_that_of_the_other(name: str) -> None:
+    swapped = {"LEFT": "RIGHT", "RIGHT": "LEFT", "BOTH": "BOTH"}
+    swap = name.replace("LEFT", "?").replace("RIGHT", "LEFT").replace("?", "RIGHT")
+    known = face_lexemes()
+    assert known[swap].aus == {(au, swapped[side]): amount for (au, side), amount in known[name].aus.items()}
+
+
+@pytest.mark.parametrize("name", sorted(face_lexemes()))
+def test_every_action_unit_of_a_lexeme_moves_a_fap(name: str) -> None:
+    moved = {row.au for row in au_to_fap()}
+    assert {au for au, _ in face_lexemes()[name].aus} <= moved
+
+
+def test_a_row_of_action_units_names_the_sides() -> None:
+    assert read_aus({"1": 0.5, "12L": 1.0, "12R": 0.25}, "x") == {
+        (1, "BOTH"): 0.5,
+        (12, "LEFT"): 1.0,
+        (12, "RIGHT"): 0.25,
+    }
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ({"999": 1.0}, "wanted an action unit such as 12 or 12L, got '999'"),
+        ({"26L": 1.0}, "got '26L'"),
+        ({"12": 0.0}, "x, 12: wanted an intensity above 0 and to 1, got 0.0"),
+        ({"12": 1.5}, "got 1.5"),
+    ],
+)
+def test_a_row_of_action_units_is_checked(cells: dict[str, float], words: str) -> None:
+    with pytest.raises(TableError, match=words):
+        read_aus(cells, "x")
