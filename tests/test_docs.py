@@ -21,7 +21,7 @@ MODULE = re.compile(r"python -m ((?:tests|realizer)[\w.]*)")
 TEST = re.compile(r"\btest_\w+")
 
 
-def name(page: Path) -> str:
+def relative(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
@@ -43,14 +43,14 @@ def test_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_text("utf-8").splitlines()) < 200
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
+@pytest.mark.parametrize("page", PAGES, ids=relative)
 def test_links_resolve(page: Path) -> None:
     links = [link for link in LINK.findall(page.read_text("utf-8")) if "://" not in link and link[0] != "#"]
     missing = [link for link in links if not (page.parent / link.partition("#")[0]).exists()]
     assert not missing
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
+@pytest.mark.parametrize("page", PAGES, ids=relative)
 def test_paths_exist(page: Path) -> None:
     bases = (ROOT, ROOT / "realizer", ROOT / "tests", page.parent)
     missing = {path for path in PATH.findall(code(page)) if not any((base / path).exists() for base in bases)}
@@ -61,21 +61,25 @@ def test_paths_exist(page: Path) -> None:
     assert not missing
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_functions_exist(page: Path) -> None:
-    named = re.findall(r"`([\w/]+\.py)`\s`(\w+)`", page.read_text("utf-8"))
+@pytest.mark.parametrize("page", PAGES, ids=relative)
+def test_named_objects_exist(page: Path) -> None:
+    text = page.read_text("utf-8")
+    named = re.findall(r"`([\w/]+\.py)`\s`(\w+)`", text)
+    named += [(path, name) for name, path in re.findall(r"`(\w+)`\s(?:\(|of\s+|in\s+)`([\w/]+\.py)`", text)]
     missing = [
-        f"{path}: {function}"
-        for path, function in named
-        if not re.search(rf"^(?:def|class) {function}\b", (ROOT / path).read_text("utf-8"), re.MULTILINE)
+        f"{path}: {name}"
+        for path, name in named
+        if not re.search(rf"^(?:def |class )?{name}\b", (ROOT / path).read_text("utf-8"), re.MULTILINE)
     ]
     assert not missing
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
+@pytest.mark.parametrize("page", PAGES, ids=relative)
 def test_named_tests_exist(page: Path) -> None:
     # A name may be shortened: `test_a_flood_...` stands for all tests that begin so.
-    missing = [test for test in TEST.findall(code(page)) if f"\n{test}" not in f"\n{known_tests()}"]
+    missing = [
+        test for test in TEST.findall(page.read_text("utf-8")) if f"\n{test}" not in f"\n{known_tests()}"
+    ]
     assert not missing
 
 
@@ -87,5 +91,5 @@ def test_architecture_names_every_folder() -> None:
     packages = [
         path.parent for root in ("bml_schema", "realizer") for path in (ROOT / root).rglob("__init__.py")
     ]
-    missing = {f"{name(package)}/" for package in packages} - named - {"realizer/"}
+    missing = {f"{relative(package)}/" for package in packages} - named - {"realizer/"}
     assert not missing
