@@ -11,10 +11,9 @@ import pytest
 from realizer.core.errors import FaceError
 from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
-from realizer.face.au.units import units
 from realizer.face.load import list_faces, load_face
 from realizer.facebuild.au.fit import fit_models, table, table_text
-from realizer.facebuild.au.measure import read_measured, read_shapes, write_shapes
+from realizer.facebuild.au.measure import read_measured, read_shapes
 
 HEAD = "# source: made for tests\n# units: metres\n# licence: MIT\nau,x,y,z,dx,dy,dz\n"
 
@@ -142,39 +141,6 @@ def test_a_face_without_shapes_says_what_to_give(tmp_path: Path) -> None:
     assert not (tmp_path / "model.toml").exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (HEAD + "12,0,0,0,0,0,nan\n" * 9, "AU12: wanted finite numbers"),
-        (HEAD + "12,0,0,0,0,0,0.1\n" * 3, "AU12: wanted 8 landmarks"),
-        (HEAD + "12,0,0,0,0,0,0\n" * 9, "AU12: wanted 8 landmarks or more of which one moves"),
-        (HEAD + "51,0,0,0,0,0,0.1\n" * 9, "wanted action units of 1, 2, 4"),
-        (HEAD + "12,0,0,0,0,0\n", "wanted 7 cells"),
-        (HEAD.replace("dz", "d") + "12,0,0,0,0,0,1\n", "wanted columns au,x,y,z,dx,dy,dz"),
-        ("au,x,y,z,dx,dy,dz\n", "source"),
-    ],
-)
-def test_bad_measurements_are_refused_with_their_place(text: str, words: str, tmp_path: Path) -> None:
-    path = tmp_path / "landmarks.csv"
-    path.write_text(text)
-    with pytest.raises(FaceError, match=words) as caught:
-        read_measured(path)
-    assert "landmarks.csv" in str(caught.value)
-
-
 def test_an_unknown_form_is_refused() -> None:
     with pytest.raises(FaceError, match="published, extended"):
         fit_models(load_face(), {}, ("secret",))
-
-
-def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
-    folder = next(info.path for info in list_faces() if info.name == load_face().name)
-    measured = read_shapes(folder / "au_shapes.npz")
-    write_shapes(tmp_path / "again.npz", measured)
-    again = read_shapes(tmp_path / "again.npz")
-    assert set(again) == {unit.au for unit in units().values() if unit.kind == "displacement"}
-    for au, one in measured.items():
-        assert again[au].moves == pytest.approx(one.moves, abs=1e-9)
-        assert (again[au].seen == one.seen).all()
-    with pytest.raises(FaceError, match=r"none\.npz"):
-        read_shapes(tmp_path / "none.npz")

@@ -1,0 +1,65 @@
+"""Tests of the merging of pieces into one mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realizer.facebuild.arkit.mesh_merge import Surface, components, cut, joined
+from realizer.facebuild.arkit.scene import Piece
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+HALVES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+
+
+def piece(aside: float = 0, glass: bool = False, **moves: float) -> Piece:
+    """A square whose vertices all move up by what a shape's name says."""
+    up = {name: np.tile([0, amount, 0.0], (4, 1)) for name, amount in moves.items()}
+    return Piece(
+        ("skin", "m", "n"), SQUARE + np.array([aside, 0, 0]), HALVES, np.full((4, 3), 9.0), False, glass, up
+    )
+
+
+def test_joined_pieces_share_the_vertices_of_their_seam() -> None:
+    surface = joined([piece(), piece(1)])
+    assert len(surface.vertices) == 6
+    assert len(surface.triangles) == 4
+    assert set(surface.piece.tolist()) == {0, 1}
+
+
+def test_joined_pieces_keep_a_seam_that_opens() -> None:
+    surface = joined([piece(jawOpen=0.0), piece(1, jawOpen=-0.5)])
+    assert len(surface.vertices) == 8
+    assert sorted(surface.move("jawOpen")[:, 1].tolist()) == [-0.5] * 4 + [0] * 4
+    assert not surface.move("eyeBlinkLeft").any()
+
+
+def test_joined_pieces_have_arkit_s_names_and_no_glass() -> None:
+    surface = joined([piece(Mouth_Smile_L=1.0, hat=1.0), piece(5, glass=True)])
+    assert list(surface.moves) == ["mouthSmileLeft"]
+    assert len(surface.vertices) == 4
+
+
+def test_chosen_vertices_keep_the_triangles_that_they_alone_make() -> None:
+    whole = joined([piece(jawOpen=1.0)])
+    surface = whole.chosen(whole.triangles[0][::-1])
+    assert surface.triangles.tolist() == [[2, 1, 0]]
+    assert len(surface.move("jawOpen")) == len(surface.colours) == 3
+
+
+def test_components_are_numbered() -> None:
+    assert components(np.array([[0, 1, 2], [3, 4, 5], [2, 1, 6]]), 7).tolist() == [0, 0, 0, 1, 1, 1, 0]
+
+
+def test_cut_ends_the_surface_along_a_straight_line() -> None:
+    surface = joined([piece(jawOpen=1.0)])
+    left = cut(surface, surface.vertices[:, 0] - 0.25)
+    assert left.vertices[:, 0].min() == pytest.approx(0.25)
+    assert area(left) == pytest.approx(0.75)
+    assert (left.move("jawOpen")[:, 1] == 1).all()
+    assert cut(surface, np.ones(4)) is surface
+
+
+def area(surface: Surface) -> float:
+    a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
