@@ -52,9 +52,8 @@ from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.wakeup_plan import Rhythm
 from realizer.server.session.welcome import greeting
 from realizer.server.speech.audio_clips import ClipError, Clips
-from realizer.server.streams.broadcast import Broadcast
+from realizer.server.streams.broadcast import Broadcast, Run
 from realizer.server.streams.connection import SLOW, STUCK, Connection
-from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 from realizer.playback.player import Player
 from realizer.server.documents.document_queue import Intake
-from realizer.server.streams.broadcast import Broadcast
+from realizer.server.streams.broadcast import Broadcast, Run
 from realizer.server.streams.connection import Connection
-from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import EPSILON
 
 

@@ -8,8 +8,8 @@ import pytest
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.protocol.wire import unpack
+from realizer.server.streams.broadcast import Run
 from realizer.server.streams.connection import FrameSubscription
-from realizer.server.streams.frame_fast_path import Run
 from realizer.server.streams.frame_windows import Strip, Timeline
 
 FPS = 25.0
