@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import bml_schema
 import realizer
-from realizer.behaviours.kind import Position
+from realizer.core.options import PlayOptions
 
 # What decides about bytes beside our own files, where it is installed: voices, and what encodes.
 # Parts of our packages that no output is made by.
@@ -19,24 +19,12 @@ APART = {"static", "web", "_faces", "server", "cli", "batch"}
 ENGINES = ("av", "espeakng-loader", "hibari-tts", "numpy", "pillow")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
-    """How all documents of a batch are played, as `realize` and `Drawing` take it; `formats` are suffixes."""
+@dataclass(frozen=True, kw_only=True)
+class Options(PlayOptions):
+    """How all documents of a batch are played and drawn, as `Drawing` takes it; `formats` are suffixes."""
 
     formats: tuple[str, ...]
     voice: str
-    face: str = "default"
-    deformer: str | None = None
-    fps: float = 25.0
-    scene: tuple[tuple[str, Position], ...] | None = None
-    seed: int = 0
-    idle: bool = True
-    language: str = "en-US"
-    cooccurrence: str = "on"
-    prosody: bool = True
-    media: Path | None = None
-    expressions: Path | None = None
-    mapping: Path | None = None
     size: tuple[int, int] = (512, 512)
     camera: str = "front"
     light: str | None = None
@@ -52,7 +40,7 @@ class Options:
 
     def told(self) -> str:
         """All but the files, as JSON."""
-        values = {name: getattr(self, name) for name in self.__slots__ if name not in self.files}
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self.files}
         return json.dumps(values, sort_keys=True)
 
 

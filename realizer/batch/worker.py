@@ -5,16 +5,15 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
 
 from realizer.batch.task import Options, Task, fingerprint
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
-from realizer.realization import Realization
+from realizer.pipeline import play
 from realizer.render import Renderer
 from realizer.speech.utterance import Say, Utterance, Voice
 
@@ -94,7 +93,7 @@ class Worker:
     def perform(self, task: Task) -> Outcome:
         """Never raises for what is wrong with the document, or while it is played: then the row says so."""
         try:
-            realization = self._realize(task)
+            realization = play([task.text], self.options, self._speaker)
             suffixes = self.options.formats if realization.plays else ()
             files = {
                 f"{task.name}{suffix}": OUTPUTS[suffix].encode(realization, self._drawing(suffix))
@@ -134,25 +133,6 @@ class Worker:
         for renderer in self._renderers.values():
             renderer.close()
 
-    def _realize(self, task: Task) -> Realization:
-        o = self.options
-        return realize(
-            task.text,
-            face=o.face,
-            deformer=o.deformer,
-            fps=o.fps,
-            voice=self._speaker,
-            scene=None if o.scene is None else dict(o.scene),
-            seed=o.seed,
-            idle=o.idle,
-            language=o.language,
-            media=o.media,
-            expressions=o.expressions,
-            cooccurrence=o.cooccurrence,
-            prosody=o.prosody,
-            mapping=o.mapping,
-        )
-
     def _drawing(self, suffix: str) -> Drawing:
         """How that output is drawn, by a process that stays."""
         if suffix not in self._drawings:
@@ -171,31 +151,24 @@ class Worker:
                         alpha=alpha,
                         deformer=o.deformer,
                     )
-                drawing = Drawing(
-                    o.size,
-                    o.camera,
-                    light=o.light,
-                    background=o.background,
-                    begun=self._renderers[size, alpha],
-                )
+                drawing = replace(drawing, begun=self._renderers[size, alpha])
             self._drawings[suffix] = drawing
         return self._drawings[suffix]
 
 
 # One worker a process, and one task at a time in it: where several threads ask, they wait for each other.
-_HERE: dict[Options, tuple[Worker, str]] = {}
+_HERE: list[tuple[Worker, str]] = []
 _TURN = threading.Lock()
 
 
 def perform(options: Options, task: Task) -> Outcome:
     """Do a task in this process, which may be on another machine than the one that made it."""
     with _TURN:
-        if options not in _HERE:
-            for worker, _ in _HERE.values():
+        if not _HERE or _HERE[0][0].options != options:
+            for worker, _ in _HERE:
                 worker.close()
-            _HERE.clear()
-            _HERE[options] = Worker(options), fingerprint(options)
-        worker, here = _HERE[options]
+            _HERE[:] = [(Worker(options), fingerprint(options))]
+        worker, here = _HERE[0]
         if here != task.fingerprint:
             return failed(
                 task,

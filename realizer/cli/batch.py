@@ -16,7 +16,6 @@ from realizer.cli.realize import PICTURES, performance
 if TYPE_CHECKING:
     from realizer.batch.run import Crew
     from realizer.batch.task import Options
-    from realizer.core.settings import Settings
 
 STATUS = ("done", "refused", "failed")
 
@@ -79,7 +78,7 @@ def batch(
     if dask is not None and workers is not None:
         raise click.UsageError("--workers, --dask: wanted one of them, got both")
     strict: bool = asked.pop("strict")
-    how = _options(formats, **asked)
+    how = _options(formats, asked)
     from realizer.batch.documents import DocumentsError, find
     from realizer.batch.run import batch as run
 
@@ -114,37 +113,25 @@ def batch(
     return 1 if counts["refused"] or counts["failed"] or (strict and dropped) else 0
 
 
-def _options(
-    formats: tuple[str, ...], *, size: tuple[int, int], camera: str, no_idle: bool, **asked: Any
-) -> Options:
+def _options(formats: tuple[str, ...], asked: dict[str, Any]) -> Options:
     """How documents are played: flags, variables and defaults, and the voice that speaks by name."""
     from realizer.batch.task import Options
     from realizer.speech.registry import find_voice
 
-    chosen: Settings = options.settings(idle=False if no_idle else None, **asked)
+    drawn = {name: asked[name] for name in ("light", "background")}
+    chosen = options.play_settings(asked, **drawn)
     if any(suffix in PICTURES for suffix in formats):
-        options.check_camera(chosen.face, camera)
-    scene = options.read_scene(chosen.scene)
+        options.check_camera(chosen.face, asked["camera"])
+    played = chosen.play_options(options.read_scene(chosen.scene))
     voice = find_voice(chosen.voice)
     voice.close()
     options.tell_silence(chosen.voice)
     return Options(
+        **vars(played),
         formats=formats,
         voice=chosen.voice or voice.name,
-        face=chosen.face,
-        deformer=chosen.deformer,
-        fps=chosen.fps,
-        scene=None if scene is None else tuple(sorted(scene.items())),
-        seed=chosen.seed,
-        idle=chosen.idle,
-        language=chosen.language,
-        cooccurrence=chosen.cooccurrence,
-        prosody=chosen.prosody,
-        media=chosen.media,
-        expressions=chosen.expressions,
-        mapping=chosen.mapping,
-        size=size,
-        camera=camera,
+        size=asked["size"],
+        camera=asked["camera"],
         light=chosen.light,
         background=chosen.background,
     )

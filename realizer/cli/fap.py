@@ -147,7 +147,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
             "`realizer fap convert --fps` makes fewer of them"
         )
     fps = asked["fps"] if asked["fps"] is not None else min(clip.fps, FASTEST)
-    return perform(context, lambda: [document.encode()], **asked | {"fps": fps})
+    return perform(context, lambda: [document.encode()], asked | {"fps": fps})
 
 
 def _read(file: str) -> FAPClip:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -90,6 +91,15 @@ def settings(**flags: Any) -> Settings:
         return Settings.read(flags)
     except SettingsError as error:
         raise click.UsageError(str(error)) from None
+
+
+def play_settings(asked: Mapping[str, Any], **flags: Any) -> Settings:
+    """Return the settings of playing, and other flags, from the options of a command by their names."""
+    from realizer.core.options import PlayOptions
+
+    names = {"voice", *(f.name for f in fields(PlayOptions) if f.name != "idle")}
+    flags |= {name: asked[name] for name in names if name in asked}
+    return settings(**flags, idle=False if asked["no_idle"] else None)
 
 
 def playing(command: Command) -> Command:

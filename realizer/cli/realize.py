@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
 TRANSPARENT = "transparent"
+DRAWN = ("size", "camera", "at", "light", "background", "visemes")  # fields of Drawing
 # What the machine lacks, whatever was asked for: room.
 FULL = (errno.ENOSPC, errno.EFBIG)
 
@@ -84,94 +85,47 @@ def realize(context: click.Context, /, documents: tuple[str, ...], **asked: Any)
 
     Several documents are submitted at 0 s in order; their composition attributes apply.
     """
-    return perform(context, lambda: options.read_documents(documents), **asked)
+    return perform(context, lambda: options.read_documents(documents), asked)
 
 
-def perform(
-    context: click.Context,
-    read: Callable[[], list[bytes]],
-    *,
-    output: str | None,
-    fps: float | None,
-    at: float | None,
-    face: str | None,
-    deformer: str | None,
-    size: tuple[int, int],
-    camera: str,
-    light: str | None,
-    background: str | None,
-    seed: int | None,
-    no_idle: bool,
-    cooccurrence: str | None,
-    prosody: str | None,
-    visemes: bool,
-    mapping: Path | None,
-    voice: str | None,
-    scene: str | None,
-    media: Path | None,
-    expressions: Path | None,
-    strict: bool,
-) -> int:
+def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict[str, Any]) -> int:
     """Play the documents that `read` gives, as the options of `performing` ask; returns the exit status.
 
     They are read when all that was asked has been found possible.
+
+    Args:
+        asked: the options by their names.
     """
     from realizer.outputs.output import Drawing
     from realizer.outputs.registry import output_for
 
+    output, strict = asked["output"], asked["strict"]
     writer = None
     if output not in (None, "-"):
         try:
             writer = output_for(Path(output))
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="-o") from None
-    chosen = options.settings(
-        face=face,
-        deformer=deformer,
-        fps=fps,
-        voice=voice,
-        scene=scene,
-        media=media,
-        expressions=expressions,
-        seed=seed,
-        idle=False if no_idle else None,
-        cooccurrence=cooccurrence,
-        prosody=prosody,
-        mapping=mapping,
-    )
+    chosen = options.play_settings(asked)
+    drawing = Drawing(**{name: asked[name] for name in DRAWN})
     if writer is not None and writer.suffix in PICTURES:
-        options.check_camera(chosen.face, camera)
-    if background == TRANSPARENT and (writer is None or writer.suffix != ".png" or at is None):
+        options.check_camera(chosen.face, drawing.camera)
+    one = writer is not None and writer.suffix == ".png" and drawing.at is not None
+    if drawing.background == TRANSPARENT and not one:
         raise click.BadParameter(
             "wanted a colour such as #d8dde2: only the picture of one instant, a .png with --at, "
             "can be transparent",
             param_hint="--background",
         )
-    if visemes and (writer is None or writer.suffix != ".fap"):
+    if drawing.visemes and (writer is None or writer.suffix != ".fap"):
         raise click.BadParameter("wanted a .fap file to write FAP 1 into", param_hint="--visemes")
     texts = read()
-    drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background, visemes=visemes)
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)
     # What planning needs is imported while the drawing process gets ready.
-    from realizer.offline import realize as run
+    from realizer.pipeline import play
 
-    realization = run(
-        texts,
-        face=chosen.face,
-        deformer=chosen.deformer,
-        fps=chosen.fps,
-        voice=chosen.voice,
-        scene=options.read_scene(chosen.scene),
-        seed=chosen.seed,
-        idle=chosen.idle,
-        language=chosen.language,
-        media=chosen.media,
-        expressions=chosen.expressions,
-        cooccurrence=chosen.cooccurrence,
-        prosody=chosen.prosody,
-        mapping=chosen.mapping,
-    )
+    realization = play(texts, chosen.play_options(options.read_scene(chosen.scene)), chosen.voice)
     if any(speaking.utterance.pcm is None for speaking in realization.speaking):
         options.tell_silence(chosen.voice)
     options.tell(realization.warnings)

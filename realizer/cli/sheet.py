@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from realizer.animation.fap.au_fap_mapping import FapMapping
     from realizer.cli.sheet_poses import Series
+    from realizer.outputs.output import Drawing
     from realizer.render.contact_sheet import Cell
 
 SCALE = (260, 16)  # pixels of the colour scale
@@ -86,6 +87,7 @@ def sheet(
 
     from realizer.cli import sheet_poses
     from realizer.face.fap_mapping import mapping_of
+    from realizer.outputs.output import Drawing
     from realizer.render.contact_sheet import Group, album
 
     if output.suffix != ".png":
@@ -103,13 +105,12 @@ def sheet(
         series += sheet_poses.of_aus(intensity)
     if emotions:
         series += sheet_poses.of_emotions()
+    drawing = Drawing(size, light=light, background=background)
     count = sum(len(part.poses) for part in series)
     with _progress(count * len(cameras), context.obj["quiet"]) as step:
         groups = [
             Group(part.heading, cells, part.columns)
-            for part, cells in _cells(
-                name, deformer, in_force, series, cameras, size, light, background, step
-            )
+            for part, cells in _cells(name, deformer, in_force, series, cameras, drawing, step)
         ]
     words = f"{name}: {', '.join(cameras)}. Left as drawn, right the difference to the neutral face"
     pixels = album(groups, _scale(), words)
@@ -124,9 +125,7 @@ def _cells(
     mapping: FapMapping,
     series: list[Series],
     cameras: tuple[str, ...],
-    size: tuple[int, int],
-    light: str | None,
-    background: str | None,
+    drawing: Drawing,
     step: Callable[[int], None],
 ) -> Iterator[tuple[Series, list[Cell]]]:
     """Each series with its cells; the first pose of all is the neutral one."""
@@ -141,16 +140,16 @@ def _cells(
     from realizer.render.light import preset
 
     # Plain, so that what differs is the face.
-    behind = np.rint(np.array(preset(light).backdrop_middle) * 255)
-    if background:
-        behind = np.frombuffer(bytes.fromhex(background[1:]), np.uint8)
+    behind = np.rint(np.array(preset(drawing.light).backdrop_middle) * 255)
+    if drawing.background:
+        behind = np.frombuffer(bytes.fromhex(drawing.background[1:]), np.uint8)
     every = [pose for part in series for pose in part.poses]
     rows = poses_of(sheet_poses.frames(series), takes(name, deformer=deformer), mapping)
     shown: list[list[Any]] = [[] for _ in every]
     for camera in cameras:
         neutral = below = None
         with Renderer(
-            name, size, camera, light=light, background="transparent", deformer=deformer
+            name, drawing.size, camera, light=drawing.light, background="transparent", deformer=deformer
         ) as renderer:
             for k, drawn in enumerate(renderer.frames(rows)):
                 picture = flatten(drawn, behind)

@@ -66,7 +66,7 @@ def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
         return 1
     node = f'<own:timeline id="timeline" fileName={quoteattr(file.name)}/>'
     document = f'<bml xmlns="{CORE}" xmlns:own="{OWN}" id="timeline">{node}</bml>'
-    return perform(context, lambda: [document.encode()], **asked | {"media": file.parent})
+    return perform(context, lambda: [document.encode()], asked | {"media": file.parent})
 
 
 def is_timeline(name: str) -> bool:

@@ -15,7 +15,7 @@ OTHER = {
     "face": "bo",
     "deformer": "au",
     "fps": 30.0,
-    "scene": (("cup", (0.0, 1.0, 2.0)),),
+    "scene": {"cup": (0.0, 1.0, 2.0)},
     "seed": 1,
     "idle": False,
     "language": "nl",
