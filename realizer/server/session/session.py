@@ -194,7 +194,8 @@ class Session:
         # who does all of it again from the journal is not woken in between. Frames whose time has come are
         # sent as they were planned then.
         self._publish(t)
-        self._effects += self.broadcast.frames_due(t)[0]
+        if self.broadcast.active:
+            self._effects += self.broadcast.frames_due(t)[0]
         if self.notes.grown and not self._compact(t):
             return
         kept = self._dispatch(self._connections[connection], message, t)
@@ -392,7 +393,8 @@ class Session:
             return
         t = now - self.opened
         self._publish(t)
-        self._effects += self.broadcast.frames_due(t)[0]
+        if self.broadcast.active:
+            self._effects += self.broadcast.frames_due(t)[0]
         if self.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.intake.orders.answer(speak, result, t)
             self._work(t)
@@ -473,8 +475,9 @@ class Session:
         self._rhythm.unsettled = False
         self._rhythm.stir()
         self._publish(t)
-        self.broadcast.gets(self._connections.values())
-        self.broadcast.due(t, self._effects)
+        if self.broadcast.active or any(one.subscriptions for one in self._connections.values()):
+            self.broadcast.gets(self._connections.values())
+            self.broadcast.due(t, self._effects)
         if self.intake.preparation.waiting:
             self._effects += self.intake.orders.overdue(t + EPSILON)
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning

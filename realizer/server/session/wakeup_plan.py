@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from realizer.playback.player import Player
@@ -61,16 +62,18 @@ class Rhythm:
 
     def next(self) -> float:
         """When something is due that is no document; infinite where nothing is."""
-        other = self._calm
+        other, streams = self._calm, self._broadcast
         if other is None:
             self._tells, asked = self._player.next_change(), self._intake.orders.deadline()
-            other = self._broadcast.next_other if asked is None else min(self._broadcast.next_other, asked)
+            other = streams.next_other if streams.active else math.inf
+            other = other if asked is None else min(other, asked)
             # Speeches that last and clients that are slow are looked at with every frame, plans with whatever
             # is told.
             slow = any(connection.slow for connection in self._connections.values())
-            if not (self.reads or slow or self._intake.speeches.lasting or self._broadcast.shows_plans):
+            shown = streams.active and streams.shows_plans
+            if not (self.reads or slow or self._intake.speeches.lasting or shown):
                 self._calm = other
-        return min(other, self._tells, self._broadcast.next_frame)
+        return min(other, self._tells, streams.next_frame if streams.active else math.inf)
 
     def go_on(self, following: float, opened: float) -> float:
         """As `next`, when frames have been sent; those that follow need nobody to ask for them, if they can.

@@ -114,7 +114,11 @@ class Run:
 
 
 class Broadcast:
-    """The timelines, sounds and pictures of one session, each computed once for all who get it."""
+    """The timelines, sounds and pictures of one session, each computed once for all who get it.
+
+    Attributes:
+        active: a connection has a subscription: otherwise nothing is ever due.
+    """
 
     def __init__(self, player: Player, faces: Faces) -> None:
         self.player = player
@@ -128,6 +132,7 @@ class Broadcast:
         self._sound_takers: list[tuple[Connection, SoundSubscription]] = []
         self._plan_takers: list[tuple[Connection, PlanSubscription]] = []
         self._picture_takers: list[PictureSubscription] = []
+        self.active = False
 
     def timeline(self, index: int, fps: float) -> Timeline:
         """The frames of one character at one rate."""
@@ -152,6 +157,7 @@ class Broadcast:
 
     def look(self, index: int, fps: float, look: Look, now: float) -> PictureSubscription:
         """A subscription to pictures, from `now` on."""
+        self.active = True  # it may be refused yet: then `due` forgets its view
         return self.pictures.subscription(self.timeline(index, fps), index, look, now)
 
     def face_changed(self, index: int) -> list[tuple[int, FrameSubscription]]:
@@ -182,6 +188,7 @@ class Broadcast:
                 else:
                     self._picture_takers.append(s)
         self._lanes = [Lane(timeline, members) for timeline, members in lanes.items()]
+        self.active = bool(lanes or self._plan_takers or self._sound_takers or self._picture_takers)
 
     def due(self, now: float, effects: list[Effect]) -> None:
         """Every frame, packet and drawing whose time has come, to those of the last `gets`."""
