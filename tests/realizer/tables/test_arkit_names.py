@@ -24,6 +24,10 @@ def test_usual_spellings_are_understood(spell: Callable[[str], str]) -> None:
     assert {canonical(spell(name)) for name in shapes()} == set(shapes())
 
 
+def test_a_side_may_stand_behind_a_dot() -> None:
+    assert canonical("head_eyeBlink.R") == "eyeBlinkRight"
+
+
 @pytest.mark.parametrize("name", ["viseme_aa", "", "jaw", "open", "L"])
 def test_a_name_of_something_else_is_none_of_arkit_s(name: str) -> None:
     assert canonical(name) is None

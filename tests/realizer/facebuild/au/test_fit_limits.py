@@ -104,11 +104,10 @@ def test_what_is_watched_is_each_vertex_once_on_the_left(face: Face) -> None:
 def test_the_command_writes_nothing_that_tears_the_face(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    import realizer.face.au as package
     from realizer.cli.fit import fit
 
     model = torn(read_model(FOLDER / "au_published.toml"))
-    monkeypatch.setattr(package, "fit_models", lambda *_: {"published": model})
+    monkeypatch.setattr("realizer.facebuild.au.fit.fit_models", lambda *_: {"published": model})
     done = CliRunner().invoke(fit, ["default", "--form", "published", "-o", str(tmp_path)])
     assert isinstance(done.exception, FaceError)
     assert "nothing written" in str(done.exception)
