@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from realizer.face.contours import CONTOURS, contours_of, together
-from realizer.face.load import list_faces, load_face
+from realizer.face.load import load_face
 from realizer.tables import faps
-
-FACES = [info.name for info in list_faces()]
+from tests.shipped import FACES
 
 
 @pytest.fixture(params=FACES)

@@ -8,10 +8,9 @@ from realizer.face.au.model import Model
 from realizer.face.au.mouth import shares
 from realizer.face.au.skin_binding import grown, skin
 from realizer.face.au.successive_mixer import Succession
-from realizer.face.load import list_faces, load_face
+from realizer.face.load import load_face
 from realizer.face.model import Face
-
-FACES = [info.name for info in list_faces()]
+from tests.shipped import FACES
 
 
 @pytest.fixture(scope="module", params=FACES)

@@ -17,8 +17,13 @@ from realizer.tables import Fap, faps
 
 
 @pytest.fixture(scope="module")
-def brought(ada_glb: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Face, Report]:
-    place = tmp_path_factory.mktemp("faces")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where imported faces are."""
+    return tmp_path_factory.mktemp("faces")
+
+
+@pytest.fixture(scope="module")
+def brought(ada_glb: Path, place: Path) -> tuple[Face, Report]:
     report = import_head(ada_glb, place / "again")
     assert check_face("again", place) == ()
     return load_face("again", place), report
@@ -34,9 +39,8 @@ def test_a_head_comes_back_with_its_size_and_parts(brought: tuple[Face, Report])
     assert report.missing == ()
 
 
-def test_its_action_units_can_be_fitted(brought: tuple[Face, Report], ada_glb: Path, tmp_path: Path) -> None:
-    import_head(ada_glb, tmp_path / "fit")
-    measured = read_shapes(tmp_path / "fit" / "au_shapes.npz")
+def test_its_action_units_can_be_fitted(brought: tuple[Face, Report], place: Path) -> None:
+    measured = read_shapes(place / "again" / "au_shapes.npz")
     assert {1, 2, 4, 5, 6, 9, 12, 15, 16, 17, 20, 26, 43} <= set(measured)
     assert all(one.moves.any() and (one.at[:, 0] > -1e-6).all() for one in measured.values())
     assert brought[1].found[-1].startswith(f"{len(measured)} action units")

@@ -12,6 +12,7 @@ from realizer.core.errors import FaceError
 from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
+from realizer.face.model import Face
 from realizer.facebuild.au.fit import fit_models, table, table_text
 from realizer.facebuild.au.measure import read_measured, read_shapes
 
@@ -66,6 +67,7 @@ def test_the_table_is_hers(known: Model) -> None:
         assert row.n > 100
 
 
+@pytest.mark.slow
 def test_more_gaussians_come_nearer() -> None:
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
     shapes = read_shapes(folder / "au_shapes.npz")
@@ -75,6 +77,7 @@ def test_more_gaussians_come_nearer() -> None:
     assert len(models["extended"].units[1].motions["whole"].gaussians) <= 4
 
 
+@pytest.mark.slow
 def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
     (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,)))
     command = [sys.executable, "-m", "realizer", "faces", "fit", "default", "--from", "landmarks.csv"]
@@ -92,6 +95,15 @@ def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path:
     assert set(read_model(tmp_path / "mine.toml").units) == {2}
 
 
+@pytest.fixture(scope="module")
+def fitted(known: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Model]]:
+    """Landmarks of one unit, and a model of them that serves as either form."""
+    path = tmp_path_factory.mktemp("fit") / "landmarks.csv"
+    path.write_text(landmarks(known, (2,), 30))
+    model = fit_models(load_face(), read_measured(path), ("published",))["published"]
+    return path, {"published": model, "extended": model}
+
+
 @pytest.mark.parametrize(
     ("words", "files"),
     [
@@ -101,17 +113,26 @@ def test_the_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path:
     ],
 )
 def test_the_command_writes_a_file_for_each_form(
-    known: Model, tmp_path: Path, words: list[str], files: list[str]
+    fitted: tuple[Path, dict[str, Model]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    files: list[str],
 ) -> None:
     from click.testing import CliRunner
 
     from realizer.cli.fit import fit
 
-    (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,), 30))
-    given = ["default", "--from", str(tmp_path / "landmarks.csv"), "-o", str(tmp_path)]
+    path, models = fitted
+
+    def fit_again(face: Face, measured: object, forms: tuple[str, ...], *_: object) -> dict[str, Model]:
+        return {form: models[form] for form in forms}
+
+    monkeypatch.setattr("realizer.facebuild.au.fit.fit_models", fit_again)
+    given = ["default", "--from", str(path), "-o", str(tmp_path)]
     done = CliRunner().invoke(fit, [*given, *words], catch_exceptions=False)
     assert done.exit_code == 0, done.output
-    assert sorted(path.name for path in tmp_path.glob("*.toml")) == sorted(files)
+    assert sorted(file.name for file in tmp_path.glob("*.toml")) == sorted(files)
 
 
 @pytest.mark.parametrize("output", ["mine.toml", "nowhere"])
