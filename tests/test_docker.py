@@ -24,6 +24,8 @@ from websockets.asyncio.client import connect
 from realizer.cli.serve import serve
 from realizer.core.settings import Settings
 
+pytestmark = pytest.mark.xdist_group("image")
+
 ROOT = Path(__file__).parents[1]
 DOCKER = ROOT / "docker"
 DOCKERFILE = (DOCKER / "Dockerfile").read_text("utf-8")
@@ -207,6 +209,7 @@ def test_the_script_says_how_it_is_used() -> None:
     assert "TARGET" in done.stderr
 
 
+@pytest.mark.slow
 def test_what_is_installed_is_itself_and_has_no_pip(installed: Path) -> None:
     assert (installed / "bin" / "realizer").is_file()
     assert list(installed.glob("lib/*/site-packages/realizer/_faces/*/face.toml"))
@@ -244,6 +247,7 @@ def confined(command: list[str], writable: Path, environment: Mapping[str, str])
 
 @pytest.mark.gl("onboard")
 @pytest.mark.espeak
+@pytest.mark.slow
 def test_the_service_speaks_and_draws_where_nothing_can_be_written(installed: Path) -> None:
     async def test(url: str) -> list[str]:
         streams, told = set(), []

@@ -32,7 +32,13 @@ def test_realize_without_an_output_prints_json() -> None:
     assert json.loads(done.stdout)["schedule"][0]["behaviours"]["n"]["start"] == 1.0
 
 
-@pytest.mark.parametrize("suffix", [".fap", ".json", ".csv", ".vtt", ".wav"])
+SUFFIXES = [
+    ".fap",
+    *(pytest.param(suffix, marks=pytest.mark.slow) for suffix in (".json", ".csv", ".vtt", ".wav")),
+]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_realize_writes_the_same_bytes_twice(suffix: str, tmp_path: Path) -> None:
     document = tmp_path / "d.bml"
     document.write_text(GOOD)
@@ -153,6 +159,7 @@ def test_a_document_of_a_day_says_what_is_too_much() -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_files_that_documents_name_are_found_in_the_media_folder(tmp_path: Path) -> None:
     mask = " ".join("1" if fap == 31 else "0" for fap in range(1, 69))
     frames = "\n".join(f"{mask}\n{k} {value}" for k, value in enumerate((0, 80, 0)))
@@ -194,6 +201,7 @@ def test_a_target_that_is_not_there_is_no_dropped_behaviour(tmp_path: Path) -> N
     assert "NO_SUCH_TARGET" in done.stderr
 
 
+@pytest.mark.slow
 def test_prosody_can_be_switched_off() -> None:
     talk = '<bml id="b"><speech id="s"><text>Remember the tower</text></speech></bml>'
     lively, still, wrong = (

@@ -28,6 +28,14 @@ def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> lis
         return [picture[..., :3].copy() for picture in renderer.draw(poses(frames, takes(face)))]
 
 
+def test_expression_is_found_in_a_picture_of_a_face_that_is_known() -> None:
+    _, picture, *_ = drawn("ada", "evening", (150, 200), 0.7)
+    seen = by_picture(picture, KNOWN, ["ada"])
+    assert (seen.face, seen.light, seen.neutral) == ("ada", "evening", False)
+    assert seen.found[0][0] is KNOWN[0]
+
+
+@pytest.mark.slow
 def test_face_light_and_expression_are_found_in_a_picture_of_any_size() -> None:
     neutral, *pictures = drawn("ben", "evening", (300, 400), 0.7)
     for one, picture in list(zip(KNOWN, pictures, strict=True))[:2]:

@@ -64,6 +64,7 @@ def by_name(outcomes: list[Outcome]) -> dict[str, Outcome]:
     return {outcome.row["document"]: outcome for outcome in outcomes}
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_what_one_worker_gives_here_though_one_of_its_workers_is_killed(
     scheduler: str, workers: list[subprocess.Popen[str]], tasks: list[Task], options: Options
 ) -> None:

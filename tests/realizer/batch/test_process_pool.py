@@ -54,6 +54,7 @@ class Deadly(Options):
         return os._exit, (3,)
 
 
+@pytest.mark.slow
 def test_a_document_whose_worker_always_dies_is_given_up(tasks: list[Task], options: Options) -> None:
     deadly = Deadly(formats=options.formats, voice=options.voice)
     outcomes = list(Processes(deadly, 1).perform(tasks[:1]))

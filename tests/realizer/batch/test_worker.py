@@ -91,6 +91,7 @@ def test_a_voice_that_is_killed_between_documents_costs_nothing(tasks: list[Task
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.slow
 def test_pictures_are_drawn_by_processes_that_stay_and_are_the_same_in_any_order(
     tasks: list[Task], options: Options, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -121,6 +121,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     assert "mine.txt: wanted a text in UTF-8" in " ".join(done.stderr.split())
 
 
+@pytest.mark.slow
 def test_the_wheel_is_a_picture_of_64_faces_and_the_word_one_of_its_own(tmp_path: Path) -> None:
     from PIL import Image
 

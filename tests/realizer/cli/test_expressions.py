@@ -73,6 +73,7 @@ def test_nothing_found_is_said_and_counts() -> None:
     assert "nothing in the library goes with 'qqqq'" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_neutral_face_with_its_head_turned_a_little_is_like_no_expression(tmp_path: Path) -> None:
     import numpy as np
     from PIL import Image

@@ -70,6 +70,7 @@ def test_serve_refuses_a_wrong_look_before_a_door_opens(args: list[str], words: 
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_light_and_background_are_seen_in_the_picture(tmp_path: Path) -> None:
     from PIL import Image
 

@@ -17,6 +17,7 @@ def sheet(*args: str) -> Result:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_the_archetypes_from_two_sides_stand_beside_what_changed(tmp_path: Path) -> None:
     path = tmp_path / "x.png"
     done = sheet("-o", str(path), "--emotions", "--size", "60x80", "--camera", "front", "--camera", "profile")

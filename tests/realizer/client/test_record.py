@@ -35,6 +35,7 @@ def serving(test) -> None:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_the_film_of_a_block_shows_what_is_drawn_without_a_clock(tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="needs the film extra")
     import realizer

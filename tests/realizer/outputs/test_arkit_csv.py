@@ -13,6 +13,8 @@ from realizer.offline import realize
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS, output_for
 
+pytestmark = pytest.mark.xdist_group("outputs")
+
 SAYS = "Hello my beautiful world, four blue boats have a very good view of the sea."
 SPEECH = (
     '<bml id="a" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'

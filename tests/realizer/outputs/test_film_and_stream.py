@@ -15,6 +15,8 @@ from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Draw, Speak
 from tests.realizer.server.conftest import Driver
 
+pytestmark = pytest.mark.xdist_group("outputs")
+
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")
 
 FPS, SIZE = 12.5, (160, 160)
@@ -69,6 +71,7 @@ def test_the_pictures_are_the_same_to_the_bit(streamed, played):
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_a_film_has_them_as_far_as_its_encoder_lets_it(streamed, played, tmp_path):
     path = tmp_path / "x.mp4"
     OUTPUTS[".mp4"].write(played, path, Drawing(SIZE))

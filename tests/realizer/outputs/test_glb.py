@@ -20,6 +20,8 @@ from realizer.outputs.morph_targets import TRUE, morphs
 from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
 
+pytestmark = pytest.mark.xdist_group("outputs")
+
 FPS = 12.5
 EYES = ("left_eye", "right_eye")
 

@@ -11,6 +11,8 @@ from realizer.face.load import load_face
 from realizer.offline import realize
 from realizer.outputs.morph_targets import TRUE, morphs
 
+pytestmark = pytest.mark.xdist_group("outputs")
+
 
 @pytest.fixture(scope="module", params=["mpeg4", "au"])
 def played(request, turn):

@@ -60,6 +60,7 @@ def test_with_an_instant_the_png_is_one_picture_of_that_size(realization, tmp_pa
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_path):
     first = drawn(realization, tmp_path / "x.png", Drawing((160, 120)))
     drawn(realization, tmp_path / "y.png", Drawing((160, 120)))
@@ -69,6 +70,7 @@ def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_pa
 
 @pytest.mark.gl
 @pytest.mark.parametrize("at", [None, 0.4])
+@pytest.mark.slow
 def test_what_draws_may_be_started_before_there_is_anything_to_draw(realization, tmp_path, at):
     drawing = Drawing((160, 120), at=at)
     early = OUTPUTS[".png"].begin(drawing, realization.face_name, realization.deformer)

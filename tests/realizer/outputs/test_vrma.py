@@ -17,6 +17,8 @@ from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.vrma import encode_vrma, expressions
 from realizer.tables.lexemes import face_lexemes
 
+pytestmark = pytest.mark.xdist_group("outputs")
+
 PRESETS = {"aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "angry", "sad", "surprised"}
 
 

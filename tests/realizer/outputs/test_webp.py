@@ -52,6 +52,7 @@ def test_times_that_are_no_whole_milliseconds_do_not_drift(tmp_path):
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_a_realization_becomes_an_animated_picture_of_its_face(realization, tmp_path):
     for name in ("x", "y"):
         OUTPUTS[".webp"].write(realization, tmp_path / f"{name}.webp", Drawing(size=(97, 96)))

@@ -352,6 +352,7 @@ def test_an_id_in_use_is_refused(stage: Stage) -> None:
     assert stage.progress().count("a:end DONE 4") == 1
 
 
+@pytest.mark.slow
 def test_a_thousand_appended_blocks_follow_one_another_and_move_together(stage: Stage) -> None:
     for n in range(1000):
         stage.send(f"b{n}", wait(1), composition="APPEND")

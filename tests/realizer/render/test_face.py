@@ -12,7 +12,7 @@ from realizer.face.load import load_face
 from realizer.render import Renderer
 from realizer.render.cameras import camera_for
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.xdist_group("render")]
 
 SIZE = (256, 256)
 OPEN = {3: 900, 5: -900, 10: -750, 11: -750, 52: -900, 57: -750, 58: -750}
@@ -119,7 +119,9 @@ def test_a_head_turned_to_its_left_looks_to_the_picture_s_right(renderer, face):
     assert np.abs(straight.astype(int) - turned).mean() > 3
 
 
-@pytest.mark.parametrize("camera", ["three-quarter", "profile", "close"])
+@pytest.mark.parametrize(
+    "camera", ["three-quarter", pytest.param("profile", marks=pytest.mark.slow), "close"]
+)
 def test_every_camera_shows_the_head(camera):
     with Renderer("default", (128, 128), camera) as renderer:
         (picture,) = renderer.draw(row())

@@ -19,6 +19,8 @@ import realizer
 from realizer.core.errors import RealizerError, RenderError
 from realizer.render import Renderer, available
 
+pytestmark = pytest.mark.xdist_group("render")
+
 SIZE = (96, 80)
 
 
@@ -72,7 +74,7 @@ def test_pictures_that_nobody_takes_do_not_mix_with_the_next_call(renderer, left
 
 
 @pytest.mark.gl
-@pytest.mark.parametrize("call", ["draw", "jpeg"])
+@pytest.mark.parametrize("call", ["draw", pytest.param("jpeg", marks=pytest.mark.slow)])
 def test_a_killed_process_is_an_error_once_and_replaced_at_the_next_call(call):
     with Renderer("default", SIZE) as renderer:
         first = renderer.draw(rows(1))

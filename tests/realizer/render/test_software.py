@@ -13,7 +13,7 @@ from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.software import OnboardCanvas
 
-pytestmark = pytest.mark.gl("onboard")
+pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
 
 SIZE = (256, 256)
 

@@ -13,6 +13,8 @@ from realizer.face.load import load_face
 from realizer.face.surface import normals
 from realizer.render.wrinkles import Wrinkles
 
+pytestmark = pytest.mark.xdist_group("render")
+
 # What stands for an action unit on this face, in FAPs: each at full strength.
 RAISED = {31: 220, 32: 220, 33: 160, 34: 160, 35: 120, 36: 120}
 FROWN = {31: -150, 32: -150, 37: 170, 38: 170}

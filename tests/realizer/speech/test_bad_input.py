@@ -23,6 +23,8 @@ from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.utterance import Say, Utterance, Voice
 
+pytestmark = pytest.mark.xdist_group("voices")
+
 SSML = "application/ssml+xml"
 
 

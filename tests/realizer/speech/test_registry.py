@@ -13,6 +13,8 @@ from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.registry import find_voice, voices
 
+pytestmark = pytest.mark.xdist_group("voices")
+
 
 def test_voices_are_listed_with_what_they_are() -> None:
     assert [voice.name for voice in voices()] == ["espeak", "hibari", "silent"]

@@ -23,6 +23,8 @@ from realizer.render import Renderer
 from realizer.server.session.session import Session
 from realizer.server.streams.frame_windows import Timeline
 
+pytestmark = pytest.mark.xdist_group("render")
+
 BOTH = ("mpeg4", "au")
 SPEECH = '<speech id="s" start="0.2"><text>Maybe you would both prefer a warm moment of fun.</text></speech>'
 WHEN = 'start="0" attackPeak="0.4" relax="1" end="1.4"'
@@ -160,6 +162,7 @@ def test_both_change_the_picture_at_the_same_place(renderers: dict[str, Renderer
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_a_still_is_drawn_by_the_deformer_that_was_asked_for(tmp_path: Path) -> None:
     (tmp_path / "x.bml").write_text(f'<bml id="b">{facs(12)}</bml>')
     pictures = []

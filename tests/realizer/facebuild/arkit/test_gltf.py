@@ -22,6 +22,8 @@ from realizer.facebuild.arkit.importer import look_at
 from realizer.facebuild.arkit.scene import read_pieces
 from realizer.tables.arkit_names import canonical, nearest
 
+pytestmark = pytest.mark.xdist_group("fits")
+
 WAYS = {
     "as glTF asks": np.eye(3),
     "+z up, facing +x": np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]]),

@@ -15,6 +15,8 @@ from realizer.facebuild.au.measure import read_shapes
 from realizer.facebuild.check import check_face
 from realizer.tables import Fap, faps
 
+pytestmark = pytest.mark.xdist_group("fits")
+
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -96,6 +98,7 @@ def egg_with_painted_eyes(new_glb: type) -> bytes:
     return bytes(glb.bytes())
 
 
+@pytest.mark.slow
 def test_an_egg_with_few_shapes_and_painted_eyes_becomes_a_face(new_glb: type, tmp_path: Path) -> None:
     path = tmp_path / "egg.glb"
     path.write_bytes(egg_with_painted_eyes(new_glb))

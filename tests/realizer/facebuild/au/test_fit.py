@@ -16,6 +16,8 @@ from realizer.face.model import Face
 from realizer.facebuild.au.fit import fit_models, table, table_text
 from realizer.facebuild.au.measure import read_measured, read_shapes
 
+pytestmark = pytest.mark.xdist_group("fits")
+
 HEAD = "# source: made for tests\n# units: metres\n# licence: MIT\nau,x,y,z,dx,dy,dz\n"
 
 

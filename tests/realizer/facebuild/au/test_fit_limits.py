@@ -18,6 +18,8 @@ from realizer.facebuild.au.fit import fit_models
 from realizer.facebuild.au.fit_limits import FURTHEST, overshoot, runaways, watched
 from realizer.facebuild.au.measure import Measured, read_shapes
 
+pytestmark = pytest.mark.xdist_group("fits")
+
 FITTED = {info.name: info.path for info in list_faces() if (info.path / "au_extended.toml").is_file()}
 FOLDER = FITTED[load_face().name]
 FORMS = ("published", "extended")
@@ -53,6 +55,7 @@ def test_nor_does_any_place_near_the_face(name: str, form: str) -> None:
         assert far < 2 * d_max, f"AU{au}"
 
 
+@pytest.mark.slow
 def test_places_that_nobody_measured_are_held_too(face: Face) -> None:
     """A few landmarks in a row leave all else open; no vertex takes more than is allowed all the same."""
     x = np.linspace(0.005, 0.03, 8)

@@ -17,6 +17,8 @@ from realizer.facebuild.mpeg4.build import apply_zones, setup_of
 from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
 from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
 
+pytestmark = pytest.mark.xdist_group("faces")
+
 
 def copy(to: Path, fields: bool = False) -> Path:
     """The default face without what its shapes made."""

@@ -13,6 +13,8 @@ from realizer.facebuild.person.scalp import Scalp
 from realizer.facebuild.submesh import Patch, vertex_normals
 from realizer.tables import read_toml, text_of
 
+pytestmark = pytest.mark.xdist_group("faces")
+
 STYLES = list(read_toml(text_of("hair.toml"), "hair.toml")["styles"])
 LOOK = {"hair": [70, 48, 36], "skin": [226, 178, 152]}
 CLOSE = ("bun", "short", "buzz", "receding", "rim")  # styles that hang nowhere

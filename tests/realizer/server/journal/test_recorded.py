@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 from websockets.asyncio.client import ClientConnection, connect
 
@@ -162,6 +163,7 @@ def test_where_the_record_is_not_here_another_one_begins_with_what_the_session_w
     assert all(row[30] < -50 for row in faps[:5]), "the brow is held down from the first frame on"
 
 
+@pytest.mark.slow
 def test_with_two_workers_each_session_has_one_whole_record(tmp_path: Path) -> None:
     async def play(url: str) -> dict[str, list[str]]:
         names = [f"s{k}" for k in range(6)]

@@ -180,6 +180,7 @@ def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
     assert [int(jaw[round(25 * at)]) for at in (0.4, 1.2, 2.3, 3.2)] == [0, 100, 0, 60]
 
 
+@pytest.mark.slow
 def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> None:
     doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
     record, got = recorded(tmp_path, doings, 2.0)

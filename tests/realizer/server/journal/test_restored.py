@@ -101,6 +101,7 @@ def in_a_checkpoint(where: str, session: str) -> bool:
         return file.execute("SELECT 1 FROM parts WHERE session = ?", (session,)).fetchone() is not None
 
 
+@pytest.mark.slow
 def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outlived_its_blocks(
     where: str,
 ) -> None:
@@ -164,6 +165,7 @@ def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_and_in_order(
     where: str,
 ) -> None:
@@ -205,6 +207,7 @@ def test_fifty_clients_of_a_service_that_is_killed_all_have_their_feedback_once_
         assert points(texts) == ["b:start", *(f"b:n:{point}" for point in POINTS), "b:end"]
 
 
+@pytest.mark.slow
 def test_what_is_held_is_held_afterwards(where: str) -> None:
     async def hold(url: str) -> None:
         async with asyncio.timeout(LIMIT), connect(f"{url}?session=held") as client:

@@ -72,6 +72,7 @@ def test_one_kind_of_picture_too_many_is_refused_and_the_others_are_drawn(
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_a_renderer_that_takes_long_to_start_is_not_ended_for_another_one(
     studio, clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,8 @@ from realizer.server.runtime.workers import Workers
 from realizer.server.serve import run_worker
 from tests.programs import SERVE, running
 
+pytestmark = pytest.mark.xdist_group("workers")
+
 T = TypeVar("T")
 LIMIT = 60  # s; a hung test ends
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
@@ -321,6 +323,7 @@ def test_a_worker_that_hangs_does_not_keep_the_service_from_ending(
     assert "worker 1 does not end: it is killed" in caplog.text
 
 
+@pytest.mark.slow
 def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> None:
     command = [sys.executable, "-m", "realizer", "-v", "serve", "--port", "0", "--voice", "silent"]
     command += ["--workers", "2", "--token", "a-token-nobody-knows"]
@@ -335,6 +338,7 @@ def test_workers_say_as_much_as_the_command_was_asked_to_and_who_they_are() -> N
     assert any(line.startswith("realizer: worker 1: ") and "token" in line for line in logged.splitlines())
 
 
+@pytest.mark.slow
 def test_what_a_worker_lacks_is_told_once_by_the_command_and_without_a_traceback() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         command = [*SERVE, "--workers", "2", "--xface-port", str(taken.getsockname()[1])]

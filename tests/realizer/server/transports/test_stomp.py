@@ -19,6 +19,8 @@ from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.stomp import StompDoor
 
+pytestmark = pytest.mark.xdist_group("brokers")
+
 LIMIT = 60  # s; a hung test ends
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'

@@ -12,6 +12,8 @@ from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedba
 from realizer.server.transports.message_format import Leave, ToSession
 from realizer.server.transports.vhmsg import Vhmsg
 
+pytestmark = pytest.mark.xdist_group("brokers")
+
 TRICKY = '<bml id="b"><speech id="s"><text>50 % + é &amp; more</text></speech></bml>'
 
 

@@ -25,6 +25,8 @@ from realizer.speech.ssml_prosody import Prosody
 from realizer.speech.utterance import Say, Utterance
 from realizer.tables.phonemes import phoneme_features
 
+pytestmark = pytest.mark.xdist_group("voices")
+
 hibari = pytest.mark.hibari
 
 HELLO = Say('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))

@@ -220,6 +220,7 @@ def test_one_who_connects_too_often_is_told_and_the_others_notice_nothing() -> N
     serving(test, max_connections=20)
 
 
+@pytest.mark.slow
 def test_one_who_connects_again_and_again_disturbs_nobody() -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as viewer:
@@ -244,6 +245,7 @@ HELD = (
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_the_stream_shows_what_is_drawn_without_a_clock() -> None:
     import realizer
     from realizer.render import Renderer
@@ -285,6 +287,7 @@ def test_a_message_that_is_too_long_ends_its_own_connection_and_says_why() -> No
     serving(test, max_message=10_000, max_document=2_000)
 
 
+@pytest.mark.slow
 def test_a_crowd_that_asks_for_everything_at_once_is_answered() -> None:
     async def test(server: Server) -> None:
         async def one(number: int) -> None:
