@@ -24,7 +24,7 @@ from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
-from realizer.server.transports.websocket import writer
+from realizer.server.transports.websocket import connection
 from tests.programs import serving
 from tests.realizer.server.conftest import Clock
 from tests.told import feedback, numbers
@@ -271,7 +271,7 @@ def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_i
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_host, "SWEEP", 0.05)
-    monkeypatch.setattr(writer, "GOODBYE", LIMIT)
+    monkeypatch.setattr(connection, "GOODBYE", LIMIT)
 
     async def run() -> None:
         async with (
