@@ -209,7 +209,7 @@ class Timeline:
 
     Args:
         face: what is drawn; called when the first mesh or pose is asked for.
-        mapping: what its AUs ask of FAPs; called for each window.
+        mapping: what its AUs ask of FAPs; called again when the face has changed.
     """
 
     def __init__(
@@ -224,7 +224,8 @@ class Timeline:
         self.character = character
         self.fps = fps
         self._face = face
-        self._mapping = mapping
+        self._find_mapping = mapping
+        self._mapping: FapMapping | None = None
         self._window: Window | None = None
         self._revision = -1
 
@@ -237,7 +238,9 @@ class Timeline:
             def aus(times: Float64) -> AUFrames:
                 return self.player.frames(times, self.character)
 
-            window = self._window = Window(first, count, self.fps, aus, self._face, self._mapping())
+            if self._mapping is None:
+                self._mapping = self._find_mapping()
+            window = self._window = Window(first, count, self.fps, aus, self._face, self._mapping)
             self._revision = self.player.revision
         return window
 
@@ -248,7 +251,7 @@ class Timeline:
 
     def forget(self) -> None:
         """Compute anew what comes next: the face has changed."""
-        self._window = None
+        self._window = self._mapping = None
 
 
 class Wanted(Protocol):

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
+from realizer.animation.fap.au_fap_mapping import FapMapping, standard
+from realizer.playback.player import Player
 from realizer.protocol.streams import STREAMS
 from realizer.server.streams.audio_stream import Sound
 from realizer.server.streams.frame_windows import TURNS, Timeline
@@ -114,3 +116,18 @@ def test_the_state_tells_each_layer_s_part_of_the_face(drive) -> None:
     assert face["aus"]["4L"] > 0
     assert face["face"] == driver.session.faces.name(0)
     assert {(b["id"], *b["behaviours"]) for b in state["blocks"]} >= {("b", "f"), ("g", "g")}
+
+
+def test_timeline_finds_its_mapping_again_when_the_face_has_changed() -> None:
+    found: list[FapMapping] = []
+
+    def mapping() -> FapMapping:
+        found.append(standard())
+        return found[-1]
+
+    timeline = Timeline(Player(idle=False), 0, 25.0, lambda: pytest.fail("no face is wanted"), mapping)
+    assert timeline.window(0, 0) is not timeline.window(1000, 1000)
+    assert len(found) == 1
+    timeline.forget()
+    timeline.window(1000, 1000)
+    assert len(found) == 2
