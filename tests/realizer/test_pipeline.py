@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from bml_schema import BMLError
-from realizer import realize, schedule
+from bml_schema import write
+from realizer import pipeline, realize
+from realizer.core.options import PlayOptions
 from realizer.examples import examples
+from realizer.face.deform import deform
+from realizer.playback import block_planner
 from realizer.realization import Realization
 from realizer.speech.silent import SilentVoice
 from realizer.tables import faps
@@ -67,11 +72,6 @@ def test_long_documents_have_no_seam_between_windows() -> None:
     assert np.abs(np.diff(values, axis=0)).max() < 40
 
 
-def test_schedule_of_a_document_that_is_no_block_is_an_error() -> None:
-    with pytest.raises(BMLError, match="id"):
-        schedule("<bml/>")
-
-
 @pytest.mark.parametrize("name", ["greeting", "nod-on-a-word", "gaze-and-back"])
 def test_frames_are_the_golden_ones(name: str, request: pytest.FixtureRequest) -> None:
     """FAP frames at 25 fps as text, one frame a line: a change is a diff that can be read."""
@@ -89,6 +89,87 @@ def test_frames_are_the_golden_ones(name: str, request: pytest.FixtureRequest) -
     assert ours.shape == theirs.shape
     # One unit for the last bit of another machine's arithmetic.
     assert np.abs(ours - theirs).max() <= 1
+
+
+NOD = (
+    '<bml id="b"><speech id="s"><text>Well <sync id="now"/> yes.</text></speech>'
+    '<head id="n" lexeme="NOD" stroke="s:now"/><faceLexeme id="f" lexeme="SMILE" start="n:end"/></bml>'
+)
+
+
+def test_steps_pass_on_the_golden_values(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every step runs under its name, in order, and what it gives is what the golden file says."""
+    passed: dict[str, Any] = {}
+
+    def note(step: str, holder: Any, name: str, describe: Any) -> None:
+        run = getattr(holder, name)
+
+        def noted(*args: Any, **kwargs: Any) -> Any:
+            result = run(*args, **kwargs)
+            passed[step] = describe(result, *args)
+            return result
+
+        monkeypatch.setattr(holder, name, noted)
+
+    def read(result: Any, *_: Any) -> str:
+        (block,) = result
+        return write(block)
+
+    builder = block_planner._Work
+    run_read = pipeline.read
+    monkeypatch.setattr(pipeline, "read", lambda *args: list(run_read(*args)))
+    note("parse", pipeline, "read", read)
+    note("time", builder, "time", lambda _, own: {b: rounded(t.preferred) for b, t in own.timings.items()})
+    note("schedule", builder, "schedule", lambda got, *_: {b: rounded(t) for b, t in got[0].times.items()})
+    note("expand", builder, "expand", lambda got, *_: {b: described(cs) for b, cs in got.items()})
+    note("blend", pipeline, "blend", lambda got, *_: rounded(got.aus.max(axis=0)))
+    note("map", pipeline, "to_fap", lambda frames, *_: rounded(np.abs(frames.values).max(axis=0), 1))
+    played = pipeline.play([NOD], PlayOptions(idle=False), SilentVoice())
+    moved = deform(played.face, played.poses[::10]) - played.face.vertices
+    passed["deform"] = rounded(np.abs(moved).max(axis=(0, 1)) * 1000)  # millimetres
+    assert list(passed) == ["parse", "time", "schedule", "expand", "blend", "map", "deform"]
+    golden = GOLDEN / "steps.json"
+    if request.config.getoption("--update-golden"):
+        lines = (f"{json.dumps(step)}: {json.dumps(value)}" for step, value in passed.items())
+        golden.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+    expected = json.loads(golden.read_text())
+    for step, value in passed.items():
+        assert flat(value) == pytest.approx(flat(expected[step]), rel=1e-3, abs=2e-3), step
+
+
+def rounded(values: Any, digits: int = 4) -> list[float]:
+    return [round(float(v), digits) for v in values]
+
+
+def described(channels: Any) -> dict[str, list[float]]:
+    """{target: first key, last key, greatest value} of the last channel of each target."""
+    ends = {c.target.name: (c.times[0], c.times[-1], np.abs(c.values).max()) for c in channels}
+    return {name: rounded(values) for name, values in ends.items()}
+
+
+def flat(value: Any, path: str = "") -> dict[str, Any]:
+    """{path: number or text} of all that is in a value."""
+    if isinstance(value, str):
+        return {f"{path}={value}": 0.0}
+    if isinstance(value, dict | list):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        return {key: one for name, part in items for key, one in flat(part, f"{path}/{name}").items()}
+    return {path: value}
+
+
+@pytest.mark.gl
+def test_pictures_draw_the_frames_that_are_asked_for() -> None:
+    from realizer.render.renderer import Renderer
+
+    played = pipeline.play([NOD], PlayOptions(idle=False), SilentVoice())
+    frames = [0, played.frames // 2]
+    with Renderer(size=(64, 64)) as renderer:
+        drawn = [picture.copy() for picture in pipeline.pictures(played, renderer, frames)]
+        alone = renderer.draw(played.poses[frames[1:]])
+    assert np.array_equal(drawn[1], alone[0])
+    assert not np.array_equal(drawn[0], drawn[1])
 
 
 @pytest.fixture

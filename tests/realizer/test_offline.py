@@ -1,0 +1,40 @@
+"""The public functions that play and schedule documents without a clock."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import fields
+
+import pytest
+
+from bml_schema import BMLError
+from realizer import realize, schedule
+from realizer.core.options import PlayOptions
+
+NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
+
+
+def test_realize_takes_the_options_of_playing_with_their_defaults() -> None:
+    parameters = inspect.signature(realize).parameters
+    options = {name: p.default for name, p in parameters.items() if name not in ("documents", "voice")}
+    assert options == {f.name: f.default for f in fields(PlayOptions)}
+
+
+def test_realize_takes_one_text_or_several() -> None:
+    one, two = realize(NOD, idle=False), realize([NOD, NOD.replace('"b"', '"c"')], idle=False)
+    assert (len(one.schedules), len(two.schedules)) == (1, 2)
+
+
+def test_realize_refuses_a_rate_that_is_not_above_0() -> None:
+    with pytest.raises(ValueError, match="fps: wanted a number above 0, got 0"):
+        realize(NOD, fps=0)
+
+
+def test_schedule_gives_the_times_that_realize_plays() -> None:
+    (played,) = realize(NOD, idle=False).schedules
+    assert schedule(NOD).behaviours == played.behaviours
+
+
+def test_schedule_refuses_a_document_that_is_no_block() -> None:
+    with pytest.raises(BMLError, match="id"):
+        schedule("<bml/>")
