@@ -125,7 +125,7 @@ def test_timeline_finds_its_mapping_again_when_the_face_has_changed() -> None:
         found.append(standard())
         return found[-1]
 
-    timeline = Timeline(Player(idle=False), 0, 25.0, lambda: pytest.fail("no face is wanted"), mapping)
+    timeline = Timeline(Player(), 0, 25.0, lambda: pytest.fail("no face is wanted"), mapping)
     assert timeline.window(0, 0) is not timeline.window(1000, 1000)
     assert len(found) == 1
     timeline.forget()
