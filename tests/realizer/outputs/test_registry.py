@@ -31,3 +31,8 @@ def test_an_unknown_suffix_lists_the_known_ones(path):
 def test_the_longest_suffix_that_fits_is_taken() -> None:
     assert output_for("clip.arkit.csv") is OUTPUTS[".arkit.csv"]
     assert output_for("clip.v2.csv") is OUTPUTS[".csv"]
+
+
+def test_outputs_of_texts_and_sound_hold_what_all_characters_do() -> None:
+    whole = {suffix for suffix, output in OUTPUTS.items() if output.everybody}
+    assert whole == {".json", ".wav", ".vtt", ".textgrid"}
