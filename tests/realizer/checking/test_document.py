@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from bml_schema.source import Source
-from realizer.checking.advice import advice
 from realizer.checking.document import checked
 from realizer.checking.finding import Finding
 from realizer.core.options import PlayOptions
@@ -54,14 +53,3 @@ def test_every_block_of_a_text_has_its_own_findings() -> None:
 
 def test_a_later_block_may_refer_to_an_earlier_one() -> None:
     assert not findings(GOOD + '<bml id="b"><head id="m" lexeme="NOD" start="a:n:end"/></bml>')
-
-
-def test_what_only_looks_like_a_slip_is_advice() -> None:
-    text = '<bml id="a"><head id="n" lexeme="NOD" start="300"/></bml>'
-    player = Player(PlayOptions(idle=False))
-    (part,) = checked("typed", Source(text), text, player)
-    assert part.block is not None
-    assert part.schedule is not None
-    assert part.findings == ()
-    told = list(advice("typed", Source(text), part.block, part.schedule, player))
-    assert [finding.type for finding in told] == ["ADVICE"]

@@ -8,7 +8,6 @@ from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer.facebuild.parts import SHADES, teeth
-from realizer.facebuild.person.skin_colours import LIT, paint_mouth
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
 from realizer.render.software import OnboardCanvas
@@ -36,19 +35,6 @@ def test_teeth_are_closed_towards_the_tongue(name: str) -> None:
     assert (ups[middle, 2] < 0).any()  # and those that face the tongue
     rows = arch.vertices.reshape(-1, len(SHADES), 3)
     assert (rows[:, 0, 2] < rows[:, -1, 2]).all()
-
-
-def test_the_lining_of_the_mouth_is_darker_to_the_back_and_leaves_the_skin_alone() -> None:
-    deep = np.array([0.0, 0.01, 0.03, 0.08, 0.0])
-    share = np.array([1.0, 1, 1, 1, 0])
-    out, gloss, light = np.full((5, 3), 50.0), np.full(5, 0.2), np.full(5, 0.25)
-    paint_mouth(out, gloss, light, share, deep, {"mouth": [120, 48, 44], "tongue": [196, 104, 100]})
-    assert (np.diff(light[:4]) < 0).all()
-    assert (np.diff(out[:4], axis=0) < 0).all()
-    assert light[0] == pytest.approx(LIT[1])
-    assert (out[4] == 50).all()
-    assert gloss[3] == pytest.approx(0)
-    assert (gloss[4], light[4]) == (0.2, 0.25)
 
 
 @pytest.mark.parametrize("name", [info.name for info in list_faces()])

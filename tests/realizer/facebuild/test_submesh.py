@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from realizer.facebuild.person.lips import hats
 from realizer.facebuild.submesh import Patch, vertex_normals
 
 GRID = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
@@ -42,12 +41,6 @@ def test_cut_and_refined_vertices_are_mixes_of_base_vertices(sheet: Patch) -> No
     fine = sheet.clipped(sheet.positions(GRID)[:, 1] - 0.4)[0].subdivided()[0]
     assert np.allclose(np.asarray(fine.mix.sum(axis=1)).ravel(), 1)
     assert np.allclose(fine.positions(GRID + np.array([0, 0, 2.0]))[:, 2], 2)
-
-
-def test_the_lips_splines_sum_to_one_and_hold_their_knots() -> None:
-    u = np.linspace(-1, 1, 201)
-    assert np.allclose(hats(u).sum(axis=0), 1)
-    assert np.allclose(hats(np.array([-1, -0.5, 0, 0.5, 1])), np.eye(5), atol=1e-6)
 
 
 def test_a_threaded_loop_has_twice_its_vertices_and_stays_round() -> None:

@@ -9,26 +9,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
-from PIL import Image
 
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
-from realizer.face.load import load_face
-from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.importer import look_at
-from realizer.facebuild.arkit.scene import read_pieces
 from realizer.tables.arkit_names import canonical, nearest
 
 pytestmark = pytest.mark.xdist_group("fits")
-
-WAYS = {
-    "as glTF asks": np.eye(3),
-    "+z up, facing +x": np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]]),
-    "facing -z": np.diag([-1.0, 1, -1]),
-}
 
 
 def split(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -45,22 +34,6 @@ def written(path: Path, document: dict[str, Any], data: bytes) -> Path:
     )
     path.write_bytes(struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks)
     return path
-
-
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (10.0, "decimetres"), (100.0, "centimetres")])
-def test_unit_and_facing_are_told_by_the_shapes(
-    write_head: Callable[..., Path], way: str, scale: float, unit: str
-) -> None:
-    found = look_at(write_head(scale=scale, turn=WAYS[way], sparse=scale > 1)).found
-    assert any(f"in {unit}: its eyes stand" in line for line in found)
-    assert not any("exchanged" in line for line in found)
-
-
-def test_a_viewers_left_and_right_are_exchanged(write_head: Callable[..., Path]) -> None:
-    other = {"Left": "Right", "Right": "Left"}
-    path = write_head(spell=lambda n: next((n[: -len(k)] + other[k] for k in other if n.endswith(k)), n))
-    assert any("exchanged" in line for line in look_at(path).found)
 
 
 def test_foreign_names_are_told_with_the_nearest_known(write_head: Callable[..., Path]) -> None:
@@ -151,61 +124,6 @@ def test_a_gltf_with_its_data_inside_or_beside_is_read(ada_glb: Path, tmp_path: 
         document["buffers"][0]["uri"] = uri
         path.write_text(json.dumps(document), "utf-8")
         assert look_at(path).found == look_at(ada_glb).found
-
-
-def test_quantised_places_in_a_scaled_and_turned_node_are_read(
-    new_glb: Callable[[], Any], tmp_path: Path
-) -> None:
-    face = load_face("ada")
-    glb = new_glb()
-    step = 0.4 / 32767
-    whole = np.rint(face.vertices / step)
-    glb.mesh("head", face.vertices, face.triangles, None, {})
-    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
-    attributes["POSITION"] = glb.accessor(whole, 5122, normalized=True)
-    glb.json["nodes"][0] |= {"scale": [0.4] * 3, "rotation": [0, 0.7071067811865476, 0, 0.7071067811865476],
-                             "translation": [1, 2, 3]}  # fmt: skip
-    path = tmp_path / "q.glb"
-    path.write_bytes(glb.bytes())
-    (piece,) = read_pieces(Gltf(path))
-    wanted = face.vertices[:, [2, 1, 0]] * [1, 1, -1] + [1, 2, 3]
-    assert np.abs(piece.vertices - wanted).max() < 2 * step
-
-
-def test_a_skeleton_puts_the_vertices_where_its_joints_are(
-    new_glb: Callable[[], Any], tmp_path: Path
-) -> None:
-    glb = new_glb()
-    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
-    glb.mesh("head", at, np.array([[0, 1, 2]]), None, {"jawOpen": np.tile([0, 0, 1.0], (3, 1))})
-    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
-    attributes["JOINTS_0"] = glb.accessor(np.array([[0, 1, 0, 0]] * 3), 5121)
-    attributes["WEIGHTS_0"] = glb.accessor(np.array([[0.5, 0.5, 0, 0]] * 3))
-    glb.json["skins"] = [{"joints": [1, 2]}]
-    glb.json["nodes"][0] |= {"skin": 0}
-    glb.json["nodes"] += [{"translation": [0, 2, 0]}, {"translation": [0, 4, 0]}]
-    glb.json["scenes"][0]["nodes"] += [1, 2]
-    path = tmp_path / "s.glb"
-    path.write_bytes(glb.bytes())
-    (piece,) = read_pieces(Gltf(path))
-    assert piece.vertices == pytest.approx(at + np.array([0, 3, 0]))
-    assert piece.moves["jawOpen"] == pytest.approx(np.tile([0, 0, 1.0], (3, 1)))
-
-
-def test_a_texture_becomes_the_vertices_colours(new_glb: Callable[[], Any], tmp_path: Path) -> None:
-    glb = new_glb()
-    glb.mesh("head", np.eye(3), np.array([[0, 1, 2]]), None, {}, "skin")
-    pixels = np.zeros((4, 4, 3), np.uint8)
-    pixels[:, :2], pixels[:, 2:] = (200, 60, 20), (10, 120, 240)
-    Image.fromarray(pixels).save(tmp_path / "skin.png")
-    glb.json |= {"images": [{"uri": "skin.png"}], "textures": [{"source": 0}]}
-    glb.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
-    attributes = glb.json["meshes"][0]["primitives"][0]["attributes"]
-    attributes["TEXCOORD_0"] = glb.accessor(np.array([[0.25, 0.5], [0.75, 0.5], [0.75, 0.5]]))
-    path = tmp_path / "t.glb"
-    path.write_bytes(glb.bytes())
-    (piece,) = read_pieces(Gltf(path))
-    assert piece.colours == pytest.approx(np.array([[200, 60, 20], [10, 120, 240], [10, 120, 240]]), abs=1.5)
 
 
 def test_the_command_says_what_an_import_would_find(ada_glb: Path, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from realizer.face.model import Face
 from realizer.facebuild.check import check_face
 from realizer.facebuild.mpeg4.build import apply_zones, setup_of
 from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
-from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
+from realizer.facebuild.mpeg4.parameters import write_setup
 
 pytestmark = pytest.mark.xdist_group("faces")
 
@@ -103,43 +103,6 @@ def test_the_folder_s_own_parameters_count(tmp_path: Path) -> None:
     assert changed.zones[31].falloff == "linear"
     assert changed.zones[32].falloff == "linear"  # the sides go together
     assert changed.zones[33].falloff == "cosine"
-
-
-def test_parameters_survive_the_file(tmp_path: Path) -> None:
-    setup = setup_of(folder_of("default"))
-    write_setup(tmp_path / "one.toml", setup, points=True)
-    again = read_setup(tmp_path / "one.toml")
-    write_setup(tmp_path / "two.toml", again, points=True)
-    assert (tmp_path / "one.toml").read_text() == (tmp_path / "two.toml").read_text()
-    assert again.synced == setup.synced
-    assert {fap: mask.tolist() for fap, mask in again.masks.items()} == {
-        fap: mask.tolist() for fap, mask in setup.masks.items()
-    }
-    for fap, zone in setup.zones.items():
-        assert again.zones[fap].radii == pytest.approx(zone.radii, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("zone = 3", "zone: wanted a list, got 3"),
-        ("zones = []", "wanted joined, synced, whole, points, zone, masks; got zones"),
-        ('[[zone]]\nfap = 31\nfalloff = "cosine"', "zone 1: size is missing"),
-        ('[[zone]]\nfap = 31\nfalloff = "cosine"\nsize = "x"', "zone 1: size: wanted a number, got 'x'"),
-        ('[[zone]]\nfap = 31\nfalloff = "cosine"\nsize = 1\nscale = [1]', "scale: wanted three numbers"),
-        ('[[zone]]\nfap = 2\nfalloff = "cosine"\nsize = 1', "wanted a FAP from 3 to 68"),
-        ('[masks]\n"4 x" = "1-3"', "wanted a FAP's number, got 'x'"),
-        ('[masks]\n"4" = "1-b"', "wanted ranges such as '3-5 9', got '1-b'"),
-        ("a = ", "Invalid value"),
-    ],
-)
-def test_a_bad_file_says_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "mpeg4.toml"
-    path.write_text(text)
-    with pytest.raises(FaceError) as raised:
-        read_setup(path)
-    assert message in str(raised.value)
-    assert str(path) in str(raised.value) or "zone of FAP" in str(raised.value)
 
 
 def test_a_fap_without_a_zone_is_refused(tmp_path: Path) -> None:

@@ -80,17 +80,6 @@ def test_skin_may_slide_back_and_move_away_from_a_pivot() -> None:
     assert spread[at(0.006, 0), 0] < -0.1
 
 
-def test_what_is_synced_is_copied_to_the_other_side_with_its_mask() -> None:
-    right = np.flatnonzero(SHEET[:, 0] > 0.008).astype(np.int32)
-    zone = Zone(31, "ease", 0.010, ease=30, use_mask=True, pivot=(0.01, 0, 0), radial=0.5)
-    both = synchronised(dataclasses.replace(setup(zone, masks={31: right}), synced=frozenset({31})), SHEET)
-    assert both.zones[32].ease == 30
-    assert both.zones[32].pivot == (-0.01, 0, 0)
-    assert (SHEET[both.masks[32], 0] < -0.008).all()
-    fields = zone_fields(both, SHEET)
-    assert fields[32][at(-0.012, 0.002)] == pytest.approx(fields[31][at(0.012, 0.002)] * [-1, 1, 1])
-
-
 def test_bad_zones_say_what_to_change() -> None:
     with pytest.raises(FaceError, match=r"falloff: wanted one of ease, smooth, cosine, linear, got 'cubic'"):
         Zone(31, "cubic", 0.01)  # type: ignore[arg-type]
@@ -115,3 +104,14 @@ def test_bad_zones_say_what_to_change() -> None:
     wanted = setup(Zone(31, "cosine", 0.01), masks={31: mask})
     with pytest.raises(FaceError, match="has no twin on the other side"):
         synchronised(dataclasses.replace(wanted, synced=frozenset({31})), lopsided)
+
+
+def test_what_is_synced_is_copied_to_the_other_side_with_its_mask() -> None:
+    right = np.flatnonzero(SHEET[:, 0] > 0.008).astype(np.int32)
+    zone = Zone(31, "ease", 0.010, ease=30, use_mask=True, pivot=(0.01, 0, 0), radial=0.5)
+    both = synchronised(dataclasses.replace(setup(zone, masks={31: right}), synced=frozenset({31})), SHEET)
+    assert both.zones[32].ease == 30
+    assert both.zones[32].pivot == (-0.01, 0, 0)
+    assert (SHEET[both.masks[32], 0] < -0.008).all()
+    fields = zone_fields(both, SHEET)
+    assert fields[32][at(-0.012, 0.002)] == pytest.approx(fields[31][at(0.012, 0.002)] * [-1, 1, 1])

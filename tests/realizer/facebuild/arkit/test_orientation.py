@@ -1,0 +1,35 @@
+"""Tests of finding how an imported head stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realizer.facebuild.arkit.importer import look_at
+
+pytestmark = pytest.mark.xdist_group("fits")
+
+WAYS = {
+    "as glTF asks": np.eye(3),
+    "+z up, facing +x": np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]]),
+    "facing -z": np.diag([-1.0, 1, -1]),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (10.0, "decimetres"), (100.0, "centimetres")])
+def test_unit_and_facing_are_told_by_the_shapes(
+    write_head: Callable[..., Path], way: str, scale: float, unit: str
+) -> None:
+    found = look_at(write_head(scale=scale, turn=WAYS[way], sparse=scale > 1)).found
+    assert any(f"in {unit}: its eyes stand" in line for line in found)
+    assert not any("exchanged" in line for line in found)
+
+
+def test_a_viewers_left_and_right_are_exchanged(write_head: Callable[..., Path]) -> None:
+    other = {"Left": "Right", "Right": "Left"}
+    path = write_head(spell=lambda n: next((n[: -len(k)] + other[k] for k in other if n.endswith(k)), n))
+    assert any("exchanged" in line for line in look_at(path).found)

@@ -1,0 +1,94 @@
+"""Tests of the drawing process from inside."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import realizer
+from realizer.core.errors import RealizerError
+from realizer.render.process_messages import Draw
+from realizer.render.worker import answer
+
+
+def check(tmp_path: Path, site: str, way: str = "auto", **env: str) -> subprocess.CompletedProcess[str]:
+    """`available()`'s question, asked on a machine that lacks something."""
+    (tmp_path / "sitecustomize.py").write_text(site)
+    paths = os.pathsep.join([str(tmp_path), str(Path(realizer.__path__[0]).parent)])
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "realizer.render.worker", "--check", way],
+        env={**os.environ, "PYTHONPATH": paths, **env},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_with_neither_way_the_sentence_names_the_extra(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['pyrender'] = sys.modules['numba'] = None")
+    assert done.returncode == 3
+    assert "pip install 'bml-realizer[render]'" in done.stdout
+
+
+@pytest.mark.gl("gl")
+def test_without_numba_opengl_draws(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['numba'] = None")
+    assert (done.returncode, done.stdout.strip()) == (0, "gl"), done.stderr
+
+
+@pytest.mark.gl("onboard")
+def test_without_pyrender_the_processor_draws(tmp_path):
+    done = check(tmp_path, "import sys; sys.modules['pyrender'] = None")
+    assert (done.returncode, done.stdout.strip()) == (0, "onboard"), done.stderr
+
+
+@pytest.mark.gl("onboard")
+def test_where_no_folder_can_be_written_the_loops_are_compiled_all_the_same(tmp_path):
+    """Numba keeps machine code beside the source or in the user's cache, and refuses where neither is."""
+    site = "import numba.core.caching as c\nc.CacheImpl._locator_classes = []\n"
+    done = check(tmp_path, site, "onboard")
+    assert (done.returncode, done.stdout.strip()) == (0, "onboard"), done.stderr
+
+
+@pytest.mark.gl("gl")
+def test_without_gl_the_sentence_names_the_packages(tmp_path):
+    """A machine whose loader finds no libEGL and no libGL."""
+    hide = (
+        "import ctypes, ctypes.util\n"
+        "real = ctypes.CDLL.__init__\n"
+        "def init(self, name=None, *a, **k):\n"
+        "    if name and any(x in str(name) for x in ('EGL', 'libGL', 'OpenGL', 'GLESv2')):\n"
+        "        raise OSError(f'{name}: cannot open shared object file')\n"
+        "    real(self, name, *a, **k)\n"
+        "ctypes.CDLL.__init__ = init\n"
+        "find = ctypes.util.find_library\n"
+        "ctypes.util.find_library = lambda n: None if n in ('EGL', 'GL', 'OpenGL', 'GLESv2') else find(n)\n"
+    )
+    done = check(tmp_path, hide, "gl")
+    assert done.returncode == 3, done.stderr
+    assert "install Debian packages libegl1 and libgl1" in done.stdout
+
+
+@pytest.mark.gl
+def test_jpeg_without_simplejpeg_is_written_by_pillow(tmp_path):
+    code = (
+        "import sys; sys.modules['simplejpeg'] = None\n"
+        "import numpy as np\n"
+        "from realizer.render.worker import encode\n"
+        "sys.stdout.buffer.write(encode(np.full((20, 30, 3), 90, np.uint8)[::-1], 'jpeg', 85))\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(Path(realizer.__path__[0]).parent)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=env)
+    assert np.asarray(Image.open(io.BytesIO(done.stdout))).shape == (20, 30, 3)
+
+
+def test_a_picture_is_not_drawn_before_a_face_is_opened() -> None:
+    with pytest.raises(RealizerError, match="wanted Open first, got Draw"):
+        answer(None, Draw(np.zeros((1, 68), np.float32), 0))
