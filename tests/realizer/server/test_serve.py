@@ -380,7 +380,7 @@ def test_workers_end_where_their_address_cannot_be_printed(monkeypatch: pytest.M
     class Workers:
         port = 0
 
-        def __init__(self, settings: Settings) -> None:
+        def __init__(self, settings: Settings, target: object) -> None:
             self._settings = settings
 
         async def start(self) -> Workers:
