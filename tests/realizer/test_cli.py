@@ -120,10 +120,13 @@ def test_an_unknown_face_is_said_with_the_known_ones() -> None:
     assert "nobody" in done.stderr
 
 
-def test_lists_and_doctor_answer() -> None:
+def test_lists_answer() -> None:
     assert "silent" in run("voices").stdout
     assert ".fap" in run("outputs").stdout
     assert run("faces", "list").stdout.split()
+
+
+def test_doctor_says_what_is_there() -> None:
     doctor = run("doctor")
     assert doctor.returncode == 0
     for what in ("GL", "FFmpeg", "silent", "face", "page"):
