@@ -46,7 +46,7 @@ OPERATORS = {
 UNSEEN = re.compile(r"(log|logging|warnings|gc)\.|.*\.(close|cancel|shutdown|kill|flush)$|print$")
 # Arguments that only speed, memory or the look of a text depend on.
 TUNING = {"maxsize", "maxlen", "timeout", "indent", "stacklevel", "max_workers", "limit", "ndigits"}
-# Numbers there are a matter of taste: where a curl lies, how thick a line is.
+# Numbers and sums there are a matter of taste: where a curl lies, how thick a line is.
 TASTE = re.compile("realizer/(charts|facebuild/person)/")
 NO_CODE = {"annotation", "returns", "decorator_list", "bases"}
 
@@ -97,7 +97,7 @@ def mutations(path: str, source: bytes) -> Iterator[Mutation]:
             case ast.BoolOp(op=op, values=[left, right, *_]):
                 yield between(left, op, right)
             case ast.BinOp(left=left, op=op, right=right):
-                if type(op) in OPERATORS and not _is_sequence(node):
+                if type(op) in OPERATORS and not (TASTE.match(path) or _is_sequence(node)):
                     yield between(left, op, right)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 yield instead(node, f"({ast.unparse(operand)})")

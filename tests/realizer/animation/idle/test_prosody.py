@@ -184,13 +184,16 @@ def whole_at(times: Float64, seed: int, asked: Sequence[Asked]) -> dict[str, Flo
     ("channel", "part"),
     [
         (Channel(au(4)[0], np.array([0.0, 12.0]), np.array([0.5, 0.5])), "brows"),
-        (Channel(fap(33), np.array([0.0, 12.0]), np.array([90.0, 90.0]), layer=Layer.FAPS), "brows"),
+        *(
+            (Channel(fap(number), np.array([0.0, 12.0]), np.array([90.0, 90.0]), layer=Layer.FAPS), "brows")
+            for number in range(31, 39)
+        ),
         (Channel(au(1)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, holds=True), "brows"),
         (Channel(au(61)[0], np.array([0.0, 12.0]), np.array([0.2, 0.2]), layer=Layer.GAZE), "yaw"),
         (Channel(au(62)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, holds=True), "yaw"),
         (Channel(au(55)[0], np.array([0.0, 12.0]), np.array([0.2, 0.2]), layer=Layer.HEAD), "head"),
     ],
-    ids=["frown", "brow FAP", "mood", "gaze", "base gaze", "tilt"],
+    ids=["frown", *(f"FAP {number}" for number in range(31, 39)), "mood", "gaze", "base gaze", "tilt"],
 )
 def test_what_a_document_moves_is_left_alone_and_only_that(channel: Channel, part: str) -> None:
     for seed in range(10):
