@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, Phase, settings
 # Tests run beside each other: one thread of linear algebra each. numpy reads it once, when it is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Hundreds of processes start in a run of all tests: they share compiled modules, also where none may be written
+# Hundreds of processes start in a run of all tests: they share compiled modules, also where none may be put
 # beside the sources.
 if "PYTEST_XDIST_WORKER" in os.environ and os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
     sys.dont_write_bytecode = False
