@@ -1,6 +1,6 @@
 """The BML 1.0 language: parser, typed nodes, writer and feedback."""
 
-from bml_schema.absolute import timed
+from bml_schema.absolute import with_absolute_times
 from bml_schema.behaviours import (
     Face,
     FaceFacs,
@@ -31,8 +31,8 @@ from bml_schema.bmla import (
     ParameterValueChange,
     Trajectory,
 )
-from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS, parse, read
-from bml_schema.dropped_references import Lost, without
+from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, parse, read
+from bml_schema.dropped_references import ReducedBlock, without
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
 from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Mood, Timeline
 from bml_schema.feedback import (
@@ -43,7 +43,7 @@ from bml_schema.feedback import (
     SyncPointProgress,
     WarningFeedback,
     parse_feedback,
-    predicted,
+    prediction_of,
 )
 from bml_schema.node_schema import attribute, child, children, mixed, node, sync_ref, text
 from bml_schema.nodes import (
@@ -62,7 +62,7 @@ from bml_schema.nodes import (
     Required,
     Synchronize,
 )
-from bml_schema.parser import MOST_BEHAVIOURS
+from bml_schema.parser import MAX_BEHAVIOURS
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import Value, flag, integer, number, one_of, seconds, string, word
 from bml_schema.vocabulary import VOCABULARY
@@ -73,9 +73,9 @@ __all__ = [
     "BMLT",
     "CORE",
     "EXTENSIONS",
-    "MOST_BEHAVIOURS",
-    "MOST_BYTES",
-    "MOST_DOCUMENTS",
+    "MAX_BEHAVIOURS",
+    "MAX_BYTES",
+    "MAX_DOCUMENTS",
     "OWN",
     "VOCABULARY",
     "Activate",
@@ -112,7 +112,6 @@ __all__ = [
     "Idle",
     "Interrupt",
     "Locomotion",
-    "Lost",
     "Mood",
     "ParameterValueChange",
     "Part",
@@ -123,6 +122,7 @@ __all__ = [
     "PostureShift",
     "PredictionFeedback",
     "Problem",
+    "ReducedBlock",
     "Required",
     "Speech",
     "SpeechText",
@@ -147,13 +147,13 @@ __all__ = [
     "one_of",
     "parse",
     "parse_feedback",
-    "predicted",
+    "prediction_of",
     "read",
     "seconds",
     "string",
     "sync_ref",
     "text",
-    "timed",
+    "with_absolute_times",
     "without",
     "word",
     "write",

@@ -9,14 +9,14 @@ from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.dropped_references import without
 from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Required, Synchronize
 from bml_schema.sync_refs import SyncRef
-from bml_schema.values import MOST_SECONDS
+from bml_schema.values import MAX_SECONDS
 
-__all__ = ["timed"]
+__all__ = ["with_absolute_times"]
 
 _SAME = 1e-6  # s; solvers leave this much between times that should be one
 
 
-def timed(block: Block, times: Mapping[str, Mapping[str, float]]) -> Block:
+def with_absolute_times(block: Block, times: Mapping[str, Mapping[str, float]]) -> Block:
     """The block with every sync point at the time it has, such that scheduling it again gives the same times.
 
     Sync points become attributes, those of speech the `ref` of their <sync>. What has no attribute
@@ -92,6 +92,6 @@ def _time(ref: SyncRef, times: Mapping[str, Mapping[str, float]]) -> float | Non
 
 
 def _number(point: str, time: float) -> SyncRef:
-    if not abs(time) <= MOST_SECONDS:
-        raise ValueError(f"{point}: wanted at most {MOST_SECONDS:g} seconds, got {time}")
+    if not abs(time) <= MAX_SECONDS:
+        raise ValueError(f"{point}: wanted at most {MAX_SECONDS:g} seconds, got {time}")
     return SyncRef(offset=float(time))

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from lxml import etree
 
 from bml_schema.behaviours import SpeechText, Sync
-from bml_schema.element_reader import Elements
-from bml_schema.node_schema import local, shape_of
+from bml_schema.element_reader import ElementReader
+from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
 from bml_schema.sync_refs import Names, Points
 
@@ -36,7 +36,7 @@ class Kind(NamedTuple):
 def _kind_of(cls: type[Behaviour]) -> Kind:
     kind = _KINDS.get(cls)
     if kind is None:
-        shape = shape_of(cls)
+        shape = schema_of(cls)
         varies = cls.marks or shape.strokes
         kind = _KINDS[cls] = Kind(cls.tag, shape.name, cls, Points(shape.points), varies)
     return kind
@@ -55,7 +55,7 @@ class Entry(NamedTuple):
     required: bool
 
 
-class Outline:
+class BlockOutline:
     """What stands in one block.
 
     Attributes:
@@ -66,7 +66,7 @@ class Outline:
 
     __slots__ = ("elements", "kinds", "loose", "names", "owners")
 
-    def __init__(self, elements: Elements, names: Names) -> None:
+    def __init__(self, elements: ElementReader, names: Names) -> None:
         self.elements = elements
         self.names = names
         self.owners: dict[str, Entry] = {}

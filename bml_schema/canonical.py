@@ -56,13 +56,13 @@ def _split(clark: str) -> tuple[str, str]:
     return space[1:], name
 
 
-MOST_ATTRIBUTES = 100  # of one element; BML has ten, and lxml is quadratic in them
+MAX_ATTRIBUTES = 100  # of one element; BML has ten, and lxml is quadratic in them
 
 
 def attributes(element: etree._Element) -> list[tuple[str, str]]:
     """Clark names and texts, in document order; a Fault if lxml would take too long."""
     count = len(element.attrib)
-    if count > MOST_ATTRIBUTES:
-        raise Fault(f"wanted at most {MOST_ATTRIBUTES} attributes, got {count}", element)
+    if count > MAX_ATTRIBUTES:
+        raise Fault(f"wanted at most {MAX_ATTRIBUTES} attributes, got {count}", element)
     items: Any = element.items()
     return cast("list[tuple[str, str]]", items)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from itertools import count
 from typing import NamedTuple
 
-from bml_schema.errors import BMLError, shown
+from bml_schema.errors import BMLError, quoted
 
-_MOST_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
+_MAX_MARKS = 100_000  # so that a hostile text of 16 MiB costs no more than an honest one of 1 MiB
 
 # What decides where a document begins and ends, and what may hide such marks.
 _MARKS = re.compile(r"<!--|<!\[CDATA\[|<!DOCTYPE|<\?|<(?:[\w.-]+:)?bml(?=[\s/>])|</(?:[\w.-]+:)?bml\s*>")
@@ -27,7 +27,7 @@ _BLANKS = " \t\r\n\ufeff"
 _BETWEEN = re.compile(rf"(?:[{_BLANKS}]|</?act(?=[\s/>])[^<>]*>|</?participant(?=[\s/>])[^<>]*>)*+")
 
 
-class Stretch(NamedTuple):
+class DocumentSpan(NamedTuple):
     """text[start:end] is a document whose start tag is `tag`, or `fault` says why it cannot be one."""
 
     start: int
@@ -52,7 +52,7 @@ def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
         found = _MARKS.search(text, here, last)
         if found is None:
             return
-        if n == _MOST_MARKS:
+        if n == _MAX_MARKS:
             raise BMLError(f"wanted at most {n} tags of <bml>, comments and the like in one text")
         start, here = found.span()
         opener = found[0]
@@ -82,7 +82,7 @@ def _marks(text: str, first: int, last: int) -> Iterator[_Mark]:
             yield _Mark("skip", start, here)
 
 
-def stretches(text: str, first: int = 0, last: int | None = None) -> Iterator[Stretch]:
+def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterator[DocumentSpan]:
     """Documents in text[first:last], and what stands between them that should not, in order."""
     last = len(text) if last is None else last
     marks = list(_marks(text, first, last))
@@ -115,15 +115,15 @@ def stretches(text: str, first: int = 0, last: int | None = None) -> Iterator[St
         end = ends.get(n) or after.get(n, last)
         if mark.kind == "end":
             if doctype >= 0:
-                yield Stretch(doctype, here, fault=_NO_DTD)
+                yield DocumentSpan(doctype, here, fault=_NO_DTD)
             elif junk >= 0:
-                yield Stretch(junk, here, fault=_not_bml(text[junk:here]))
+                yield DocumentSpan(junk, here, fault=_not_bml(text[junk:here]))
         elif doctype >= 0:
-            yield Stretch(doctype, end, text[mark.start : mark.end], _NO_DTD)
+            yield DocumentSpan(doctype, end, text[mark.start : mark.end], _NO_DTD)
         else:
             if junk >= 0:
-                yield Stretch(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
-            yield Stretch(mark.start, end, text[mark.start : mark.end])
+                yield DocumentSpan(junk, mark.start, fault=_not_bml(text[junk : mark.start]))
+            yield DocumentSpan(mark.start, end, text[mark.start : mark.end])
         here = end
         junk = doctype = -1
 
@@ -132,4 +132,4 @@ _NO_DTD = "wanted a document without DTD and entities, got <!DOCTYPE"
 
 
 def _not_bml(text: str) -> str:
-    return f"wanted <bml>, got {shown(text.strip(_BLANKS))}"
+    return f"wanted <bml>, got {quoted(text.strip(_BLANKS))}"

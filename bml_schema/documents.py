@@ -10,19 +10,19 @@ from itertools import count
 
 from lxml import etree
 
-from bml_schema.document_splitter import NEXT, Stretch, stretches
-from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, shown
+from bml_schema.document_splitter import NEXT, DocumentSpan, document_spans
+from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, quoted
 from bml_schema.node_schema import local
 from bml_schema.nodes import Behaviour, Block
-from bml_schema.parser import MOST_BEHAVIOURS, read_block
+from bml_schema.parser import MAX_BEHAVIOURS, read_block
 from bml_schema.vocabulary import VOCABULARY
 
-__all__ = ["MOST_BYTES", "MOST_DOCUMENTS", "parse", "read"]
+__all__ = ["MAX_BYTES", "MAX_DOCUMENTS", "parse", "read"]
 
-MOST_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
-_MOST_RETRIES = 20  # times that a broken document is searched for a good one inside it
-_MOST_AGAIN = 100_000  # characters of one text that are searched so, or a large broken one takes seconds
-MOST_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
+MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word is a third of it
+_MAX_RETRIES = 20  # times that a broken document is searched for a good one inside it
+_MAX_AGAIN = 100_000  # characters of one text that are searched so, or a large broken one takes seconds
+MAX_DOCUMENTS = 1000  # in one text; a text full of "<bml>" must not become a flood of warnings
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
@@ -38,8 +38,8 @@ def parse(
     vocabulary: Vocabulary = VOCABULARY,
     *,
     strict: bool = False,
-    most_bytes: int = MOST_BYTES,
-    most_behaviours: int = MOST_BEHAVIOURS,
+    max_bytes: int = MAX_BYTES,
+    max_behaviours: int = MAX_BEHAVIOURS,
 ) -> Block:
     """The block of a text that holds exactly one document.
 
@@ -48,7 +48,7 @@ def parse(
             before it are allowed. Bytes in UTF-8, UTF-16 or Latin.
         vocabulary: Clark tag -> node class; extensions add theirs.
         strict: the first Problem is an error.
-        most_bytes, most_behaviours: more are refused.
+        max_bytes, max_behaviours: more are refused.
 
     Returns:
         The block. What was dropped from it is in its `problems`.
@@ -58,7 +58,7 @@ def parse(
             (BMLSizeError), not one document.
     """
     first: Block | BMLError | None = None
-    for found in read(text, vocabulary, most_bytes=most_bytes, most_behaviours=most_behaviours):
+    for found in read(text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours):
         if first is not None:
             raise BMLError("wanted one document, got several") if isinstance(first, Block) else first
         first = found
@@ -78,9 +78,9 @@ def read(
     text: str | bytes,
     vocabulary: Vocabulary = VOCABULARY,
     *,
-    most_bytes: int = MOST_BYTES,
-    most_behaviours: int = MOST_BEHAVIOURS,
-    most_documents: int = MOST_DOCUMENTS,
+    max_bytes: int = MAX_BYTES,
+    max_behaviours: int = MAX_BEHAVIOURS,
+    max_documents: int = MAX_DOCUMENTS,
 ) -> Iterator[Block | BMLError]:
     """The blocks of a text with any number of documents, in order.
 
@@ -89,12 +89,12 @@ def read(
     Yields:
         A Block for each document, a BMLError for each stretch that gave none. Raises nothing.
     """
-    data, roots = _whole(text, most_bytes)
-    if 0 < len(roots) <= most_documents:
+    data, roots = _whole(text, max_bytes)
+    if 0 < len(roots) <= max_documents:
         begins = _begins(data)
         for root in roots:
             try:
-                yield read_block(root, vocabulary, begins=begins, most_behaviours=most_behaviours)
+                yield read_block(root, vocabulary, begins=begins, max_behaviours=max_behaviours)
             except BMLError as wrong:
                 yield wrong
         return
@@ -104,7 +104,7 @@ def read(
         yield wrong
         return
     try:
-        found = list(stretches(text))
+        found = list(document_spans(text))
     except BMLError as wrong:
         yield wrong
         return
@@ -112,7 +112,7 @@ def read(
     counted = 0
     broken = False  # the stretch before was broken XML: what follows it up to the next document is part of it
     todo = deque(found)
-    retries, again = _MOST_RETRIES, _MOST_AGAIN
+    retries, again = _MAX_RETRIES, _MAX_AGAIN
     told = 0  # up to here broken XML has been told of
     for n in count():
         if not todo:
@@ -120,14 +120,14 @@ def read(
         stretch = todo.popleft()
         line += text.count("\n", counted, stretch.start)
         counted = stretch.start
-        if n == most_documents:
+        if n == max_documents:
             said = f"wanted at most {n} documents in one text; the rest is not read"
             yield BMLError(said, line=line)
             return
         if broken and stretch.fault and not stretch.tag:
             continue
         try:
-            block = _block(text, stretch, line, vocabulary, most_bytes, most_behaviours)
+            block = _block(text, stretch, line, vocabulary, max_bytes, max_behaviours)
         except BMLError as wrong:
             broken = isinstance(wrong, BMLSyntaxError)
             if not (broken and stretch.start < told):
@@ -139,18 +139,18 @@ def read(
                     retries -= 1
                     again -= stretch.end - inner.start()
                     told = max(told, stretch.end)
-                    todo.extendleft(reversed(list(stretches(text, inner.start(), stretch.end))))
+                    todo.extendleft(reversed(list(document_spans(text, inner.start(), stretch.end))))
         else:
             broken = False
             yield block
 
 
-def _whole(text: str | bytes, most_bytes: int) -> tuple[bytes, list[etree._Element]]:
+def _whole(text: str | bytes, max_bytes: int) -> tuple[bytes, list[etree._Element]]:
     """What lxml was given, and the documents in it, where the text is nothing but one sound document.
 
     Nearly all texts are, and are read in one pass; no document sends a text the long way, which explains.
     """
-    if len(text) > most_bytes:
+    if len(text) > max_bytes:
         return b"", []
     if isinstance(text, str):
         try:
@@ -161,7 +161,7 @@ def _whole(text: str | bytes, most_bytes: int) -> tuple[bytes, list[etree._Eleme
         return b"", []
     else:
         data = text
-    if len(data) > most_bytes or b"<!DOCTYPE" in data:
+    if len(data) > max_bytes or b"<!DOCTYPE" in data:
         return data, []
     try:
         root = etree.fromstring(data, _PARSER)
@@ -190,20 +190,20 @@ def _begins(data: bytes) -> dict[tuple[int, str], int]:
 
 
 def _block(
-    text: str, stretch: Stretch, line: int, vocabulary: Vocabulary, most_bytes: int, most_behaviours: int
+    text: str, stretch: DocumentSpan, line: int, vocabulary: Vocabulary, max_bytes: int, max_behaviours: int
 ) -> Block:
     named = _ID.search(stretch.tag)
     id = (named[1] or named[2]) if named else None
     if stretch.fault:
         raise BMLSyntaxError(stretch.fault, line=line, block=id)
     data = _encoded(text[stretch.start : stretch.end], line, id)
-    if len(data) > most_bytes:
+    if len(data) > max_bytes:
         raise BMLSizeError(
-            f"wanted at most {most_bytes} bytes in a document, got {len(data)}", line=line, block=id
+            f"wanted at most {max_bytes} bytes in a document, got {len(data)}", line=line, block=id
         )
     root = element(data, lines_before=line - 1, block=id)
     return read_block(
-        root, vocabulary, lines_before=line - 1, begins=_begins(data), most_behaviours=most_behaviours
+        root, vocabulary, lines_before=line - 1, begins=_begins(data), max_behaviours=max_behaviours
     )
 
 
@@ -252,7 +252,7 @@ def _decoded(data: bytes) -> str:
             raise LookupError(encoding)
         return data.decode(encoding)
     except LookupError:
-        raise BMLSyntaxError(f"encoding: wanted UTF-8, UTF-16 or Latin, got {shown(encoding)}") from None
+        raise BMLSyntaxError(f"encoding: wanted UTF-8, UTF-16 or Latin, got {quoted(encoding)}") from None
     except UnicodeDecodeError as wrong:
         line = data.count(b"\n", 0, wrong.start) + 1
         raise BMLSyntaxError(

@@ -10,25 +10,25 @@ from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.nodes import Behaviour, Block, Constraint, Required, Synchronize
 from bml_schema.sync_refs import SyncRef
 
-__all__ = ["Lost", "without"]
+__all__ = ["ReducedBlock", "without"]
 
 
-class Lost(NamedTuple):
+class ReducedBlock(NamedTuple):
     """What is left of a block without some of its behaviours.
 
     Attributes:
         block: the rest; its places and problems are those of the whole.
-        lost: id of a behaviour that went -> what went with it: "behaviour:sync" for a reference, the id of a
-            constraint or its path.
+        lost_references: id of a behaviour that went -> what went with it: "behaviour:sync" for a reference,
+            the id of a constraint or its path.
         fatal: ids whose loss breaks a constraint inside <required>.
     """
 
     block: Block
-    lost: Mapping[str, tuple[str, ...]]
+    lost_references: Mapping[str, tuple[str, ...]]
     fatal: frozenset[str]
 
 
-def without(block: Block, gone: Collection[str]) -> Lost:
+def without(block: Block, gone: Collection[str]) -> ReducedBlock:
     """The block without some behaviours, the references to their sync points, and the constraints on them.
 
     Args:
@@ -36,7 +36,7 @@ def without(block: Block, gone: Collection[str]) -> Lost:
         gone: ids of behaviours; one the block does not hold costs what names it.
     """
     gone = frozenset(gone)
-    losses = Losses(gone)
+    losses = ReferenceRemover(gone)
     children: list[Behaviour | Required | Constraint] = []
     for child in block.children:
         if isinstance(child, Required):
@@ -44,21 +44,22 @@ def without(block: Block, gone: Collection[str]) -> Lost:
             children.append(replace(child, children=tuple(c for c in inside if c is not None)))
         elif (left := losses.without(child)) is not None:
             children.append(left)
-    lost = {id: tuple(names) for id, names in losses.lost.items()}
-    return Lost(replace(block, children=tuple(children)), lost, frozenset(losses.fatal))
+    lost = {id: tuple(names) for id, names in losses.lost_references.items()}
+    return ReducedBlock(replace(block, children=tuple(children)), lost, frozenset(losses.fatal))
 
 
-class Losses:
+class ReferenceRemover:
     """What vanishes with dropped behaviours.
 
     Attributes:
-        lost: id of the dropped behaviour -> "behaviour:sync" of references, ids or paths of constraints.
+        lost_references: id of the dropped behaviour -> "behaviour:sync" of references, ids or paths of
+            constraints.
         fatal: ids whose loss breaks a required constraint.
     """
 
     def __init__(self, gone: Collection[str]) -> None:
         self.gone = gone
-        self.lost: dict[str, list[str]] = {}
+        self.lost_references: dict[str, list[str]] = {}
         self.fatal: set[str] = set()
 
     def without(
@@ -72,7 +73,7 @@ class Losses:
     def _is_gone(self, ref: SyncRef, name: str) -> bool:
         if ref.block is not None or ref.behaviour not in self.gone or ref.behaviour is None:
             return False
-        names = self.lost.setdefault(ref.behaviour, [])
+        names = self.lost_references.setdefault(ref.behaviour, [])
         if name not in names[-1:]:
             names.append(name)
         return True

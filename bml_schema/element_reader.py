@@ -13,10 +13,10 @@ from typing import Any, cast
 from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText, Sync
-from bml_schema.canonical import MOST_ATTRIBUTES, attributes, canonical
-from bml_schema.errors import Fault, did_you_mean, shown
+from bml_schema.canonical import MAX_ATTRIBUTES, attributes, canonical
+from bml_schema.errors import Fault, did_you_mean, quoted
 from bml_schema.escape import escape
-from bml_schema.node_schema import Attribute, Shape, local, shape_of
+from bml_schema.node_schema import Attribute, NodeSchema, local, schema_of
 from bml_schema.nodes import (
     BMLA,
     BMLT,
@@ -35,8 +35,8 @@ from bml_schema.nodes import (
     extension,
 )
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
-from bml_schema.unknown_attributes import stray
-from bml_schema.values import unwanted
+from bml_schema.unknown_attributes import describe_unknown
+from bml_schema.values import describe_mismatch
 
 Vocabulary = Mapping[str, type[Behaviour]]
 
@@ -60,21 +60,22 @@ def _standard(raw: str) -> tuple[str, str]:
     return raw, ""
 
 
-class Elements:
+class ElementReader:
     """Reads elements of one document.
 
     Attributes:
         vocabulary: Clark tag -> node class.
         names: what references may name; None looks nothing up.
-        strays: what is to be said of attributes that nobody knows, with the element; who tells it clears it.
+        unknown_attributes: what is to be said of attributes that nobody knows, with the element; who tells it
+            clears it.
     """
 
-    __slots__ = ("names", "strays", "vocabulary")
+    __slots__ = ("names", "unknown_attributes", "vocabulary")
 
     def __init__(self, vocabulary: Vocabulary, names: Names | None = None) -> None:
         self.vocabulary = vocabulary
         self.names = names
-        self.strays: list[tuple[str, etree._Element]] = []
+        self.unknown_attributes: list[tuple[str, etree._Element]] = []
 
     def tag(self, element: etree._Element) -> str:
         """Clark tag; elements of drafts and without namespace count as core, faceFacs as extension."""
@@ -88,7 +89,7 @@ class Elements:
 
     def node(self, cls: type[Any], element: etree._Element, *, timed: bool = False) -> Any:
         """An element as its class says; timed: with an id and sync points of its own."""
-        shape = shape_of(cls)
+        shape = schema_of(cls)
         values = self.attributes(shape, element, timed)
         if shape.mixed:
             values[shape.mixed] = tuple(self.mixed(shape, element))
@@ -103,7 +104,7 @@ class Elements:
             raise Fault(said, element)
         return node
 
-    def attributes(self, shape: Shape, element: etree._Element, timed: bool) -> dict[str, Any]:
+    def attributes(self, shape: NodeSchema, element: etree._Element, timed: bool) -> dict[str, Any]:
         """Values by field; one Fault names everything that is wrong with them."""
         values: dict[str, Any] = {}
         syncs: dict[str, SyncRef] = {}
@@ -111,7 +112,7 @@ class Elements:
         faults: list[str] = []
         known = shape.attributes
         points = shape.points if timed else ()
-        if len(element.attrib) > MOST_ATTRIBUTES:
+        if len(element.attrib) > MAX_ATTRIBUTES:
             attributes(element)  # which refuses them
         items: Any = element.items()
         for name, text in items:
@@ -137,23 +138,25 @@ class Elements:
                 values["id"] = ""  # a part of <face>: it has no timing, so nobody need name it
             missing = (s for s in shape.required if s.field not in values and s.name not in element.attrib)
             faults += [f"{s.name}: wanted {s.value.wanted}, got none" for s in missing]
-        said = self.stray(shape, element, foreign, timed) if foreign else ""
+        said = self.describe_unknown(shape, element, foreign, timed) if foreign else ""
         if faults:
             faults += (said,) if said else ()
             raise Fault("; ".join(faults), element)
         if said:
-            self.strays.append((said, element))
+            self.unknown_attributes.append((said, element))
         if shape.timed:
             values["syncs"] = syncs
-            values["foreign"] = foreign
+            values["unknown_attributes"] = foreign
         return values
 
-    def stray(self, shape: Shape, element: etree._Element, foreign: Iterable[str], timed: bool) -> str:
+    def describe_unknown(
+        self, shape: NodeSchema, element: etree._Element, foreign: Iterable[str], timed: bool
+    ) -> str:
         """What is to be said of the attributes that a shape does not know; "" for nothing."""
         suggest = did_you_mean if self.names is None else self.names.suggest
-        return stray(shape, element, foreign, timed, suggest)
+        return describe_unknown(shape, element, foreign, timed, suggest)
 
-    def children(self, shape: Shape, element: etree._Element, values: dict[str, Any]) -> None:
+    def children(self, shape: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
         """Child elements into the fields of `values`."""
         found: dict[str, list[Any]] = {}
         descriptions: list[Description] = []
@@ -191,15 +194,15 @@ class Elements:
         if descriptions:
             values["descriptions"] = tuple(descriptions)
         if others:
-            values["others"] = tuple(others)
+            values["unknown_children"] = tuple(others)
 
     def no_text(self, element: etree._Element) -> None:
         loose = loose_text(element)
         if loose:
             hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
-            raise Fault(f"wanted elements, got the text {shown(loose)}{hint}", element)
+            raise Fault(f"wanted elements, got the text {quoted(loose)}{hint}", element)
 
-    def mixed(self, shape: Shape, element: etree._Element) -> Iterator[Any]:
+    def mixed(self, shape: NodeSchema, element: etree._Element) -> Iterator[Any]:
         """text := (characters | sync)*, blanks kept."""
         if element.text:
             yield element.text
@@ -219,7 +222,7 @@ class Elements:
     # description := any XML
 
     def description(self, element: etree._Element) -> Description:
-        values = self.attributes(shape_of(Description), element, False)
+        values = self.attributes(schema_of(Description), element, False)
         if values["type"] == _SSML:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
             if len(speak) != 1:
@@ -234,7 +237,7 @@ class Elements:
 
     def constraint(self, element: etree._Element) -> dict[str, Any]:
         """The id and parts of a constraint, by field."""
-        values = self.attributes(shape_of(Constraint), element, False)
+        values = self.attributes(schema_of(Constraint), element, False)
         self.no_text(element)
         values["parts"] = tuple(self.constraint_part(child) for child in element)
         if not values["parts"]:
@@ -270,7 +273,7 @@ class Elements:
             raise Fault(f"ref: {wrong}", element) from None
 
 
-def _drafts(shape: Shape, values: dict[str, Any], foreign: dict[str, str]) -> Iterator[str]:
+def _drafts(shape: NodeSchema, values: dict[str, Any], foreign: dict[str, str]) -> Iterator[str]:
     """Read what a draft named otherwise, unless its present name is there too; yields what is wrong."""
     for name, spec in shape.old.items():
         if name in foreign and spec.field not in values and spec.read is not None:
@@ -282,7 +285,7 @@ def _drafts(shape: Shape, values: dict[str, Any], foreign: dict[str, str]) -> It
 
 
 def _unwanted(spec: Attribute, text: str) -> str:
-    return unwanted(spec.value.wanted, text, shown(text))
+    return describe_mismatch(spec.value.wanted, text, quoted(text))
 
 
 def loose_text(element: etree._Element) -> str:

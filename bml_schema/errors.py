@@ -31,7 +31,7 @@ class Place(NamedTuple):
     line: int
     path: str
 
-    def says(self, text: str) -> str:
+    def with_place(self, text: str) -> str:
         """A sentence with the place in front."""
         return at(self.line, self.path, text)
 
@@ -87,7 +87,7 @@ class Problem:
         type: BML warning type, such as PARSING_FAILURE.
         text: what was wanted and what came, without the place; str(problem) has it in front.
         line, path: where.
-        lost: what vanished with it: "behaviour:sync" for a reference, a constraint's id or path.
+        lost_references: what vanished with it: "behaviour:sync" for a reference, a constraint's id or path.
         fatal: the whole block goes, because it was inside <required>.
         dropped: a behaviour or constraint went; otherwise attributes only, and what they stand on plays.
     """
@@ -97,7 +97,7 @@ class Problem:
     text: str
     line: int
     path: str
-    lost: tuple[str, ...] = ()
+    lost_references: tuple[str, ...] = ()
     fatal: bool = False
     dropped: bool = True
 
@@ -118,14 +118,14 @@ class Fault(Exception):
 _LONGEST_SHOWN = 60  # characters of a value in a message; enough to find it, never a flood
 
 
-def shown(value: str) -> str:
+def quoted(value: str) -> str:
     """A value as it stands in a message: numbers bare, everything else quoted, long ones cut."""
     if len(value) > _LONGEST_SHOWN:
         value = value[:_LONGEST_SHOWN] + "..."
     return value if re.fullmatch(r"[+-]?[0-9.]+", value) else f'"{value}"'
 
 
-_MOST_CHOICES = 500  # difflib is slow; a suggestion is not worth more than about a millisecond
+_MAX_CHOICES = 500  # difflib is slow; a suggestion is not worth more than about a millisecond
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
@@ -133,6 +133,6 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     if len(word) > _LONGEST_SHOWN:
         return ""
     near = difflib.get_close_matches(
-        word, [c for c in islice(choices, _MOST_CHOICES) if len(c) <= _LONGEST_SHOWN], n=1
+        word, [c for c in islice(choices, _MAX_CHOICES) if len(c) <= _LONGEST_SHOWN], n=1
     )
     return f', did you mean "{near[0]}"?' if near else ""

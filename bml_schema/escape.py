@@ -32,11 +32,11 @@ def escape_value(text: str) -> str:
     return text if _plain(text) else _checked(text).translate(_ATTRIBUTE)
 
 
-def legal_value(text: str) -> str:
+def sanitized_value(text: str) -> str:
     """The inside of a double-quoted attribute, with U+FFFD for what XML cannot hold."""
-    return text if _plain(text) else escape_value(legal(text))
+    return text if _plain(text) else escape_value(sanitized(text))
 
 
-def legal(text: str) -> str:
+def sanitized(text: str) -> str:
     """The text with every character XML cannot hold replaced by U+FFFD."""
     return _ILLEGAL.sub("\ufffd", text)

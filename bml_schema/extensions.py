@@ -17,7 +17,7 @@ _FAPU = number(-1e5, 1e5)
 
 
 @node
-class Feeling(Behaviour):
+class EmotionBase(Behaviour):
     """What an emotion and a mood say alike.
 
     Attributes:
@@ -51,7 +51,7 @@ class Feeling(Behaviour):
 
 
 @node
-class Emotion(Feeling):
+class Emotion(EmotionBase):
     """Show an emotion for a while."""
 
     tag = own("emotion")
@@ -59,7 +59,7 @@ class Emotion(Feeling):
 
 
 @node
-class Mood(Feeling):
+class Mood(EmotionBase):
     """An emotion that is the resting face from now on."""
 
     tag = own("mood")

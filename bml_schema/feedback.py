@@ -16,8 +16,8 @@ from lxml import etree
 from bml_schema.behaviours import Speech, SpeechText, Sync
 from bml_schema.bmla import FaceKeyframe
 from bml_schema.documents import element
-from bml_schema.errors import BMLError, BMLSyntaxError, shown
-from bml_schema.escape import escape, legal, legal_value
+from bml_schema.errors import BMLError, BMLSyntaxError, quoted
+from bml_schema.escape import escape, sanitized, sanitized_value
 from bml_schema.node_schema import changed, local, node
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
 from bml_schema.parser import read_behaviour
@@ -34,7 +34,7 @@ __all__ = [
     "SyncPointProgress",
     "WarningFeedback",
     "parse_feedback",
-    "predicted",
+    "prediction_of",
 ]
 
 
@@ -69,7 +69,7 @@ class BlockProgress:
         posix = _posix("bmla:posixTime", self.global_time, epoch, self.posix_time)
         said = _given("realizer:said", self.said) + _given("realizer:lastWord", self.last_word)
         return (
-            f'<blockProgress{_CORE} id="{legal_value(self.id)}" globalTime="{_seconds(self.global_time)}"'
+            f'<blockProgress{_CORE} id="{sanitized_value(self.id)}" globalTime="{_seconds(self.global_time)}"'
             f"{_given('characterId', self.character_id)}"
             f"{_bmla(posix + _given('bmla:status', self.status))}"
             f"{_ours(said + _number(self.seq if seq is None else seq))}/>"
@@ -96,7 +96,7 @@ class SyncPointProgress:
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; `seq` and `epoch` as the module says."""
         return (
-            f'<syncPointProgress{_CORE} id="{legal_value(self.id)}" time="{_seconds(self.time)}"'
+            f'<syncPointProgress{_CORE} id="{sanitized_value(self.id)}" time="{_seconds(self.time)}"'
             f' globalTime="{_seconds(self.global_time)}"{_given("characterId", self.character_id)}'
             f"{_bmla(_posix('bmla:posixTime', self.global_time, epoch, self.posix_time))}"
             f"{_ours(_number(self.seq if seq is None else seq))}/>"
@@ -122,10 +122,10 @@ class WarningFeedback:
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """The element as text; no CDATA and no elements inside, clients refuse both."""
         start = (
-            f'<warningFeedback{_CORE} id="{legal_value(self.id)}" type="{legal_value(self.type)}"'
+            f'<warningFeedback{_CORE} id="{sanitized_value(self.id)}" type="{sanitized_value(self.type)}"'
             f"{_given('characterId', self.character_id)}{_ours(_number(self.seq if seq is None else seq))}"
         )
-        return f"{start}>{escape(legal(self.text))}</warningFeedback>" if self.text else f"{start}/>"
+        return f"{start}>{escape(sanitized(self.text))}</warningFeedback>" if self.text else f"{start}/>"
 
 
 @node
@@ -151,7 +151,8 @@ class PredictionFeedback:
 
     Attributes:
         blocks: block times.
-        behaviours: nodes whose id is "block:behaviour" and whose syncs are plain numbers; see `predicted`.
+        behaviours: nodes whose id is "block:behaviour" and whose syncs are plain numbers; see
+            `prediction_of`.
     """
 
     character_id: str | None = None
@@ -175,7 +176,7 @@ class PredictionFeedback:
             times = "" if start is None else f' globalStart="{_seconds(start)}"'
             if end is not None:
                 times += f' globalEnd="{_seconds(end)}"'
-            inner.append(f'<bml id="{legal_value(block.id)}"{times}{told}/>')
+            inner.append(f'<bml id="{sanitized_value(block.id)}"{times}{told}/>')
         inner.extend(writer.behaviour(b) for b in self.behaviours)
         declared = writer.declarations()
         tag = (
@@ -188,7 +189,7 @@ class PredictionFeedback:
 Feedback = BlockProgress | SyncPointProgress | WarningFeedback | PredictionFeedback
 
 
-def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behaviour:
+def prediction_of(node: Behaviour, block: str, times: Mapping[str, float]) -> Behaviour:
     """A behaviour as predictionFeedback tells of it: id "block:behaviour", each sync point a plain number.
 
     Args:
@@ -198,7 +199,9 @@ def predicted(node: Behaviour, block: str, times: Mapping[str, float]) -> Behavi
     """
     syncs = {p: SyncRef(offset=round(times[p], 6)) for p in node.sync_points if p in times}
     id = f"{block}:{node.id}"
-    node = changed(node, id=id, syncs=syncs, descriptions=(), foreign={}, others=(), priority=0.0)
+    node = changed(
+        node, id=id, syncs=syncs, descriptions=(), unknown_attributes={}, unknown_children=(), priority=0.0
+    )
     if isinstance(node, Speech):
         refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}
         parts = node.text.parts if node.text is not None else ()
@@ -278,11 +281,11 @@ def _time(source: etree._Element, name: str) -> float:
     value = _needed(source, name).strip()
     # Java clients and servers write 1.0E-4: others' feedback may have exponents, ours never.
     if not NUMBER.fullmatch(value.partition("E")[0].partition("e")[0]):
-        raise BMLError(f"{name}: wanted seconds, got {shown(value)}", line=_line(source))
+        raise BMLError(f"{name}: wanted seconds, got {quoted(value)}", line=_line(source))
     try:
         return float(value)
     except ValueError:
-        raise BMLError(f"{name}: wanted seconds, got {shown(value)}", line=_line(source)) from None
+        raise BMLError(f"{name}: wanted seconds, got {quoted(value)}", line=_line(source)) from None
 
 
 def _line(source: etree._Element) -> int:
@@ -317,7 +320,7 @@ def _seconds(time: float) -> str:
 
 def _given(name: str, value: str | None) -> str:
     """An attribute; "" where there is no value."""
-    return "" if value is None else f' {name}="{legal_value(value)}"'
+    return "" if value is None else f' {name}="{sanitized_value(value)}"'
 
 
 def _posix(name: str, time: float | None, epoch: float | None, read: int | None) -> str:

@@ -59,7 +59,7 @@ class Child:
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class NodeSchema:
     """All an element may hold, as the parser and the writer need it.
 
     Attributes:
@@ -204,7 +204,7 @@ def camel(name: str) -> str:
     return head + "".join(t.capitalize() for t in tail)
 
 
-def shape_of(cls: type[Any]) -> Shape:
+def schema_of(cls: type[Any]) -> NodeSchema:
     """The shape of a node class, read once from its fields."""
     shape = _SHAPES.get(cls)
     if shape is None:
@@ -212,10 +212,10 @@ def shape_of(cls: type[Any]) -> Shape:
     return shape
 
 
-_SHAPES: dict[type[Any], Shape] = {}
+_SHAPES: dict[type[Any], NodeSchema] = {}
 
 
-def _shape(cls: type[Any]) -> Shape:
+def _shape(cls: type[Any]) -> NodeSchema:
     attributes: dict[str, Attribute] = {}
     kinds: list[Child] = []
     content = {"mixed": "", "text": ""}
@@ -240,7 +240,7 @@ def _shape(cls: type[Any]) -> Shape:
     sync_points = cls.sync_points if timed else ()
     points = frozenset(sync_points)
     needed = tuple(a for a in attributes.values() if a.required)
-    return Shape(
+    return NodeSchema(
         attributes=attributes,
         old={a.old: a for a in attributes.values() if a.old},
         required=needed,

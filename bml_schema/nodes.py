@@ -95,9 +95,10 @@ class Behaviour:
         syncs: sync point -> where the document wants it; only those the document gives.
         priority: bmla:priority; of two that want the same thing the lower one is dropped.
         descriptions: in document order.
-        foreign: attributes this class does not know, by Clark name, kept for others and for the round trip.
-        others: child elements of others, such as <bmlt:parameter>, kept likewise: each as XML text in
-            canonical form, with its own namespace declarations.
+        unknown_attributes: attributes this class does not know, by Clark name, kept for others and for the
+            round trip.
+        unknown_children: child elements of others, such as <bmlt:parameter>, kept likewise: each as XML text
+            in canonical form, with its own namespace declarations.
     """
 
     tag: ClassVar[str]
@@ -109,8 +110,8 @@ class Behaviour:
     priority: float = attribute(number(-1e6, 1e6), default=0.0, name=bmla("priority"))
     syncs: Mapping[str, SyncRef] = field(default_factory=dict, hash=False)
     descriptions: tuple[Description, ...] = ()
-    foreign: Mapping[str, str] = field(default_factory=dict, hash=False)
-    others: tuple[str, ...] = ()
+    unknown_attributes: Mapping[str, str] = field(default_factory=dict, hash=False)
+    unknown_children: tuple[str, ...] = ()
 
     def fault(self) -> str:
         """What is wrong with the whole of it, beyond single attributes; "" if it is sound."""
@@ -185,7 +186,7 @@ class Block:
         on_start: BMLA: these preplanned blocks are activated when this one starts.
         preplan: BMLA: planned, but not started before somebody activates it.
         children: in document order.
-        foreign: attributes this version does not know, by Clark name.
+        unknown_attributes: attributes this version does not know, by Clark name.
         problems: what was dropped while parsing; not part of ==.
         places: behaviour or constraint id -> line and path; not part of ==.
         behaviours: all, in document order, those inside <required> too.
@@ -206,7 +207,7 @@ class Block:
     on_start: tuple[str, ...] = attribute(block_names, default=(), name=bmla("onStart"))
     preplan: bool = attribute(flag, default=False, name=bmla("preplan"))
     children: tuple[Behaviour | Required | Constraint, ...] = ()
-    foreign: Mapping[str, str] = field(default_factory=dict, hash=False)
+    unknown_attributes: Mapping[str, str] = field(default_factory=dict, hash=False)
     problems: tuple[Problem, ...] = field(default=(), compare=False)
     places: Mapping[str, Place] = field(default_factory=dict, compare=False, repr=False)
     behaviours: tuple[Behaviour, ...] = field(init=False, compare=False, repr=False)

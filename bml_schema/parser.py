@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
-from bml_schema.block_outline import Entry, Outline, flat, made
+from bml_schema.block_outline import BlockOutline, Entry, flat, made
 from bml_schema.canonical import attributes
-from bml_schema.dropped_references import Losses
-from bml_schema.element_reader import Elements, Vocabulary
+from bml_schema.dropped_references import ReferenceRemover
+from bml_schema.element_reader import ElementReader, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
     CUSTOM_ATTRIBUTE_NOT_SUPPORTED,
@@ -28,21 +28,21 @@ from bml_schema.errors import (
     Fault,
     Place,
     Problem,
-    shown,
+    quoted,
 )
-from bml_schema.node_schema import local, shape_of
+from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
 from bml_schema.sync_refs import Names
-from bml_schema.values import block_names, unwanted
+from bml_schema.values import block_names, describe_mismatch
 
-__all__ = ["MOST_BEHAVIOURS"]
+__all__ = ["MAX_BEHAVIOURS"]
 
-MOST_BEHAVIOURS = 10_000  # in one block; more than anybody writes, and still scheduled in about a second
-_MOST_LISTED = 10  # lost references named in a warning's text; `Problem.lost` has them all
+MAX_BEHAVIOURS = 10_000  # in one block; more than anybody writes, and still scheduled in about a second
+_MAX_LISTED = 10  # lost references named in a warning's text; `Problem.lost_references` has them all
 # BMLA says this in composition or in an attribute of its own.
 _APPEND_AFTER = re.compile(r"\s*APPEND-AFTER\s*\(([^()]*)\)\s*", re.IGNORECASE)
-_BLOCK_LISTS = {a.field for a in shape_of(Block).attributes.values() if a.value is block_names}
-_MOST_ID = 256  # characters of an id a warning repeats
+_BLOCK_LISTS = {a.field for a in schema_of(Block).attributes.values() if a.value is block_names}
+_MAX_ID = 256  # characters of an id a warning repeats
 
 
 def read_block(
@@ -51,7 +51,7 @@ def read_block(
     *,
     lines_before: int = 0,
     begins: Mapping[tuple[int, str], int] = MappingProxyType({}),
-    most_behaviours: int = MOST_BEHAVIOURS,
+    max_behaviours: int = MAX_BEHAVIOURS,
 ) -> Block:
     """The block of a <bml> element.
 
@@ -60,36 +60,36 @@ def read_block(
         vocabulary: Clark tag -> node class.
         lines_before: lines of the text in front of what lxml saw.
         begins: (line where a start tag ends, its local name) -> line where it begins, if that is another.
-        most_behaviours: more (constraints counted with them) are refused.
+        max_behaviours: more (constraints counted with them) are refused.
 
     Raises:
         BMLError: not a <bml>, no usable id, or too many behaviours.
     """
-    elements = Elements(vocabulary)
+    elements = ElementReader(vocabulary)
     lines = _Lines(lines_before, begins)
     line = lines.of(root)
     if elements.tag(root) != Block.tag:
-        raise BMLError(f"wanted <bml> in namespace {CORE}, got {shown(str(root.tag))}", line=line)
+        raise BMLError(f"wanted <bml> in namespace {CORE}, got {quoted(str(root.tag))}", line=line)
     try:
         values, wrong_attributes = _block_attributes(root, line)
     except Fault as wrong:
         raise BMLError(wrong.text, line=line, path="/bml") from None
     names = elements.names = Names(values["id"])
-    outline = Outline(elements, names)
+    outline = BlockOutline(elements, names)
     tree = outline.entries(root, "/bml", required=False)
     reader = _Reader(outline, lines)
     entries = flat(tree)
-    if len(entries) > most_behaviours:
-        said = f"wanted at most {most_behaviours} behaviours and constraints in a block, got {len(entries)}"
+    if len(entries) > max_behaviours:
+        said = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {len(entries)}"
         raise BMLSizeError(said, line=line, path="/bml", block=names.block)
     if wrong_attributes:
         reader.problem(names.block, Fault(wrong_attributes, root), "/bml", root, dropped=False)
-    if stray := elements.stray(shape_of(Block), root, values["foreign"], False):
-        reader.stray(names.block, stray, "/bml", root, root)
+    if stray := elements.describe_unknown(schema_of(Block), root, values["unknown_attributes"], False):
+        reader.report_unknown(names.block, stray, "/bml", root, root)
     for text, parent, path in outline.loose:
         # Nobody's text, so the block's problem.
         reader.problem(
-            names.block, Fault(f"wanted elements, got the text {shown(text)}", parent), path, parent
+            names.block, Fault(f"wanted elements, got the text {quoted(text)}", parent), path, parent
         )
     nodes: dict[int, Behaviour | Constraint] = {}
     for n, entry in enumerate(entries):
@@ -114,7 +114,7 @@ def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour
 
     Its id may hold colons ("block:behaviour"), and its references are not looked up.
     """
-    elements = Elements(vocabulary)
+    elements = ElementReader(vocabulary)
     cls = vocabulary.get(elements.tag(element))
     if cls is None:
         return None
@@ -129,8 +129,8 @@ def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour
 
 def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], str]:
     """Values by field, and what is wrong with them; a fault in the id is an error."""
-    known = shape_of(Block).attributes
-    values: dict[str, Any] = {"foreign": {}}
+    known = schema_of(Block).attributes
+    values: dict[str, Any] = {"unknown_attributes": {}}
     faults: list[str] = []
     after: tuple[str, ...] = ()
     if "id" not in root.attrib:
@@ -138,7 +138,7 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
     for name, text in attributes(root):
         spec = known.get(name)
         if spec is None:
-            values["foreign"][name] = text
+            values["unknown_attributes"][name] = text
             continue
         try:
             if name == "composition" and (listed := _APPEND_AFTER.fullmatch(text)):
@@ -146,7 +146,7 @@ def _block_attributes(root: etree._Element, line: int) -> tuple[dict[str, Any], 
             else:
                 values[spec.field] = spec.value.read(text)
         except ValueError:
-            said = f"{local(name)}: {unwanted(spec.value.wanted, text, shown(text))}"
+            said = f"{local(name)}: {describe_mismatch(spec.value.wanted, text, quoted(text))}"
             if name == "id":
                 raise BMLError(said, line=line, path="/bml") from None
             if text.strip():
@@ -178,7 +178,7 @@ class _Reader:
 
     __slots__ = ("elements", "line", "names", "owners", "places", "problems")
 
-    def __init__(self, outline: Outline, lines: _Lines) -> None:
+    def __init__(self, outline: BlockOutline, lines: _Lines) -> None:
         self.elements = outline.elements
         self.names = outline.names
         self.owners = outline.owners
@@ -197,24 +197,24 @@ class _Reader:
             owner = self.owners.get(entry.id, entry)
             if owner is not entry:
                 line = self.line(owner.element)
-                said = f"id: wanted one of its own, got {shown(entry.id)}, which line {line} has"
+                said = f"id: wanted one of its own, got {quoted(entry.id)}, which line {line} has"
                 raise Fault(said, element)
             node: Behaviour = self.elements.node(cls, element, timed=True)
         except Fault as fault:
-            self.elements.strays.clear()  # it goes, whatever else is to be said of it
-            id = entry.id if 0 < len(entry.id) <= _MOST_ID else entry.path
+            self.elements.unknown_attributes.clear()  # it goes, whatever else is to be said of it
+            id = entry.id if 0 < len(entry.id) <= _MAX_ID else entry.path
             self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
             return None
         self.places[node.id] = made(Place, (self.line(element), entry.path))
-        if self.elements.strays:
-            self.take_strays(f"{self.names.block}:{node.id}", entry)
+        if self.elements.unknown_attributes:
+            self.report_unknown_attributes(f"{self.names.block}:{node.id}", entry)
         return node
 
     def unknown(self, entry: Entry) -> Fault:
         tag, element = entry.kind.tag, entry.element
         standard = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
         if not tag.startswith(standard):
-            return Fault(f"no behaviour {shown(tag)} is known here", element, CUSTOM_BEHAVIOR_NOT_SUPPORTED)
+            return Fault(f"no behaviour {quoted(tag)} is known here", element, CUSTOM_BEHAVIOR_NOT_SUPPORTED)
         name = local(tag)
         elsewhere = [t for t in self.elements.vocabulary if local(t) == name]
         if elsewhere:
@@ -225,11 +225,11 @@ class _Reader:
             )
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
-    def take_strays(self, id: str, entry: Entry) -> None:
+    def report_unknown_attributes(self, id: str, entry: Entry) -> None:
         """Tell of the attributes that nobody knows, element by element."""
-        for said, element in self.elements.strays:
-            self.stray(id, said, entry.path, element, entry.element)
-        self.elements.strays.clear()
+        for said, element in self.elements.unknown_attributes:
+            self.report_unknown(id, said, entry.path, element, entry.element)
+        self.elements.unknown_attributes.clear()
 
     def constraint(self, entry: Entry) -> Constraint | None:
         """The node of an entry; None, and a Problem, if it is dropped."""
@@ -237,11 +237,11 @@ class _Reader:
         try:
             values = self.elements.constraint(element)
         except Fault as fault:
-            self.elements.strays.clear()
-            id = entry.id if 0 < len(entry.id) <= _MOST_ID else self.names.block
+            self.elements.unknown_attributes.clear()
+            id = entry.id if 0 < len(entry.id) <= _MAX_ID else self.names.block
             self.problem(id, fault, entry.path, element, entry.required)
             return None
-        self.take_strays(values.get("id") or self.names.block, entry)
+        self.report_unknown_attributes(values.get("id") or self.names.block, entry)
         place = Place(self.line(element), entry.path)
         return Constraint(**values, required=entry.required, place=place)
 
@@ -252,7 +252,7 @@ class _Reader:
         gone = self.owners.keys() - self.places.keys()
         if not gone:
             return
-        losses = Losses(gone)
+        losses = ReferenceRemover(gone)
         for n, node in list(nodes.items()):
             left = losses.without(node)
             if left is None:
@@ -262,15 +262,17 @@ class _Reader:
         prefix = f"{self.names.block}:"
         for n, problem in enumerate(self.problems):
             id = problem.id.removeprefix(prefix) if problem.id.startswith(prefix) else ""
-            lost = tuple(losses.lost.pop(id, ()))
+            lost = tuple(losses.lost_references.pop(id, ()))
             if lost:
-                more = len(lost) - _MOST_LISTED
-                named = ", ".join(lost[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+                more = len(lost) - _MAX_LISTED
+                named = ", ".join(lost[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
                 text = f"{problem.text}; with it went {named}"
                 fatal = problem.fatal or id in losses.fatal
-                self.problems[n] = replace(problem, text=text, lost=lost, fatal=fatal)
+                self.problems[n] = replace(problem, text=text, lost_references=lost, fatal=fatal)
 
-    def stray(self, id: str, said: str, path: str, element: etree._Element, top: etree._Element) -> None:
+    def report_unknown(
+        self, id: str, said: str, path: str, element: etree._Element, top: etree._Element
+    ) -> None:
         fault = Fault(said, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED)
         self.problem(id, fault, path, top, dropped=False)
 

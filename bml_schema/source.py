@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bml_schema.tolerant_scanner import DOCUMENT, Element, Slip, scan
+from bml_schema.tolerant_scanner import DOCUMENT, Element, ScanError, scan
 
 _STEP = re.compile(r"([^/\[\]]+)(?:\[([0-9]{1,9})\])?")
 _ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
@@ -35,12 +35,12 @@ class Source:
     Attributes:
         text: decoded.
         elements: every start tag, in order.
-        slips: what is not well-formed, as far as that is seen, in order.
+        errors: what is not well-formed, as far as that is seen, in order.
     """
 
     def __init__(self, text: str | bytes) -> None:
         self.text = _decoded(text) if isinstance(text, bytes) else text
-        self.elements, self.slips = scan(self.text)
+        self.elements, self.errors = scan(self.text)
         self._starts = [0, *(m.end() for m in re.finditer("\n", self.text))]
         self._line = 0, ""  # the last one asked for
         self._children = {
@@ -188,14 +188,14 @@ class Source:
         blanks = len(text) - len(text.lstrip())
         return Spot(number, blanks + 1, max(1, len(text.strip())))
 
-    def slip(self, line: int) -> Slip | None:
+    def error_on_line(self, line: int) -> ScanError | None:
         """What is not well-formed on a line, or above it in the same document: parsers notice some late."""
-        on = next((s for s in self.slips if self.line_of(s.offset) == line), None)
+        on = next((s for s in self.errors if self.line_of(s.offset) == line), None)
         if on is not None:
             return on
         roots = (self.elements[n].offset for n in self._roots)
         first = max((r for r in roots if self.line_of(r) <= line), default=0)
-        above = [s for s in self.slips if first <= s.offset and self.line_of(s.offset) < line]
+        above = [s for s in self.errors if first <= s.offset and self.line_of(s.offset) < line]
         return above[-1] if above else None
 
     def _below(self, root: int, steps: list[tuple[str, int]]) -> Element | None:

@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bml_schema.errors import did_you_mean, shown
+from bml_schema.errors import did_you_mean, quoted
 from bml_schema.node_schema import node
-from bml_schema.values import MOST_SECONDS, NUMBER, decimal, unwanted
+from bml_schema.values import MAX_SECONDS, NUMBER, decimal, describe_mismatch
 
 __all__ = ["SyncRef"]
 
@@ -109,7 +109,7 @@ def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
         raise ValueError(f"wanted at most {_LONGEST} characters, got {len(text)}")
     readings = [r for r in (_point(text, ""), _with_offset(text)) if r is not None]
     if not readings:
-        raise ValueError(unwanted(_WANTED, text, shown(text)))
+        raise ValueError(describe_mismatch(_WANTED, text, quoted(text)))
     if names is None:
         return readings[-1]
     readings = [_own(r, names) for r in readings]
@@ -124,8 +124,8 @@ def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
 
 def _seconds(text: str) -> float:
     value = float(text)
-    if not abs(value) <= MOST_SECONDS:
-        raise ValueError(f"wanted at most {MOST_SECONDS:g} seconds, got {shown(text)}")
+    if not abs(value) <= MAX_SECONDS:
+        raise ValueError(f"wanted at most {MAX_SECONDS:g} seconds, got {quoted(text)}")
     return value
 
 
@@ -178,20 +178,22 @@ def _missing(ref: SyncRef, names: Names, say: bool = False) -> str:
     source, sync = ref.behaviour or "", ref.sync or ""
     if source == "bml":
         return (
-            "" if sync == "start" and ref.index is None else f'wanted "bml:start", got {shown(f"bml:{sync}")}'
+            ""
+            if sync == "start" and ref.index is None
+            else f'wanted "bml:start", got {quoted(f"bml:{sync}")}'
         )
     if source not in names.points:
         if not say:
             return "unknown"
         near = ', did you mean "bml:start"?' if source == names.block else names.suggest(source, names.points)
-        return f"no behaviour {shown(source)} in this block{near}"
+        return f"no behaviour {quoted(source)} in this block{near}"
     points = names.points[source]
     if points is None:
         return ""
     if sync not in points.names:
-        return f"no sync point {shown(sync)} on {shown(source)}" + (
+        return f"no sync point {quoted(sync)} on {quoted(source)}" + (
             names.suggest(sync, points.names) if say else ""
         )
     if ref.index is not None and ref.index > points.strokes:
-        return f"wanted stroke:1..{points.strokes} of {shown(source)}, got stroke:{ref.index}"
+        return f"wanted stroke:1..{points.strokes} of {quoted(source)}, got stroke:{ref.index}"
     return ""

@@ -16,7 +16,7 @@ _SLIPPED = re.compile(r"\s*([^\s<>/='\"]+)(?:\s*=\s*([^\s<>]*))?")
 _BAD_ENTITY = re.compile(r"&(?!(?:amp|lt|gt|quot|apos|#[0-9]+|#x[0-9a-fA-F]+);)[^\s<>;\"'&]{0,30};?")
 
 
-class Slip(NamedTuple):
+class ScanError(NamedTuple):
     """A place that no XML parser takes, what is wrong there, and the offset of what it does not fit or -1."""
 
     offset: int
@@ -47,11 +47,11 @@ class Element:
     attributes: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
-def scan(text: str) -> tuple[list[Element], list[Slip]]:
+def scan(text: str) -> tuple[list[Element], list[ScanError]]:
     """Every start tag, and every slip, both in order; forgiving, as texts are scanned that are broken."""
     one = _Scan(text)
     one.run()
-    return one.elements, sorted(one.slips)
+    return one.elements, sorted(one.errors)
 
 
 class _Scan:
@@ -60,7 +60,7 @@ class _Scan:
     def __init__(self, text: str) -> None:
         self.text = text
         self.elements: list[Element] = []
-        self.slips: list[Slip] = []
+        self.errors: list[ScanError] = []
         self.open: list[int] = []
         self.names: dict[str, int] = {}  # how many of these are open
         self.counts: dict[tuple[int, str], int] = {}
@@ -76,7 +76,7 @@ class _Scan:
             first = self.elements[self.open[-1]]
             end = len(self.text.rstrip())
             words = f"<{first.name}> is never closed"
-            self.slips.append(Slip(max(0, end - 1), 1, words, first.offset))
+            self.errors.append(ScanError(max(0, end - 1), 1, words, first.offset))
 
     def tag(self, opener: str, start: int, end: int) -> int:
         """Read what begins at `start`; returns where to go on."""
@@ -85,7 +85,7 @@ class _Scan:
             close = -1 if closer in self.never else self.text.find(closer, end)
             if close < 0:
                 self.never.add(closer)
-                self.slips.append(Slip(start, len(opener), f"{opener} is never closed by {closer}"))
+                self.errors.append(ScanError(start, len(opener), f"{opener} is never closed by {closer}"))
                 return end
             return close + len(closer)
         name = _NAME.match(self.text, end)
@@ -104,12 +104,12 @@ class _Scan:
         while not (end := _TAG_END.match(self.text, here)):
             found = _ATTRIBUTE.match(self.text, here)
             if found is None:
-                here = self.slipped(name, here)
+                here = self.report_errors(name, here)
                 break
             key, quoted = found[1], 2 if found[2] is not None else 3
             if key in element.attributes:
                 words = f"{key} is given twice"
-                self.slips.append(Slip(found.start(1), len(key), words, element.attributes[key][0]))
+                self.errors.append(ScanError(found.start(1), len(key), words, element.attributes[key][0]))
             else:
                 element.attributes[key] = found.span(quoted)
             self.entities(*found.span(quoted))
@@ -120,24 +120,24 @@ class _Scan:
             self.names[name] = self.names.get(name, 0) + 1
         return element.end
 
-    def slipped(self, tag: str, here: int) -> int:
+    def report_errors(self, tag: str, here: int) -> int:
         """Say what is wrong in a start tag; returns where to look for the next tag."""
-        slips, text = self.slips, self.text
+        slips, text = self.errors, self.text
         found = _SLIPPED.match(text, here)
         if found is None:
             at = here + len(text[here : here + 200]) - len(text[here : here + 200].lstrip())
-            slips.append(Slip(at, 1, f"wanted an attribute or the end of <{tag}>"))
+            slips.append(ScanError(at, 1, f"wanted an attribute or the end of <{tag}>"))
             return here
         name, value = found[1], found[2]
         if value is None:
-            slips.append(Slip(found.start(1), len(name), f'wanted {name}="...", got no value'))
+            slips.append(ScanError(found.start(1), len(name), f'wanted {name}="...", got no value'))
         elif value[:1] in ('"', "'"):
             slips.append(
-                Slip(found.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
+                ScanError(found.start(2), len(value), f"the value of {name} is never closed by {value[0]}")
             )
         else:
             slips.append(
-                Slip(found.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
+                ScanError(found.start(2), max(1, len(value)), f"wanted quotes around the value of {name}")
             )
         return found.end()
 
@@ -147,7 +147,7 @@ class _Scan:
             if elements[self.open[-1]].name != name:
                 inner = elements[self.open[-1]]
                 words = f"wanted </{inner.name}>, got </{name}>"
-                self.slips.append(Slip(start, end - start, words, inner.offset))
+                self.errors.append(ScanError(start, end - start, words, inner.offset))
             while self.names.get(name):
                 last = elements[self.open.pop()].name
                 self.names[last] -= 1
@@ -156,9 +156,9 @@ class _Scan:
         elif self.open:
             inner = elements[self.open[-1]]
             words = f"wanted </{inner.name}>, got </{name}>"
-            self.slips.append(Slip(start, end - start, words, inner.offset))
+            self.errors.append(ScanError(start, end - start, words, inner.offset))
         else:
-            self.slips.append(Slip(start, end - start, f"</{name}> closes nothing"))
+            self.errors.append(ScanError(start, end - start, f"</{name}> closes nothing"))
         return end
 
     def entities(self, start: int, end: int) -> None:
@@ -167,4 +167,4 @@ class _Scan:
                 words = f"no entity {found[0]} in XML, write the character itself"
             else:
                 words = "wanted &amp; for the character &"
-            self.slips.append(Slip(found.start(), len(found[0]), words))
+            self.errors.append(ScanError(found.start(), len(found[0]), words))

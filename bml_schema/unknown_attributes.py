@@ -10,15 +10,15 @@ from collections.abc import Callable, Iterable
 
 from lxml import etree
 
-from bml_schema.node_schema import Shape, local
+from bml_schema.node_schema import NodeSchema, local
 from bml_schema.nodes import CORE, EXTENSIONS, OWN
 
 # BMLA and BMLT have more attributes than are known here.
 _OURS = tuple(f"{{{space}}}" for space in (CORE, EXTENSIONS, OWN))
 
 
-def stray(
-    shape: Shape,
+def describe_unknown(
+    shape: NodeSchema,
     element: etree._Element,
     names: Iterable[str],
     timed: bool,

@@ -10,9 +10,9 @@ from typing import Any
 
 __all__ = ["Value", "flag", "integer", "number", "one_of", "seconds", "string", "word"]
 
-MOST_SECONDS = 86400.0  # a day; longer times in a document are a unit mistake or an attack
-_MOST_DIGITS = 400  # the smallest float written without exponent has 345 characters
-_MOST_NAME = 256  # characters; ids come back in feedback start tags, which clients cut at 4096
+MAX_SECONDS = 86400.0  # a day; longer times in a document are a unit mistake or an attack
+_MAX_DIGITS = 400  # the smallest float written without exponent has 345 characters
+_MAX_NAME = 256  # characters; ids come back in feedback start tags, which clients cut at 4096
 
 # No exponent, NaN or infinity: the standard's numbers are plain decimals.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
@@ -52,7 +52,7 @@ def decimal(value: float) -> str:
     return text.removesuffix(".0")
 
 
-def unwanted(wanted: str, got: str, shown: str) -> str:
+def describe_mismatch(wanted: str, got: str, shown: str) -> str:
     """`wanted 0..1, got 7`, with a hint where a number is written in a way BML does not have."""
     hint = " (a plain decimal number, no exponent, NaN or infinity)" if _FANCY.fullmatch(got.strip()) else ""
     return f"wanted {wanted}{hint}, got {shown}"
@@ -63,7 +63,7 @@ def number(low: float, high: float, *, wanted: str = "") -> Value:
 
     def read(text: str) -> float:
         text = text.strip()
-        if len(text) > _MOST_DIGITS or not NUMBER.fullmatch(text):
+        if len(text) > _MAX_DIGITS or not NUMBER.fullmatch(text):
             raise ValueError(text)
         value = float(text)
         if not low <= value <= high:
@@ -111,19 +111,19 @@ def _read_word(text: str) -> str:
     return text
 
 
-_NAME = re.compile(rf"[^\s:]{{1,{_MOST_NAME}}}")
+_NAME = re.compile(rf"[^\s:]{{1,{_MAX_NAME}}}")
 
 
 def _read_name(text: str) -> str:
     text = text.strip()
-    if text == "bml" or not ((text.isalnum() and len(text) <= _MOST_NAME) or _NAME.fullmatch(text)):
+    if text == "bml" or not ((text.isalnum() and len(text) <= _MAX_NAME) or _NAME.fullmatch(text)):
         raise ValueError(text)
     return text
 
 
 def _read_block_name(text: str) -> str:
     text = text.strip()
-    if not text or text == "bml" or ":" in text or len(text) > _MOST_NAME:
+    if not text or text == "bml" or ":" in text or len(text) > _MAX_NAME:
         raise ValueError(text)
     return text
 
@@ -154,16 +154,16 @@ def _read_flag(text: str) -> bool:
 word = Value("a word", _read_word)
 string = Value("text", str)
 flag = Value("true or false", _read_flag, lambda v: "true" if v else "false", "boolean")
-seconds = number(-MOST_SECONDS, MOST_SECONDS, wanted=f"seconds, at most {MOST_SECONDS:g}")
+seconds = number(-MAX_SECONDS, MAX_SECONDS, wanted=f"seconds, at most {MAX_SECONDS:g}")
 # Ids hold no colon, because references and feedback ids are joined with it. Those of behaviours hold no
 # blank, because "a - 1" must always mean an offset. "bml" is the block itself in references.
 block_name = Value(
-    f'a name of at most {_MOST_NAME} characters without ":", other than "bml"',
+    f'a name of at most {_MAX_NAME} characters without ":", other than "bml"',
     _read_block_name,
     type="name",
 )
 name = Value(
-    f'a name of at most {_MOST_NAME} characters without blanks or ":", other than "bml"',
+    f'a name of at most {_MAX_NAME} characters without blanks or ":", other than "bml"',
     _read_name,
     type="name",
 )

@@ -8,7 +8,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.escape import escape, escape_value
-from bml_schema.node_schema import shape_of, sync_ref
+from bml_schema.node_schema import schema_of, sync_ref
 from bml_schema.nodes import (
     BMLA,
     BMLT,
@@ -86,7 +86,7 @@ class Writer:
             yield self._element(node, indent)
 
     def _element(self, node: Any, indent: str) -> str:
-        shape = shape_of(type(node))
+        shape = schema_of(type(node))
         name = self.name(node.tag)
         start = f"<{name}{self._attributes(node)}"
         if shape.mixed:
@@ -103,7 +103,7 @@ class Writer:
                 inner.append(self._element(child, indent + "  "))
         for description in getattr(node, "descriptions", ()):
             inner.append(f"{indent}  {self._description(description)}")
-        inner += [f"{indent}  {_checked(other)}" for other in getattr(node, "others", ())]
+        inner += [f"{indent}  {_checked(other)}" for other in getattr(node, "unknown_children", ())]
         if not inner:
             return f"{indent}{start}/>"
         return "\n".join((f"{indent}{start}>", *inner, f"{indent}</{name}>"))
@@ -117,7 +117,7 @@ class Writer:
         return f"<description{values}>{node.content}</description>"
 
     def _attributes(self, node: Any) -> str:
-        shape = shape_of(type(node))
+        shape = schema_of(type(node))
         out = ""
         for spec in shape.attributes.values():
             value = getattr(node, spec.field)
@@ -129,7 +129,7 @@ class Writer:
         for point in _ordered(node):
             ref = node.syncs[point]
             out += f' {point}="{decimal(ref.offset)}"' if ref.behaviour is None else _value(point, str(ref))
-        for name, text in getattr(node, "foreign", {}).items():
+        for name, text in getattr(node, "unknown_attributes", {}).items():
             out += _value(self.name(name, attribute=True), text)
         return out
 

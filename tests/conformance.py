@@ -34,7 +34,7 @@ from bml_schema import (
     Synchronize,
 )
 from bml_schema import VOCABULARY as LANGUAGE
-from bml_schema.node_schema import Attribute, shape_of
+from bml_schema.node_schema import Attribute, schema_of
 from realizer.behaviours.registry import VOCABULARY
 from tests.cases import CASES, CORPUS, Case
 
@@ -85,7 +85,7 @@ def classes() -> Iterator[type[Any]]:
         if cls not in seen:
             seen.add(cls)
             yield cls
-            for child in shape_of(cls).children:
+            for child in schema_of(cls).children:
                 for inner in child.classes:
                     yield from within(inner)
 
@@ -96,7 +96,7 @@ def classes() -> Iterator[type[Any]]:
 def derived() -> Iterator[Rule]:
     """The rules that the node classes state."""
     yield from _attributes("behaviour", Behaviour, "Every behaviour", True, set())
-    own = set(shape_of(Behaviour).attributes)
+    own = set(schema_of(Behaviour).attributes)
     for cls in classes():
         name = prefixed(cls.tag)
         core = cls.tag.startswith((f"{{{CORE}}}", f"{{{EXTENSIONS}}}"))
@@ -111,7 +111,7 @@ def derived() -> Iterator[Rule]:
 
 
 def _attributes(name: str, cls: type[Any], chapter: str, core: bool, without: set[str]) -> Iterator[Rule]:
-    for spec in shape_of(cls).attributes.values():
+    for spec in schema_of(cls).attributes.values():
         if spec.name in without:
             continue
         known = prefixed(spec.name)
@@ -243,7 +243,7 @@ def _rank(rule: Rule) -> tuple[int, str, str]:
         return len(_ORDER), "", ""
     proof = _proof(rule) if rule.kind in ("sync point", "reference", "value") else ""
     by_name = rule.kind in ("attribute", "required", "value", "default")
-    order = list(shape_of(rule.element).attributes).index(rule.name) if by_name and rule.element else 0
+    order = list(schema_of(rule.element).attributes).index(rule.name) if by_name and rule.element else 0
     return _ORDER.index(rule.kind), f"{order:03}", proof
 
 

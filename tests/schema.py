@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape, quoteattr
 import bml_schema
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Behaviour
 from bml_schema.behaviours import AMOUNT, PEAK
-from bml_schema.node_schema import Attribute, shape_of
+from bml_schema.node_schema import Attribute, schema_of
 from bml_schema.values import string, word
 from realizer.behaviours.registry import VOCABULARY
 
@@ -43,7 +43,7 @@ def classes() -> dict[str, type[Any]]:
         space, _, name = cls.tag[1:].partition("}")
         if space == OWN and name not in found:
             found[name] = cls
-            waiting = [inner for child in shape_of(cls).children for inner in child.classes] + waiting
+            waiting = [inner for child in schema_of(cls).children for inner in child.classes] + waiting
     return found
 
 
@@ -59,7 +59,7 @@ def render() -> str:
 
 
 def _content(cls: type[Any]) -> Iterator[str]:
-    shape = shape_of(cls)
+    shape = schema_of(cls)
     inner = [
         f'<xs:element ref="realizer:{c.tag.partition("}")[2]}"/>' for k in shape.children for c in k.classes
     ]
@@ -72,7 +72,7 @@ def _content(cls: type[Any]) -> Iterator[str]:
         yield "      </xs:choice>"
     without: set[str] = set()
     if timed:
-        without = set(shape_of(Behaviour).attributes)
+        without = set(schema_of(Behaviour).attributes)
         yield '      <xs:attributeGroup ref="bml:identity"/>'
         if group := GROUPS.get(tuple(cls.sync_points)):
             yield f'      <xs:attributeGroup ref="bml:{group}"/>'

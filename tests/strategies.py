@@ -27,7 +27,7 @@ from bml_schema import (
     SyncRef,
     Value,
 )
-from bml_schema.node_schema import shape_of, sync_ref
+from bml_schema.node_schema import schema_of, sync_ref
 
 __all__ = ["attribute_values", "blocks", "descriptions", "names", "numbers", "xml_text"]
 
@@ -119,7 +119,7 @@ OTHERS = [
 def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
     """Values for the plain attributes of a class; optional ones sometimes left out."""
     values: dict[str, Any] = {}
-    for spec in shape_of(cls).attributes.values():
+    for spec in schema_of(cls).attributes.values():
         if spec.field != "id" and spec.value is not sync_ref and (spec.required or draw(st.booleans())):
             values[spec.field] = draw(attribute_values(spec.value))
     if cls in (Emotion, Mood):
@@ -138,7 +138,7 @@ def _own_values(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
 
 def _content(draw: st.DrawFn, cls: type[Any]) -> dict[str, Any]:
     """Values for the children and the text of a class; not for mixed content, which holds references."""
-    shape = shape_of(cls)
+    shape = schema_of(cls)
     values: dict[str, Any] = {shape.text: draw(xml_text())} if shape.text else {}
     for kind in shape.children:
         if kind.classes == (SpeechText,):
@@ -198,8 +198,8 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
             id=id,
             syncs={p: draw(refs) for p in cls.sync_points if draw(st.integers(0, 2)) == 0},
             descriptions=tuple(draw(st.lists(descriptions(), max_size=1))),
-            foreign=draw(others) if foreign else {},
-            others=tuple(draw(st.lists(st.sampled_from(OTHERS), max_size=2))) if foreign else (),
+            unknown_attributes=draw(others) if foreign else {},
+            unknown_children=tuple(draw(st.lists(st.sampled_from(OTHERS), max_size=2))) if foreign else (),
             **given[id],
         )
         nodes.append(node)
@@ -219,4 +219,6 @@ def blocks(draw: st.DrawFn, foreign: bool = True) -> Block:
     values = _own_values(draw, Block)
     # Its own id in a list of blocks says nothing, and is not kept.
     lists = {k: tuple(n for n in v if n != id) for k, v in values.items() if isinstance(v, tuple)}
-    return Block(id=id, children=children, foreign=draw(others) if foreign else {}, **values | lists)
+    return Block(
+        id=id, children=children, unknown_attributes=draw(others) if foreign else {}, **values | lists
+    )

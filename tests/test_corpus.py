@@ -18,7 +18,7 @@ from bml_schema import (
     parse,
     write,
 )
-from bml_schema.node_schema import shape_of
+from bml_schema.node_schema import schema_of
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.curves import gain_at
 from realizer.behaviours.registry import VOCABULARY
@@ -129,7 +129,7 @@ def check_reading(case: Case, played: Played) -> None:
 
 def field_of(node: object, name: str) -> str:
     """The field that an attribute goes to; children and all else are named as they are."""
-    spec = shape_of(type(node)).attributes.get(name)
+    spec = schema_of(type(node)).attributes.get(name)
     return spec.field if spec else name
 
 

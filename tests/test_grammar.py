@@ -19,7 +19,7 @@ from bml_schema import (
     SyncPointProgress,
     WarningFeedback,
     read,
-    timed,
+    with_absolute_times,
     write,
 )
 from realizer.animation.fap.conversion import to_fap
@@ -130,7 +130,7 @@ def can_be_asked_for(block: Block, schedule: Schedule) -> bool:
 
 def stays(block: Block, schedule: Schedule) -> None:
     """A block that is written back with its times is scheduled to the same times."""
-    (again,) = read(write(timed(block, schedule.behaviours)), VOCABULARY)
+    (again,) = read(write(with_absolute_times(block, schedule.behaviours)), VOCABULARY)
     assert isinstance(again, Block)
     player = Player(PlayOptions(idle=False))
     second = submit_with_speech(player, again, SilentVoice())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, SyncRef
-from bml_schema.node_schema import local, shape_of
+from bml_schema.node_schema import local, schema_of
 from bml_schema.source import Source
 from realizer.checking.explain import near
 from realizer.checking.finding import Finding, Label
@@ -57,8 +57,8 @@ class _Advisor:
 
         Those languages have more than we know; unknown attributes of BML itself are faults.
         """
-        known = shape_of(type(node)).attributes
-        for name in node.foreign:
+        known = schema_of(type(node)).attributes
+        for name in node.unknown_attributes:
             space = name.rpartition("}")[0]
             if space[1:] not in (BMLA, BMLT):
                 continue
@@ -74,7 +74,7 @@ class _Advisor:
     def children(self, node: Any, path: str, line: int) -> Iterator[Finding]:
         """Yield advice on unknown child elements of a behaviour that are nearly a known one."""
         element = self.source.find(path, line=line, block=self.block.id)
-        known = {local(tag): tag for tag in shape_of(type(node)).by_tag}
+        known = {local(tag): tag for tag in schema_of(type(node)).by_tag}
         if element is None or not known:
             return
         for inner in self.source.below(element):

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from bml_schema import Block
-from bml_schema.node_schema import Attribute, local, shape_of
+from bml_schema.node_schema import Attribute, local, schema_of
 from bml_schema.source import Source, Spot
 from bml_schema.tolerant_scanner import Element
 from realizer.checking.explain_conflicts import explain_clash
@@ -105,7 +105,7 @@ class _Sentences:
         if line is None:
             return
         bad = source.line(line).find("\N{REPLACEMENT CHARACTER}")
-        slip = source.slip(line)
+        slip = source.error_on_line(line)
         if "got the byte" in text and bad >= 0:
             self.labels.append(Label(Spot(line, bad + 1, 1), "no such character in this encoding"))
         elif (found := _UNKNOWN_PREFIX.search(text)) and (
@@ -153,7 +153,7 @@ class _Sentences:
             self.unknown_element(text, element, bool(meant))
             return text
         name, said = found[1], found[2]
-        spec = shape_of(cls).attributes.get(name) if cls else None
+        spec = schema_of(cls).attributes.get(name) if cls else None
         span = self.source.value_span(element, name)
         if span is None:
             self.missing(name, said, element, cls)
@@ -204,7 +204,7 @@ class _Sentences:
     def missing(self, name: str, said: str, element: Element, cls: type[Any] | None) -> None:
         """An attribute that is not there: perhaps another is it, misspelt."""
         known = (
-            {*shape_of(cls).attributes, *cls.sync_points} if cls and hasattr(cls, "sync_points") else set()
+            {*schema_of(cls).attributes, *cls.sync_points} if cls and hasattr(cls, "sync_points") else set()
         )
         word = near(name, [a for a in element.attributes if a not in known and ":" not in a])
         if word is None:

@@ -17,7 +17,7 @@ from realizer.scheduling.timing import Warning
 def told_of(block: Block, id: str, type: str, text: str) -> Warning:
     """A warning of a behaviour, with its place."""
     place = block.places.get(id)
-    return Warning(f"{block.id}:{id}", type, text if place is None else place.says(text))
+    return Warning(f"{block.id}:{id}", type, text if place is None else place.with_place(text))
 
 
 def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Block | None]:

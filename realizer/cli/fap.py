@@ -123,7 +123,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     """
     import numpy as np
 
-    from bml_schema.documents import MOST_BYTES
+    from bml_schema.documents import MAX_BYTES
     from realizer.behaviours.fap_document import document_of
     from realizer.behaviours.fap_visemes import shown
     from realizer.core.errors import RealizerError
@@ -140,7 +140,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
         document = document_of(clip, "fap")
     except RealizerError as error:
         raise _refused(file, error) from None
-    room = MOST_BYTES * len(clip.values) // len(document)
+    room = MAX_BYTES * len(clip.values) // len(document)
     if room < len(clip.values):
         raise click.ClickException(
             f"{file}: wanted at most about {room} frames of these FAPs to play, got {len(clip.values)}; "

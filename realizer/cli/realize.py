@@ -279,9 +279,13 @@ def _table(planned: Schedule) -> str:
 
 def _as_documents(texts: Iterable[bytes], schedules: Iterable[Schedule]) -> str:
     """The documents of texts with the times of their schedules, one of each, in order."""
-    from bml_schema import Block, read, timed, write
+    from bml_schema import Block, read, with_absolute_times, write
     from realizer.behaviours.registry import VOCABULARY
 
     blocks = [item for text in texts for item in read(text, VOCABULARY) if isinstance(item, Block)]
     pairs = zip(blocks, schedules, strict=True)
-    return "".join(write(timed(block, planned.behaviours)) for block, planned in pairs if not planned.failed)
+    return "".join(
+        write(with_absolute_times(block, planned.behaviours))
+        for block, planned in pairs
+        if not planned.failed
+    )

@@ -49,8 +49,8 @@ def _named(speech: Speech, block: Block) -> Iterator[str | None]:
             yield _of_ssml(description.content)
     if speech.text is not None:
         yield speech.text.language
-    yield speech.foreign.get(LANG)
-    yield block.foreign.get(LANG)
+    yield speech.unknown_attributes.get(LANG)
+    yield block.unknown_attributes.get(LANG)
 
 
 def _of_ssml(content: str) -> str | None:

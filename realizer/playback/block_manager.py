@@ -193,7 +193,7 @@ class Ensemble:
             name = playing.block.id if required else f"{playing.block.id}:{behaviour}"
             text = f"{behaviour}, which is required: {fault}" if required else str(fault)
             place = playing.block.places.get(behaviour)
-            text = text if place is None else place.says(text)
+            text = text if place is None else place.with_place(text)
             self.reports.warn(Warning(name, "EXECUTION_FAILURE", text), playing.block.character_id)
             if required and not playing.done:
                 self.course.stop(playing, now)

@@ -246,4 +246,4 @@ class _Work:
     def at(self, behaviour: str, text: str) -> str:
         """A sentence with the place of its behaviour."""
         place = self.whole.places.get(behaviour)
-        return text if place is None else place.says(text)
+        return text if place is None else place.with_place(text)

@@ -15,7 +15,7 @@ from bml_schema import (
     PredictionFeedback,
     SyncPointProgress,
     WarningFeedback,
-    predicted,
+    prediction_of,
 )
 from realizer.playback.block_states import State
 from realizer.scheduling.timing import Schedule, Warning
@@ -82,7 +82,9 @@ def prediction(
     return PredictionFeedback(
         character_id=block.character_id,
         blocks=(times,),
-        behaviours=tuple([predicted(block[id], block.id, syncs) for id, syncs in (behaviours or {}).items()]),
+        behaviours=tuple(
+            [prediction_of(block[id], block.id, syncs) for id, syncs in (behaviours or {}).items()]
+        ),
     )
 
 

@@ -32,7 +32,7 @@ import numpy as np
 from plot import exponent
 from stopwatch import helped, noise
 
-from bml_schema import MOST_BEHAVIOURS, Block, parse
+from bml_schema import MAX_BEHAVIOURS, Block, parse
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.scheduling import Timing, schedule_block
@@ -253,7 +253,7 @@ def main() -> None:
     row("one added and tied to one of 50 blocks", added(chained=False), 5.0)
     row("one added to 50 that are tied in a chain", added(chained=True), None)
     print(f"\n{'growth (slope of log time over log n)':40}")
-    sizes = [n for n in (50, 200, 1000, 5000) if n <= MOST_BEHAVIOURS]
+    sizes = [n for n in (50, 200, 1000, 5000) if n <= MAX_BEHAVIOURS]
     for name, make_n in (
         ("groups", groups),
         ("cross-linked", linked),

@@ -22,7 +22,7 @@ from bml_schema import (
     Wait,
     parse,
     read,
-    timed,
+    with_absolute_times,
     write,
 )
 from realizer import schedule
@@ -68,11 +68,11 @@ def told(block: Block) -> dict[str, dict[str, float]]:
 @given(scheduled())
 def test_every_time_of_every_behaviour_is_said_to_the_last_bit(given_: tuple[Block, Times]) -> None:
     block, times = given_
-    result = timed(block, times)
+    result = with_absolute_times(block, times)
     back = parse(write(result))
     assert not back.problems
     assert back == result
-    assert timed(back, times) == back, "what says its times already stays as it is"
+    assert with_absolute_times(back, times) == back, "what says its times already stays as it is"
     assert [b.id for b in result.behaviours] == [b.id for b in block.behaviours if b.id in times]
     for id, at in times.items():
         assert {p: t for p, t in told(back)[id].items() if p in at and ":" not in p} == {
@@ -92,7 +92,7 @@ def test_a_block_with_its_times_reads_as_people_would_write_it() -> None:
         "s": {"start": 0.0, "m": 0.1 + 0.2, "end": 1.0},
         "h": {"start": 0.0, "stroke:1": 0.25, "stroke:2": 0.5, "stroke": 0.5, "end": 1.5},
     }
-    assert write(timed(block, times)) == (
+    assert write(with_absolute_times(block, times)) == (
         '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" xmlns:bmla="http://www.asap-project.org/bmla"'
         ' id="b" bmla:appendAfter="x">\n'
         '  <speech id="s" start="0" end="1">\n'
@@ -122,7 +122,7 @@ def test_a_mark_of_a_description_stands_in_a_constraint() -> None:
     speak = "<speak xmlns='http://www.w3.org/2001/10/synthesis'>a<mark name='m'/>b</speak>"
     inside = f"<description priority='1' type='application/ssml+xml'>{speak}</description>"
     block = parse(f"<bml id='b'><speech id='s'>{inside}</speech></bml>")
-    result = timed(block, {"s": {"start": 0.0, "m": 0.5, "end": 1.0}})
+    result = with_absolute_times(block, {"s": {"start": 0.0, "m": 0.5, "end": 1.0}})
     refs = (SyncRef(behaviour="s", sync="m"), SyncRef(offset=0.5))
     assert result.constraints == (Constraint(parts=(Synchronize(refs=refs),)),)
     assert not parse(write(result)).problems
@@ -131,7 +131,7 @@ def test_a_mark_of_a_description_stands_in_a_constraint() -> None:
 @pytest.mark.parametrize("time", [math.nan, math.inf, 86401.0, -1e9])
 def test_a_time_no_document_can_say_is_a_value_error(time: float) -> None:
     with pytest.raises(ValueError, match="w:end: wanted at most 86400 seconds, got"):
-        timed(Block(id="b", children=(Wait(id="w"),)), {"w": {"start": 0.0, "end": time}})
+        with_absolute_times(Block(id="b", children=(Wait(id="w"),)), {"w": {"start": 0.0, "end": time}})
 
 
 def test_a_constraint_that_the_times_break_was_dropped_and_is_not_said_again() -> None:
@@ -141,9 +141,16 @@ def test_a_constraint_that_the_times_break_was_dropped_and_is_not_said_again() -
         "<constraint id='l'><after ref='w:end'><sync ref='bml:start+2'/></after></constraint>"
         "<constraint id='m'><before ref='x:w:end'><sync ref='w:start'/></before></constraint></bml>"
     )
-    assert [c.id for c in timed(block, {"w": {"start": 0.0, "end": 1.0}}).constraints] == ["l", "m"]
-    assert [c.id for c in timed(block, {"w": {"start": 0.0, "end": 2.0}}).constraints] == ["k", "l", "m"]
-    assert [c.id for c in timed(block, {"w": {"start": 0.0, "end": 2.5}}).constraints] == ["m"]
+    assert [c.id for c in with_absolute_times(block, {"w": {"start": 0.0, "end": 1.0}}).constraints] == [
+        "l",
+        "m",
+    ]
+    assert [c.id for c in with_absolute_times(block, {"w": {"start": 0.0, "end": 2.0}}).constraints] == [
+        "k",
+        "l",
+        "m",
+    ]
+    assert [c.id for c in with_absolute_times(block, {"w": {"start": 0.0, "end": 2.5}}).constraints] == ["m"]
 
 
 CASES = sorted(p for folder in ("core", "constraints", "ext") for p in (CORPUS / folder).glob("*.xml"))
@@ -154,7 +161,7 @@ def test_scheduling_it_again_gives_the_same_times(case: Path) -> None:
     for block in read(case.read_bytes()):
         assert isinstance(block, Block)
         first = schedule(write(block), voice=SilentVoice())
-        text = write(timed(block, first.behaviours))
+        text = write(with_absolute_times(block, first.behaviours))
         again = schedule(text, voice=SilentVoice())
         assert again.behaviours == {id: pytest.approx(at, abs=1e-9) for id, at in first.behaviours.items()}, (
             text

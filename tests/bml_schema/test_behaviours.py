@@ -22,7 +22,7 @@ from bml_schema import (
     parse,
     write,
 )
-from bml_schema.node_schema import shape_of
+from bml_schema.node_schema import schema_of
 
 # What an element needs beyond its required attributes; children without namespace.
 LEAST = {
@@ -40,7 +40,7 @@ def sample(cls: type[Behaviour], *, leave_out: str = "", extra: str = "") -> str
     space, name = cls.tag[1:].split("}")
     values = {
         a.name: a.value.words[0] if a.value.words else SAMPLES.get(a.value.type, "X")
-        for a in shape_of(cls).required
+        for a in schema_of(cls).required
     }
     attributes = "".join(f" {k}='{v}'" for k, v in values.items() if k not in (leave_out, "id"))
     inside = LEAST.get(name, "")
@@ -66,7 +66,7 @@ def test_its_required_attributes_are_enough(cls: type[Behaviour]) -> None:
 
 @EACH
 def test_each_required_attribute_is_missed_when_it_is_not_there(cls: type[Behaviour]) -> None:
-    for spec in shape_of(cls).required:
+    for spec in schema_of(cls).required:
         if spec.name == "id":
             continue
         problems = parse(sample(cls, leave_out=spec.name)).problems
@@ -85,7 +85,7 @@ def test_each_of_its_sync_points_can_be_given_and_referred_to(cls: type[Behaviou
 
 @EACH
 def test_each_closed_set_refuses_another_word(cls: type[Behaviour]) -> None:
-    for spec in shape_of(cls).attributes.values():
+    for spec in schema_of(cls).attributes.values():
         if spec.value.words and not spec.required:
             problems = parse(sample(cls, extra=f"{spec.name}='SIDEWAYS'")).problems
             assert [p.text for p in problems] == [f'{spec.name}: wanted {spec.value.wanted}, got "SIDEWAYS"']
@@ -93,7 +93,7 @@ def test_each_closed_set_refuses_another_word(cls: type[Behaviour]) -> None:
 
 @EACH
 def test_each_number_refuses_what_is_none(cls: type[Behaviour]) -> None:
-    for spec in shape_of(cls).attributes.values():
+    for spec in schema_of(cls).attributes.values():
         if spec.value.low is not None and not spec.required:
             for bad in ("nan", "inf", "1e308", "x", "", "99999999999"):
                 extra = f"{spec.name}='{bad}'".replace(f"{{{BMLA}}}", "a:") + f" xmlns:a='{BMLA}'"
@@ -103,7 +103,7 @@ def test_each_number_refuses_what_is_none(cls: type[Behaviour]) -> None:
 @EACH
 def test_unknown_attributes_are_kept(cls: type[Behaviour]) -> None:
     block = parse(sample(cls, extra="xmlns:q='urn:q' q:a='1' unheardOf='2'"))
-    assert block["x"].foreign == {"{urn:q}a": "1", "unheardOf": "2"}
+    assert block["x"].unknown_attributes == {"{urn:q}a": "1", "unheardOf": "2"}
     assert parse(write(block)) == block
 
 
@@ -118,7 +118,7 @@ def test_the_parts_of_a_face_share_its_timing_and_need_no_id() -> None:
     face = block["f"]
     assert isinstance(face, Face)
     assert face.parts == (
-        FaceLexeme(id="", lexeme="SMILE", foreign={"end": "9"}),
+        FaceLexeme(id="", lexeme="SMILE", unknown_attributes={"end": "9"}),
         FaceFacs(id="", au=4, side="LEFT"),
     )
     assert not face.parts[0].syncs
@@ -205,7 +205,7 @@ def test_a_posture_has_one_stance_and_any_poses() -> None:
 def test_the_duration_of_a_wait_may_have_the_name_of_the_drafts() -> None:
     assert only("<wait id='w' max-wait='2'/>").children == (Wait(id="w", duration=2.0),)
     both = only("<wait id='w' max-wait='2' duration='1'/>").children
-    assert both == (Wait(id="w", duration=1.0, foreign={"max-wait": "2"}),)
+    assert both == (Wait(id="w", duration=1.0, unknown_attributes={"max-wait": "2"}),)
     assert only("<wait id='w' max-wait='x'/>").problems[0].text.startswith("max-wait: wanted seconds")
 
 

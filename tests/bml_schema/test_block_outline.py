@@ -5,14 +5,14 @@ from __future__ import annotations
 from lxml import etree
 
 from bml_schema import VOCABULARY, Head, Speech
-from bml_schema.block_outline import Outline, flat
-from bml_schema.element_reader import Elements
+from bml_schema.block_outline import BlockOutline, flat
+from bml_schema.element_reader import ElementReader
 from bml_schema.sync_refs import Names
 
 
-def outline(inside: str) -> tuple[Outline, list[object]]:
+def outline(inside: str) -> tuple[BlockOutline, list[object]]:
     names = Names("b")
-    found = Outline(Elements(VOCABULARY, names), names)
+    found = BlockOutline(ElementReader(VOCABULARY, names), names)
     root = etree.fromstring(f"<bml id='b'>{inside}</bml>")
     return found, list(found.entries(root, "/bml", required=False))
 

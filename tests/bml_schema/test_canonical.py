@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from lxml import etree
 
-from bml_schema.canonical import MOST_ATTRIBUTES, canonical
+from bml_schema.canonical import MAX_ATTRIBUTES, canonical
 from bml_schema.errors import Fault
 
 
@@ -34,6 +34,6 @@ def test_canonical_text_is_its_own_canonical_text(inner: str) -> None:
 
 
 def test_too_many_attributes_are_a_fault() -> None:
-    many = " ".join(f'a{i}="1"' for i in range(MOST_ATTRIBUTES + 1))
+    many = " ".join(f'a{i}="1"' for i in range(MAX_ATTRIBUTES + 1))
     with pytest.raises(Fault, match="wanted at most 100 attributes, got 101"):
         text_of(f"<x><a {many}/></x>")

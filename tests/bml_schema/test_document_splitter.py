@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import BMLError
-from bml_schema.document_splitter import stretches
+from bml_schema.document_splitter import document_spans
 
 
 def cut(text: str) -> list[str]:
     """Each stretch; what cannot be a document with "!" before it."""
-    return [("!" if s.fault else "") + text[s.start : s.end] for s in stretches(text)]
+    return [("!" if s.fault else "") + text[s.start : s.end] for s in document_spans(text)]
 
 
 @pytest.mark.parametrize(
@@ -37,24 +37,24 @@ def test_a_text_is_cut_where_its_documents_begin_and_end(text: str, wanted: list
 
 
 def test_a_stretch_knows_its_start_tag_or_why_it_is_none() -> None:
-    junk, document = stretches("oops<bml id='a'></bml>")
+    junk, document = document_spans("oops<bml id='a'></bml>")
     assert (junk.tag, junk.fault) == ("", 'wanted <bml>, got "oops"')
     assert (document.tag, document.fault) == ("<bml id='a'>", "")
 
 
 def test_only_a_part_of_a_text_may_be_cut() -> None:
     text = "<bml/><bml id='x'/><bml/>"
-    assert [(s.start, s.end) for s in stretches(text, 6, 19)] == [(6, 19)]
+    assert [(s.start, s.end) for s in document_spans(text, 6, 19)] == [(6, 19)]
 
 
 def test_more_marks_than_anybody_writes_are_an_error() -> None:
     with pytest.raises(BMLError, match="wanted at most 100000 tags"):
-        list(stretches("<!---->" * 100_001))
+        list(document_spans("<!---->" * 100_001))
 
 
 @given(st.lists(st.sampled_from(["<bml>", "</bml>", "<bml/>", "<!--", "-->", "<act>", "</act>", "x", " "])))
 def test_stretches_stand_in_order_and_do_not_overlap(words: list[str]) -> None:
     text = "".join(words)
-    ends = [0, *(end for s in stretches(text) for end in (s.start, s.end))]
+    ends = [0, *(end for s in document_spans(text) for end in (s.start, s.end))]
     assert ends == sorted(ends)
     assert not ends or ends[-1] <= len(text)

@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bml_schema import CORE, Block, BMLError, BMLSyntaxError, Place, Speech, SyncRef, Wait, parse, read, write
-from bml_schema.documents import MOST_BYTES, MOST_DOCUMENTS
+from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS
 from tests.strategies import blocks
 
 A, B, C = '<bml id="a"/>', '<bml id="b"></bml>', '<bml id="c">\n</bml>'
@@ -112,26 +112,26 @@ def test_deep_nesting_is_one_clear_error(tag: str, depth: int) -> None:
 def test_a_text_of_two_megabytes_is_refused() -> None:
     text = f'<bml id="b"><speech id="s"><text>{"x" * 2_000_000}</text></speech></bml>'
     with pytest.raises(
-        BMLError, match=f"wanted at most {MOST_BYTES} bytes in a document, got 20000"
+        BMLError, match=f"wanted at most {MAX_BYTES} bytes in a document, got 20000"
     ) as caught:
         parse(text)
     assert caught.value.block == "b"
-    assert isinstance(parse(text, most_bytes=1 << 22)["s"], Speech)
+    assert isinstance(parse(text, max_bytes=1 << 22)["s"], Speech)
 
 
 def test_the_limit_counts_bytes_and_counts_each_document() -> None:
     text = '<bml id="b"><speech id="s"><text>ééé</text></speech></bml>'
-    assert parse(text, most_bytes=len(text.encode()))
+    assert parse(text, max_bytes=len(text.encode()))
     with pytest.raises(BMLError, match="bytes"):
-        parse(text, most_bytes=len(text))
-    assert len(list(read(text * 5, most_bytes=len(text.encode())))) == 5
+        parse(text, max_bytes=len(text))
+    assert len(list(read(text * 5, max_bytes=len(text.encode())))) == 5
 
 
 def test_too_many_documents_in_one_text_are_not_read() -> None:
-    found = list(read(A * (MOST_DOCUMENTS + 5)))
-    assert len(found) == MOST_DOCUMENTS + 1
+    found = list(read(A * (MAX_DOCUMENTS + 5)))
+    assert len(found) == MAX_DOCUMENTS + 1
     assert "wanted at most 1000 documents in one text" in str(found[-1])
-    assert len(list(read(A * 3, most_documents=2))) == 3
+    assert len(list(read(A * 3, max_documents=2))) == 3
 
 
 HOSTILE = {
@@ -159,7 +159,7 @@ HOSTILE = {
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
 def test_hostile_texts_end_in_few_answers(text: str) -> None:
     # Each of them once took minutes or a flood of warnings: this test ends, or somebody notices.
-    assert 1 <= len(list(read(text))) <= MOST_DOCUMENTS + 1
+    assert 1 <= len(list(read(text))) <= MAX_DOCUMENTS + 1
 
 
 def test_bytes_are_decoded_by_mark_declaration_or_as_utf8() -> None:

@@ -18,7 +18,7 @@ from bml_schema import (
     without,
     write,
 )
-from bml_schema.dropped_references import Losses
+from bml_schema.dropped_references import ReferenceRemover
 from tests.strategies import blocks
 
 
@@ -35,7 +35,7 @@ def test_references_to_a_dropped_behaviour_vanish_and_are_listed() -> None:
     assert block["c"] == Wait(id="c")
     (problem,) = block.problems
     assert problem.id == "b:bad"
-    assert problem.lost == ("a:start", "c:end")
+    assert problem.lost_references == ("a:start", "c:end")
     assert problem.text.endswith("; with it went a:start, c:end")
     assert not problem.fatal
 
@@ -48,7 +48,7 @@ def test_a_sync_of_speech_loses_its_reference_and_stays() -> None:
     assert isinstance(speech, Speech)
     assert speech.text is not None
     assert speech.text.parts == ("a", Sync(id="m"), "b", Sync(id="n", ref=SyncRef(offset=1.0)))
-    assert block.problems[0].lost == ("s:m",)
+    assert block.problems[0].lost_references == ("s:m",)
 
 
 def test_a_constraint_that_names_a_dropped_behaviour_vanishes_whole() -> None:
@@ -59,7 +59,7 @@ def test_a_constraint_that_names_a_dropped_behaviour_vanishes_whole() -> None:
         "<constraint id='kept'><after ref='1'><sync ref='a:start'/></after></constraint>"
     )
     assert [c.id for c in block.constraints] == ["kept"]
-    assert [p.lost for p in block.problems] == [("c", "/bml/constraint[2]")]
+    assert [p.lost_references for p in block.problems] == [("c", "/bml/constraint[2]")]
 
 
 def test_a_required_constraint_that_cannot_hold_is_fatal() -> None:
@@ -71,13 +71,13 @@ def test_a_required_constraint_that_cannot_hold_is_fatal() -> None:
 def test_a_chain_of_dropped_behaviours_gives_each_its_own_problem_only() -> None:
     block = only("<wait id='a' start='nobody:end'/><wait id='c' start='a:end'/><wait id='d' start='c:end'/>")
     assert [p.id for p in block.problems] == ["b:a"]
-    assert block.problems[0].lost == ("c:start",)
+    assert block.problems[0].lost_references == ("c:start",)
     assert [x.id for x in block.behaviours] == ["c", "d"]
 
 
 def test_references_to_an_unsupported_element_vanish() -> None:
     block = only("<blink id='x'/><wait id='a' start='x:middle'/>")
-    assert [(p.id, p.type, p.lost) for p in block.problems] == [
+    assert [(p.id, p.type, p.lost_references) for p in block.problems] == [
         ("b:x", "BEHAVIOR_TYPE_NOT_SUPPORTED", ("a:start",))
     ]
 
@@ -85,17 +85,17 @@ def test_references_to_an_unsupported_element_vanish() -> None:
 def test_many_losses_are_counted_in_the_text_and_named_in_the_tuple() -> None:
     waits = "".join(f"<wait id='w{i}' start='bad:end'/>" for i in range(30))
     problem: Problem = only(BAD + waits).problems[0]
-    assert len(problem.lost) == 30
+    assert len(problem.lost_references) == 30
     assert problem.text.endswith("w9:start and 20 more")
 
 
 def test_a_node_that_names_nothing_dropped_is_itself() -> None:
-    losses = Losses({"gone"})
+    losses = ReferenceRemover({"gone"})
     node = Wait(id="a", syncs={"start": SyncRef(behaviour="here", sync="end")})
     other = Wait(id="a", syncs={"start": SyncRef(block="x", behaviour="gone", sync="end")})
     assert losses.without(node) is node
     assert losses.without(other) is other
-    assert not losses.lost
+    assert not losses.lost_references
 
 
 def test_without_gives_the_rest_of_a_block_and_what_went() -> None:

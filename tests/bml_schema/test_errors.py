@@ -7,7 +7,7 @@ import pickle
 import pytest
 
 from bml_schema import BMLError, BMLSyntaxError, Problem
-from bml_schema.errors import at, did_you_mean, shown
+from bml_schema.errors import at, did_you_mean, quoted
 
 
 def test_an_error_reads_like_line_path_wanted_got() -> None:
@@ -34,11 +34,11 @@ def test_a_problem_reads_like_an_error() -> None:
 
 @pytest.mark.parametrize(("value", "said"), [("7", "7"), ("-0.5", "-0.5"), ("left", '"left"'), ("", '""')])
 def test_numbers_are_shown_bare_and_words_quoted(value: str, said: str) -> None:
-    assert shown(value) == said
+    assert quoted(value) == said
 
 
 def test_a_long_value_is_cut() -> None:
-    assert len(shown("x" * 1000)) < 80
+    assert len(quoted("x" * 1000)) < 80
 
 
 def test_a_near_name_is_suggested() -> None:

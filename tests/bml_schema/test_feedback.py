@@ -29,7 +29,7 @@ from bml_schema import (
     WarningFeedback,
     parse,
     parse_feedback,
-    predicted,
+    prediction_of,
 )
 from bml_schema.values import decimal
 from tests.strategies import blocks, names, xml_text
@@ -44,7 +44,7 @@ who = st.none() | names
 def predictions(draw: st.DrawFn) -> PredictionFeedback:
     block = draw(blocks())
     behaviours = tuple(
-        predicted(
+        prediction_of(
             b,
             block.id,
             {p: draw(inside) for p in (*b.sync_points, *(b.marked if isinstance(b, Speech) else ()))},
@@ -166,7 +166,9 @@ SPEECH = """<bml id="b"><speech id="s" start="h:end"><text>Hi <sync id="m" ref="
 
 def test_a_predicted_behaviour_has_its_required_attributes_and_its_times() -> None:
     block = parse(SPEECH)
-    head = predicted(block["h"], "b", {"start": 0.0, "stroke:1": 0.25, "stroke": 0.5, "end": 1.0000000004})
+    head = prediction_of(
+        block["h"], "b", {"start": 0.0, "stroke:1": 0.25, "stroke": 0.5, "end": 1.0000000004}
+    )
     assert head.id == "b:h"
     assert head.syncs == {"start": SyncRef(), "stroke": SyncRef(offset=0.5), "end": SyncRef(offset=1.0)}
     text = PredictionFeedback(behaviours=(head,)).to_xml()
@@ -174,7 +176,7 @@ def test_a_predicted_behaviour_has_its_required_attributes_and_its_times() -> No
 
 
 def test_predicted_speech_tells_its_syncs_in_the_text() -> None:
-    speech = predicted(parse(SPEECH)["s"], "b", {"start": 0.0, "m": 2.0, "end": 3.0})
+    speech = prediction_of(parse(SPEECH)["s"], "b", {"start": 0.0, "m": 2.0, "end": 3.0})
     assert isinstance(speech, Speech)
     assert speech.text is not None
     assert speech.text.parts == ("Hi ", Sync(id="m", ref=SyncRef(offset=2.0)), " you")
@@ -184,8 +186,8 @@ def test_predicted_speech_tells_its_syncs_in_the_text() -> None:
 
 def test_what_is_predicted_tells_no_keys_and_nothing_of_others() -> None:
     keys = FaceInterpolator(parts="31", keys="0 1\n" * 1000)
-    node = FaceKeyframe(id="k", type="FAPS", interpolator=keys, others=('<a xmlns="urn:a"/>',))
-    told = predicted(node, "b", {"start": 0.0, "end": 1.0})
+    node = FaceKeyframe(id="k", type="FAPS", interpolator=keys, unknown_children=('<a xmlns="urn:a"/>',))
+    told = prediction_of(node, "b", {"start": 0.0, "end": 1.0})
     assert told == FaceKeyframe(id="b:k", type="FAPS", syncs={"start": SyncRef(), "end": SyncRef(offset=1.0)})
 
 
@@ -228,7 +230,7 @@ def test_what_is_no_feedback_is_an_error(text: str, said: str) -> None:
 
 def test_marks_that_only_a_description_names_are_predicted_behind_the_text() -> None:
     node = parse('<bml id="b"><speech id="s"><text>a <sync id="m"/> b</text></speech></bml>')["s"]
-    told = predicted(node, "b", {"start": 0.0, "m": 0.5, "x": 0.75, "end": 1.0})
+    told = prediction_of(node, "b", {"start": 0.0, "m": 0.5, "x": 0.75, "end": 1.0})
     text = text_of(told)
     assert text == 'a <sync id="m" ref="0.5"/> b<sync id="x" ref="0.75"/>'
     bare = parse(
@@ -236,7 +238,10 @@ def test_marks_that_only_a_description_names_are_predicted_behind_the_text() -> 
         '<speak xmlns="http://www.w3.org/2001/10/synthesis">a <mark name="x"/></speak>'
         "</description></speech></bml>"
     )["s"]
-    assert text_of(predicted(bare, "b", {"start": 0.0, "x": 0.75, "end": 1.0})) == '<sync id="x" ref="0.75"/>'
+    assert (
+        text_of(prediction_of(bare, "b", {"start": 0.0, "x": 0.75, "end": 1.0}))
+        == '<sync id="x" ref="0.75"/>'
+    )
 
 
 def text_of(node: Behaviour) -> str:

@@ -24,7 +24,7 @@ from bml_schema import (
     word,
     write,
 )
-from bml_schema.node_schema import camel, changed, local, shape_of
+from bml_schema.node_schema import camel, changed, local, schema_of
 
 OURS = "urn:bml-realizer:test"
 
@@ -150,7 +150,7 @@ def test_nodes_are_made_as_dataclasses_are() -> None:
 
 
 def test_the_shape_of_a_class_is_made_once() -> None:
-    assert shape_of(Block) is shape_of(Block)
+    assert schema_of(Block) is schema_of(Block)
     assert local("{urn:x}a") == local("a") == "a"
 
 

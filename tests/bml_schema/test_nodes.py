@@ -27,7 +27,7 @@ def test_behaviours_and_constraints_are_listed_in_document_order() -> None:
 
 def test_nodes_can_be_keys_of_a_dict() -> None:
     assert len({Wait(id="a"), Wait(id="a"), Wait(id="b")}) == 2
-    assert len({Block(id="a"), Block(id="a", foreign={})}) == 1
+    assert len({Block(id="a"), Block(id="a", unknown_attributes={})}) == 1
 
 
 @given(blocks())

@@ -173,7 +173,7 @@ def test_the_later_goes_even_when_the_first_is_bad() -> None:
     block = only("<wait id='a' duration='x'/><wait id='a'/><wait id='c' start='a:end'/>")
     assert block.behaviours == (Wait(id="c"),)
     assert [p.id for p in block.problems] == ["b:a", "b:a"]
-    assert [p.lost for p in block.problems] == [("c:start",), ()]
+    assert [p.lost_references for p in block.problems] == [("c:start",), ()]
 
 
 @pytest.mark.parametrize(
@@ -253,17 +253,21 @@ def test_places_tell_line_and_path() -> None:
 
 def test_attributes_nobody_knows_are_kept() -> None:
     block = only("", "id='b' xmlns:q='urn:q' q:a='1' odd='2' xml:lang='de'")
-    assert block.foreign == {"{urn:q}a": "1", "odd": "2", "{http://www.w3.org/XML/1998/namespace}lang": "de"}
+    assert block.unknown_attributes == {
+        "{urn:q}a": "1",
+        "odd": "2",
+        "{http://www.w3.org/XML/1998/namespace}lang": "de",
+    }
 
 
 def test_too_many_behaviours_are_refused() -> None:
     waits = "".join(f"<wait id='w{i}'/>" for i in range(11))
     text = f"<bml id='b'><required>{waits}</required></bml>"
-    assert len(parse(text, most_behaviours=11).behaviours) == 11
+    assert len(parse(text, max_behaviours=11).behaviours) == 11
     with pytest.raises(
         BMLError, match="wanted at most 10 behaviours and constraints in a block, got 11"
     ) as caught:
-        parse(text, most_behaviours=10)
+        parse(text, max_behaviours=10)
     assert caught.value.block == "b"
 
 

@@ -71,7 +71,7 @@ def test_bytes_are_read_as_the_parser_reads_them(encoding: str) -> None:
     assert under(source, source.locate("/bml", "id")) == "é"
 
 
-@given(blocks(foreign=False))
+@given(blocks(unknown_attributes=False))
 def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
     text = "<!-- one -->\n" + write(block)
     source = Source(text)
@@ -83,7 +83,7 @@ def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
         assert element is not None
         assert source.id(element) == node.id
         assert source.line_of(element.offset) == place.line
-    assert not source.slips
+    assert not source.errors
 
 
 @given(st.text("<>/='\" abml!-[]?&;:\n", max_size=200))
@@ -94,5 +94,5 @@ def test_any_text_is_taken_and_every_place_is_inside_it(text: str) -> None:
             assert 1 <= spot.line <= text.count("\n") + 1
             assert spot.column - 1 <= len(source.line(spot.line))
     for line in range(1, text.count("\n") + 2):
-        source.slip(line)
+        source.error_on_line(line)
         source.locate("/bml/a[1]", "a", line=line)

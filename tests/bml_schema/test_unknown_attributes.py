@@ -22,7 +22,7 @@ def test_a_slip_is_told_with_its_place_what_is_known_and_what_was_meant() -> Non
         'ready, strokeStart, stroke, strokeEnd, relax, end, did you mean "amount"?'
     )
     assert (problem.fatal, problem.dropped) == (False, False)
-    assert block["h"] == Head(id="h", lexeme="NOD", foreign={"amout": "1"})
+    assert block["h"] == Head(id="h", lexeme="NOD", unknown_attributes={"amout": "1"})
 
 
 def test_several_slips_of_one_element_are_one_warning() -> None:
@@ -45,7 +45,7 @@ def test_several_slips_of_one_element_are_one_warning() -> None:
 def test_what_other_languages_put_there_is_theirs(attribute: str) -> None:
     block = document(f"<head id='h' lexeme='NOD' {attribute}/>", attribute)
     assert block.problems == ()
-    assert len(block.foreign) == len(block["h"].foreign) == 1
+    assert len(block.unknown_attributes) == len(block["h"].unknown_attributes) == 1
 
 
 def test_a_name_with_the_prefix_of_bml_is_not_the_name_itself() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import flag, integer, number, one_of, seconds, string, word
-from bml_schema.values import block_name, block_names, decimal, name, names, unwanted
+from bml_schema.values import block_name, block_names, decimal, describe_mismatch, name, names
 from tests.strategies import attribute_values
 
 AMOUNT = number(0, 1)
@@ -62,7 +62,7 @@ def test_other_spellings_and_values_out_of_range_are_refused(text: str) -> None:
 @pytest.mark.parametrize("text", ["nan", "-inf", "1e308", "1.5E+3"])
 def test_the_message_for_an_exponent_says_what_is_wrong_with_it(text: str) -> None:
     assert (
-        unwanted("0..1", text, text)
+        describe_mismatch("0..1", text, text)
         == f"wanted 0..1 (a plain decimal number, no exponent, NaN or infinity), got {text}"
     )
 

@@ -51,9 +51,9 @@ def test_a_document_is_written_for_people_to_read() -> None:
 
 def test_foreign_namespaces_get_the_prefixes_people_know() -> None:
     known = "{http://www.asap-project.org/bmla}unheardOf"
-    text = write(Block(id="b", foreign={known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}))
+    text = write(Block(id="b", unknown_attributes={known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}))
     assert 'bmla:unheardOf="x" ns2:k="1" ns3:k="2"' in text
-    assert parse(text).foreign == {known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}
+    assert parse(text).unknown_attributes == {known: "x", "{urn:a}k": "1", "{urn:b}k": "2"}
 
 
 @pytest.mark.parametrize(
@@ -91,4 +91,4 @@ def test_a_description_cannot_break_out_of_its_element(content: str) -> None:
 )
 def test_what_is_others_stays_one_element_in_a_namespace(other: str) -> None:
     with pytest.raises(ValueError, match="wanted one well-formed element in a namespace of its own"):
-        write(Block(id="b", children=(Wait(id="w", others=(other,)),)))
+        write(Block(id="b", children=(Wait(id="w", unknown_children=(other,)),)))

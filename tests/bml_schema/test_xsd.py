@@ -34,7 +34,7 @@ from bml_schema import (
     parse,
     write,
 )
-from bml_schema.node_schema import Attribute, shape_of
+from bml_schema.node_schema import Attribute, schema_of
 from realizer.behaviours.registry import VOCABULARY
 from tests import schema
 from tests.strategies import blocks
@@ -150,7 +150,7 @@ def assert_agrees(spec: Attribute, declared: Element) -> None:
 
 def own_attributes(cls: type[Any]) -> dict[str, Attribute]:
     """The attributes of a class that are its element's own, not of another namespace."""
-    return {name: spec for name, spec in shape_of(cls).attributes.items() if not name.startswith("{")}
+    return {name: spec for name, spec in schema_of(cls).attributes.items() if not name.startswith("{")}
 
 
 def test_the_schema_of_our_namespace_is_current() -> None:
@@ -158,7 +158,7 @@ def test_the_schema_of_our_namespace_is_current() -> None:
 
 
 def test_bmlas_attributes_of_blocks_and_behaviours_are_declared_and_no_others() -> None:
-    specs = {**shape_of(Block).attributes, **shape_of(Behaviour).attributes}
+    specs = {**schema_of(Block).attributes, **schema_of(Behaviour).attributes}
     wanted = {name: spec for name, spec in specs.items() if name.startswith("{")}
     assert {f"{{{BMLA}}}{e.get('name')}" for e in SCHEMAS[BMLA] if e.tag == XS + "attribute"} == set(wanted)
     for name, spec in wanted.items():
@@ -180,7 +180,7 @@ def test_a_node_and_its_schema_have_the_same_attributes(cls: type[Any]) -> None:
 
 @EACH
 def test_a_node_and_its_schema_have_the_same_children(cls: type[Any]) -> None:
-    kinds = {c.tag.partition("}")[2] for kind in shape_of(cls).children for c in kind.classes}
+    kinds = {c.tag.partition("}")[2] for kind in schema_of(cls).children for c in kind.classes}
     declared = children(declaration_of(cls))
     if issubclass(cls, Behaviour):
         assert declared == kinds | {"description"}
@@ -205,7 +205,7 @@ def test_the_sync_of_speech_is_that_of_the_schema() -> None:
     sync = text.find(f"{XS}sequence/{XS}element")
     assert sync is not None
     declared = attributes(type_of(sync))
-    assert set(declared) == set(shape_of(Sync).attributes)
+    assert set(declared) == set(schema_of(Sync).attributes)
 
 
 @pytest.mark.parametrize(("part", "space"), [("faceLexeme", CORE), ("faceFacs", EXTENSIONS)])
@@ -227,7 +227,7 @@ def test_the_schema_declares_no_element_the_vocabulary_does_not_know() -> None:
     assert declared == known | others
 
 
-@given(blocks(foreign=False))
+@given(blocks(unknown_attributes=False))
 def test_what_is_written_is_valid(block: Block) -> None:
     text = write(block)
     assert SCHEMA.validate(etree.fromstring(text.encode())), (SCHEMA.error_log, text)

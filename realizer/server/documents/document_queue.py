@@ -55,7 +55,7 @@ class Inbox:
             return Warning(name_of(text), "PARSING_FAILURE", f"{words} {raises('max_blocks')}")
         if (beyond := too_large(text, limits)) is not None:
             return Warning(name_of(text), "PARSING_FAILURE", beyond)
-        found = read(text, VOCABULARY, most_bytes=limits.max_document, most_behaviours=limits.max_behaviours)
+        found = read(text, VOCABULARY, max_bytes=limits.max_document, max_behaviours=limits.max_behaviours)
         self._unread.append(found)
         self._came += 1
         return None

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 from bml_schema import CORE, EXTENSIONS, Block, Constraint, Required
-from bml_schema.node_schema import local, shape_of
+from bml_schema.node_schema import local, schema_of
 from realizer.behaviours.registry import VOCABULARY
 
 PREFIXES = {
@@ -17,7 +17,7 @@ PREFIXES = {
     "http://hmi.ewi.utwente.nl/bmlt": "bmlt",
     "urn:bml-realizer:1": "realizer",
 }
-# What `shape_of` does not tell: a constraint is read by the parser itself.
+# What `schema_of` does not tell: a constraint is read by the parser itself.
 RELATIONS = ("synchronize", "before", "after")
 
 
@@ -58,7 +58,7 @@ def _elements() -> list[dict[str, Any]]:
     classes: list[type[Any]] = [Block, Required, Constraint, *VOCABULARY.values()]
     found = {local(cls.tag): _element(cls, children) for cls in classes}
     for cls in classes:
-        for kind in shape_of(cls).children:
+        for kind in schema_of(cls).children:
             for inner in kind.classes:
                 found.setdefault(local(inner.tag), _element(inner, children))
     plain = {"namespace": CORE, "prefix": "", "syncs": []}
@@ -71,7 +71,7 @@ def _elements() -> list[dict[str, Any]]:
 
 
 def _element(cls: type[Any], children: dict[str, list[str]]) -> dict[str, Any]:
-    shape, name = shape_of(cls), local(cls.tag)
+    shape, name = schema_of(cls), local(cls.tag)
     namespace = cls.tag[1:].partition("}")[0]
     attributes = []
     for spec in shape.attributes.values():

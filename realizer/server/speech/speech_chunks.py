@@ -9,7 +9,7 @@ from functools import cache
 from xml.sax.saxutils import escape, quoteattr, unescape
 
 from bml_schema import Block, read
-from bml_schema.escape import legal
+from bml_schema.escape import sanitized
 from bml_schema.nodes import BMLA, BMLT, CORE, OWN
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import TAG
@@ -61,13 +61,13 @@ def text_block(text: str, piece: Piece) -> Block:
     its tags. A tag that breaks off at the end is left out.
     """
     work = _Text(piece)
-    work.read(legal(text))
+    work.read(sanitized(text))
     found = list(read(piece.document(work.inside()), VOCABULARY))
     block = found[0] if len(found) == 1 and isinstance(found[0], Block) else None
     if block is not None and (not work.spoken or any(node.id == piece.speech for node in block.behaviours)):
         return block
     plain = _Text(piece)
-    plain.say(TAG.sub(" ", legal(text)))
+    plain.say(TAG.sub(" ", sanitized(text)))
     (spoken,) = read(piece.document(plain.inside()), VOCABULARY)
     assert isinstance(spoken, Block)
     if block is None:
