@@ -60,7 +60,9 @@ def plan(documents: Documents, player: Player, voice: Voice | str | None = None)
 def play(documents: Documents, options: PlayOptions, voice: Voice | str | None = None) -> Realization:
     """Play documents from 0 s to the end of the last block, without a clock."""
     mapping = mapping_of(options.face, options.mapping)
-    player = Player(options, history=math.inf, takes=lambda _: takes(options.face, deformer=options.deformer))
+    player = Player(
+        options, history=math.inf, face_inputs=lambda _: takes(options.face, deformer=options.deformer)
+    )
     schedules, refused = plan(documents, player, voice)
     feedback = player.due(math.inf)
     characters = {}

@@ -18,8 +18,8 @@ from realizer.core.array_types import Float32, Float64, Int16
 from realizer.core.errors import RealizerError
 from realizer.core.options import PlayOptions
 from realizer.core.units import frame_count
-from realizer.playback.active_block import HUSH, Speaking
-from realizer.playback.audio_mix import heard
+from realizer.playback.active_block import SPEECH_FADE, ScheduledSpeech
+from realizer.playback.audio_mix import render_utterance
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Longest stretch of frames computed in one call: the cost of a call is flat up to here, its memory is not.
 WINDOW = 10.0  # s
 # More is a mistake (four hours at 25 fps) and would not fit into memory as JSON or film.
-MOST_FRAMES = 360_000
+MAX_FRAMES = 360_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Performance:
 
 
 @dataclass(frozen=True, eq=False)
-class Worn:
+class FaceChange:
     """A face from a frame on, and what its AUs ask of FAPs."""
 
     frame: int
@@ -61,13 +61,13 @@ class Realization:
         face_name: which face folder is drawn; the last one where it changes.
         deformer: "mpeg4" or "au", what moves that face; None is what it says itself.
         mapping: what its AUs ask of FAPs.
-        worn: the faces of the first character, in order, where it changes.
+        face_changes: the faces of the first character, in order, where it changes.
         characters: character id (None: unnamed) -> its frames, the first character first.
         schedules: one per accepted or failed block, in the order of submission.
-        told: BML feedback, in order.
+        feedback_events: BML feedback, in order.
         warnings: all of them, in order.
-        refused: documents and blocks that gave nothing to play.
-        speaking: what sounds when.
+        refusals: documents and blocks that gave nothing to play.
+        speeches: what sounds when.
     """
 
     fps: float
@@ -75,16 +75,16 @@ class Realization:
     face_name: str
     characters: Mapping[str | None, Performance]
     schedules: tuple[Schedule, ...]
-    told: tuple[Feedback, ...]
+    feedback_events: tuple[Feedback, ...]
     warnings: tuple[Warning, ...]
-    refused: tuple[str, ...] = ()
-    speaking: tuple[Speaking, ...] = field(default=())
+    refusals: tuple[str, ...] = ()
+    speeches: tuple[ScheduledSpeech, ...] = field(default=())
     deformer: str | None = None
     mapping: FapMapping = field(default_factory=standard)
-    worn: tuple[Worn, ...] = ()
+    face_changes: tuple[FaceChange, ...] = ()
 
     @property
-    def plays(self) -> bool:
+    def has_content(self) -> bool:
         """Some block was accepted: there is something to write."""
         return not all(schedule.failed for schedule in self.schedules)
 
@@ -106,12 +106,12 @@ class Realization:
     @cached_property
     def feedback(self) -> tuple[str, ...]:
         """BML feedback as XML text, in order."""
-        return tuple(f.to_xml() for f in self.told)
+        return tuple(f.to_xml() for f in self.feedback_events)
 
     @property
     def speech(self) -> tuple[tuple[float, Utterance], ...]:
         """(start in seconds, utterance) of everything said."""
-        return tuple((s.start, s.utterance) for s in self.speaking)
+        return tuple((s.start, s.utterance) for s in self.speeches)
 
     @cached_property
     def face(self) -> Face:
@@ -138,16 +138,21 @@ class Realization:
     @cached_property
     def faces(self) -> list[tuple[int, Realization]]:
         """What is to be drawn by one face after the other: (its first frame, those frames and no sound)."""
-        if len(self.worn) < 2:
+        if len(self.face_changes) < 2:
             return [(0, self)]
         name = next(iter(self.characters))
-        ends = [*(one.frame for one in self.worn[1:]), self.frames]
+        ends = [*(one.frame for one in self.face_changes[1:]), self.frames]
         found = []
-        for one, end in zip(self.worn, ends, strict=True):
+        for one, end in zip(self.face_changes, ends, strict=True):
             aus, faps = self.aus.part(one.frame, end), self.faps.values[one.frame : end]
             shown = Performance(aus, FAPFrames(aus.times, faps, self.faps.mask))
             part = replace(
-                self, face_name=one.face, mapping=one.mapping, characters={name: shown}, speaking=(), worn=()
+                self,
+                face_name=one.face,
+                mapping=one.mapping,
+                characters={name: shown},
+                speeches=(),
+                face_changes=(),
             )
             found.append((one.frame, part))
         return found
@@ -163,10 +168,10 @@ class Realization:
 
         times = self.aus.times
         weights = np.eye(1, len(lip_shapes())).repeat(len(times), axis=0)
-        for speaking in self.speaking:
+        for speaking in self.speeches:
             if speaking.character == character:
                 said = viseme_weights(speaking.utterance.phonemes, times - speaking.start)
-                left = np.clip(1 - (times - speaking.until) / HUSH, 0, 1)
+                left = np.clip(1 - (times - speaking.until) / SPEECH_FADE, 0, 1)
                 weights[:, 1:] = np.maximum(weights[:, 1:], said[:, 1:] * left[:, None])
         weights[:, 1:] /= np.maximum(weights[:, 1:].sum(axis=1, keepdims=True), 1.0)
         weights[:, 0] = np.maximum(1 - weights[:, 1:].sum(axis=1), 0.0)
@@ -175,11 +180,11 @@ class Realization:
     def sound(self, rate: int = 22050) -> Int16:
         """(round(duration x rate),) int16 mono: all that is said, mixed; silence where nobody speaks."""
         mix = np.zeros(round(self.duration * rate), np.float32)
-        for speaking in self.speaking:
+        for speaking in self.speeches:
             utterance = speaking.utterance
             if utterance.pcm is None or not len(utterance.pcm):
                 continue
-            pcm = heard(speaking, rate)
+            pcm = render_utterance(speaking, rate)
             first = round(speaking.start * rate)
             last = min(len(mix), first + len(pcm))
             mix[first:last] += pcm[: max(0, last - first)]
@@ -231,10 +236,10 @@ def realization_of(
         face_name=face_name(options.face),
         characters=characters,
         schedules=tuple(schedules),
-        told=tuple(feedback),
-        warnings=warned(feedback, schedules, refused),
-        refused=tuple(warning.text for warning in refused),
-        speaking=player.speech(),
+        feedback_events=tuple(feedback),
+        warnings=merge_warnings(feedback, schedules, refused),
+        refusals=tuple(warning.text for warning in refused),
+        speeches=player.speech(),
         deformer=options.deformer,
         mapping=mapping,
     )
@@ -246,31 +251,31 @@ def frame_times(duration: float, fps: float) -> list[Float64]:
     Raises:
         RealizerError: there are too many.
     """
-    times = np.arange(counted(duration, fps)) / fps
+    times = np.arange(frames_until(duration, fps)) / fps
     step = max(1, int(WINDOW * fps))
     return [times[i : i + step] for i in range(0, len(times), step)]
 
 
-def counted(duration: float, fps: float) -> int:
+def frames_until(duration: float, fps: float) -> int:
     """The number of frames in 0..duration.
 
     Raises:
         RealizerError: there are too many.
     """
-    if (count := frame_count(duration, fps)) > MOST_FRAMES:
+    if (count := frame_count(duration, fps)) > MAX_FRAMES:
         raise RealizerError(
-            f"wanted at most {MOST_FRAMES} frames, got {count} of {duration:g} s at {fps:g} fps: "
+            f"wanted at most {MAX_FRAMES} frames, got {count} of {duration:g} s at {fps:g} fps: "
             "play less of it, or at a lower rate"
         )
     return count
 
 
-def warned(
-    told: Sequence[Feedback], schedules: Sequence[Schedule], refused: Sequence[Warning] = ()
+def merge_warnings(
+    feedback_events: Sequence[Feedback], schedules: Sequence[Schedule], refusals: Sequence[Warning] = ()
 ) -> tuple[Warning, ...]:
     """The warnings among all feedback, as planning gave them where it did: that says more."""
-    planned = {(w.id, w.type, w.text): w for w in (*refused, *(w for s in schedules for w in s.warnings))}
-    known = ((f.id, f.type, f.text) for f in told if isinstance(f, WarningFeedback))
+    planned = {(w.id, w.type, w.text): w for w in (*refusals, *(w for s in schedules for w in s.warnings))}
+    known = ((f.id, f.type, f.text) for f in feedback_events if isinstance(f, WarningFeedback))
     return tuple(planned.get(key) or Warning(*key) for key in known)
 
 

@@ -16,7 +16,7 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import to_fap
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
-from realizer.playback.active_block import Speaking
+from realizer.playback.active_block import ScheduledSpeech
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import synthesize
@@ -58,7 +58,7 @@ class Played:
     feedback: list[Feedback] = field(default_factory=list)
     faces: dict[Instant, dict[str, float]] = field(default_factory=dict)
     film: dict[Instant, dict[str, float]] = field(default_factory=dict)
-    speaking: tuple[Speaking, ...] = ()
+    speaking: tuple[ScheduledSpeech, ...] = ()
 
     @cached_property
     def log(self) -> list[Told]:
@@ -140,7 +140,9 @@ def play(
                 player.announce(item, time)
             case Step.PLAN, Block():
                 played.blocks.append(item)
-                played.schedules[item.id] = player.submit(item, time, synthesize(player.wants(item), voice))
+                played.schedules[item.id] = player.submit(
+                    item, time, synthesize(player.speech_requests(item), voice)
+                )
             case Step.SEND, BMLError():
                 player.refuse(parse_warning(item), time)
     hear(player, played, now, math.inf, punctual)

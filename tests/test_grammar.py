@@ -117,7 +117,7 @@ def can_be_asked_for(block: Block, schedule: Schedule) -> bool:
 
     A voice that speaks a text faster shortens some of its parts more than `STRETCH` lets a document ask.
     """
-    for id, say in Player(PlayOptions(idle=False)).wants(block).items():
+    for id, say in Player(PlayOptions(idle=False)).speech_requests(block).items():
         if id not in schedule.times:
             continue
         spoken = SilentVoice().say(say)

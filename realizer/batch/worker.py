@@ -94,7 +94,7 @@ class Worker:
         """Never raises for what is wrong with the document, or while it is played: then the row says so."""
         try:
             realization = play([task.text], self.options, self._speaker)
-            suffixes = self.options.formats if realization.plays else ()
+            suffixes = self.options.formats if realization.has_content else ()
             files = {
                 f"{task.name}{suffix}": OUTPUTS[suffix].encode(realization, self._drawing(suffix))
                 for suffix in suffixes
@@ -105,7 +105,7 @@ class Worker:
         row = {
             "document": task.name,
             "key": task.key,
-            "status": "refused" if realization.refused or not realization.plays else "done",
+            "status": "refused" if realization.refusals or not realization.has_content else "done",
             "duration": round(realization.duration, 6),
             "frames": realization.frames,
             "dropped": [id for schedule in realization.schedules for id in schedule.dropped],

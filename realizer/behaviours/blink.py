@@ -5,19 +5,19 @@ from __future__ import annotations
 from bml_schema import Blink
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 
-def timing(node: Blink, world: World) -> Timing:
-    return preferred("blink")
+def timing(node: Blink, context: PlanningContext) -> Timing:
+    return timing_from_table("blink")
 
 
-def expand(node: Blink, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Blink, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Shut from attackPeak to relax, by AU45."""
-    return pose_channels.shown(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
+    return pose_channels.hold(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
 
 
-KINDS = (Kind(Blink, timing, expand, parameters={"amount": "amount"}),)
+KINDS = (BehaviourKind(Blink, timing, expand, parameters={"amount": "amount"}),)

@@ -5,27 +5,27 @@ from __future__ import annotations
 from bml_schema import Activate, Interrupt, ParameterValueChange
 from realizer.animation.channel import Channel
 from realizer.behaviours import kind
-from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 
-def timing_of_interrupt(node: Interrupt, world: World) -> Timing:
-    return preferred("interrupt")
+def timing_of_interrupt(node: Interrupt, context: PlanningContext) -> Timing:
+    return timing_from_table("interrupt")
 
 
-def timing_of_activate(node: Activate, world: World) -> Timing:
-    return preferred("activate")
+def timing_of_activate(node: Activate, context: PlanningContext) -> Timing:
+    return timing_from_table("activate")
 
 
-def timing_of_change(node: ParameterValueChange, world: World) -> Timing:
+def timing_of_change(node: ParameterValueChange, context: PlanningContext) -> Timing:
     """At once, or as long as its start and end say."""
-    return preferred("parametervaluechange")
+    return timing_from_table("parametervaluechange")
 
 
 def nothing(
-    node: Interrupt | Activate | ParameterValueChange, times: Float64, world: World
+    node: Interrupt | Activate | ParameterValueChange, times: Float64, context: PlanningContext
 ) -> tuple[Channel, ...]:
     return ()
 
@@ -56,7 +56,7 @@ def change(node: ParameterValueChange) -> kind.Change:
 
 
 KINDS = (
-    Kind(Interrupt, timing_of_interrupt, nothing, act=interrupt),
-    Kind(Activate, timing_of_activate, nothing, act=activate),
-    Kind(ParameterValueChange, timing_of_change, nothing, act=change),
+    BehaviourKind(Interrupt, timing_of_interrupt, nothing, command=interrupt),
+    BehaviourKind(Activate, timing_of_activate, nothing, command=activate),
+    BehaviourKind(ParameterValueChange, timing_of_change, nothing, command=change),
 )

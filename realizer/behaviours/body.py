@@ -6,20 +6,20 @@ from typing import Any
 
 from bml_schema import Gesture, Locomotion, Pointing, Posture, PostureShift
 from realizer.animation.channel import Channel
-from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 
-def _kind(node_class: type[Any], element: str) -> Kind:
-    def timing(node: Any, world: World) -> Timing:
-        return preferred(element)
+def _kind(node_class: type[Any], element: str) -> BehaviourKind:
+    def timing(node: Any, context: PlanningContext) -> Timing:
+        return timing_from_table(element)
 
-    return Kind(node_class, timing, nothing)
+    return BehaviourKind(node_class, timing, nothing)
 
 
-def nothing(node: Any, times: Float64, world: World) -> tuple[Channel, ...]:
+def nothing(node: Any, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """A face shows nothing of it."""
     return ()
 

@@ -14,8 +14,8 @@ from bml_schema import Emotion, Mood
 from realizer.animation.axis import Target, fap
 from realizer.animation.channel import Channel
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.emotions.wheel import affect, place_of_affect, shares, strength_at, wheel
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
@@ -29,7 +29,7 @@ OWN, PUBLISHED = (None, "default", "own"), ("published", "raw")
 PARAMETERS = {"intensity": "intensity", "amount": "intensity"}
 
 
-class Feeling(NamedTuple):
+class EmotionRequest(NamedTuple):
     """What an element asks for: a word of one of the sets, in lower case, or a place."""
 
     name: str | None
@@ -40,25 +40,25 @@ class Feeling(NamedTuple):
     arousal: float | None
 
     @classmethod
-    def of(cls, node: Emotion | Mood) -> Feeling:
+    def of(cls, node: Emotion | Mood) -> EmotionRequest:
         shown = node.profile if node.profile is not None and node.profile in PUBLISHED else "own"
         name = None if node.name is None else " ".join(node.name.split()).lower()
         return cls(name, shown, node.angle, node.activation, node.valence, node.arousal)
 
 
-def timing(node: Emotion, world: World) -> Timing:
+def timing(node: Emotion, context: PlanningContext) -> Timing:
     """As its archetype's face lexeme; between two, as much of each as shows."""
-    return _timing(Feeling.of(node))
+    return _timing(EmotionRequest.of(node))
 
 
 @lru_cache(maxsize=1000)
-def _timing(feeling: Feeling) -> Timing:
+def _timing(feeling: EmotionRequest) -> Timing:
     parts = [
-        (share, preferred("faceLexeme", emotion_faces()[name].lexeme))
+        (share, timing_from_table("faceLexeme", emotion_faces()[name].lexeme))
         for name, share in _mix(feeling)[0].items()
     ]
     if not parts:
-        return preferred("faceLexeme")
+        return timing_from_table("faceLexeme")
     wanted = {
         name: sum(share * getattr(part, name) for share, part in parts)
         for name in ("preferred", "least", "stiffness")
@@ -66,29 +66,29 @@ def _timing(feeling: Feeling) -> Timing:
     return replace(parts[0][1], **wanted)
 
 
-def timing_of_mood(node: Mood, world: World) -> Timing:
-    return preferred("mood")
+def timing_of_mood(node: Mood, context: PlanningContext) -> Timing:
+    return timing_from_table("mood")
 
 
-def expand(node: Emotion, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Emotion, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """There at attackPeak, held to relax, gone at end."""
-    return pose_channels.shown(values_of(node), times, node.id)
+    return pose_channels.hold(values_of(node), times, node.id)
 
 
-def expand_mood(node: Mood, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_mood(node: Mood, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """From start to end the new base face rises, and stays; the neutral one has no channels."""
-    return pose_channels.kept(values_of(node), times, node.id)
+    return pose_channels.keep_base(values_of(node), times, node.id)
 
 
-def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
+def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
     """An unknown word, and one without a face, are fatal, an unknown profile is not."""
     if node.name is not None:
         try:
-            _has_profile(Feeling.of(node))
+            _has_profile(EmotionRequest.of(node))
         except UnknownWordError as wrong:
             if node.name[-1:].isdecimal():
                 return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)
-            return (pose_channels.unknown("name", node.name, known_words()),)
+            return (pose_channels.unknown_word("name", node.name, known_words()),)
         except ValueError as wrong:
             return (Fault("CANNOT_CREATE_BEHAVIOR", f"name: {wrong}"),)
     if node.profile not in (*OWN, *PUBLISHED):
@@ -99,7 +99,7 @@ def check(node: Emotion | Mood, world: World) -> tuple[Fault, ...]:
 
 
 @lru_cache(maxsize=1000)
-def _has_profile(feeling: Feeling) -> bool:
+def _has_profile(feeling: EmotionRequest) -> bool:
     """True.
 
     Raises:
@@ -109,7 +109,7 @@ def _has_profile(feeling: Feeling) -> bool:
     return True
 
 
-def claims_of_mood(node: Mood, world: World) -> frozenset[str]:
+def claims_of_mood(node: Mood, context: PlanningContext) -> frozenset[str]:
     """A face has one resting state."""
     return frozenset({"base face"})
 
@@ -129,11 +129,11 @@ def values_of(node: Emotion | Mood) -> dict[Target, float]:
             found = profile_of(node.name or "", node.profile)
         frame = found.frame() if node.seed is None else found.draw(node.seed)
         return {fap(number): node.intensity * float(frame[number - 1]) for number in found.ranges}
-    aus = _aus(Feeling.of(node))
-    return pose_channels.columns(aus if node.seed is None else _drawn(aus, node.seed), node.intensity)
+    aus = _aus(EmotionRequest.of(node))
+    return pose_channels.columns(aus if node.seed is None else _varied(aus, node.seed), node.intensity)
 
 
-def _drawn(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:
+def _varied(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, str], float]:
     """Each action unit a little more or less, as far as our own profiles are wide; both sides alike."""
     numbers = sorted({number for number, _ in aus})
     spread = emotion_model().spread
@@ -144,7 +144,7 @@ def _drawn(aus: Mapping[tuple[int, str], float], seed: int) -> dict[tuple[int, s
 
 
 @lru_cache(maxsize=1000)
-def _aus(feeling: Feeling) -> Mapping[tuple[int, str], float]:
+def _aus(feeling: EmotionRequest) -> Mapping[tuple[int, str], float]:
     """(AU, side) -> 0..1 at intensity 1, of what is no published profile."""
     parts, strength = _mix(feeling)
     aus: dict[tuple[int, str], float] = {}
@@ -154,7 +154,7 @@ def _aus(feeling: Feeling) -> Mapping[tuple[int, str], float]:
     return MappingProxyType(aus)
 
 
-def _mix(feeling: Feeling) -> tuple[Mapping[str, float], float]:
+def _mix(feeling: EmotionRequest) -> tuple[Mapping[str, float], float]:
     """{archetype: its share}, and how strongly they show: 1 as drawn; ({}, 0) for the neutral face.
 
     A place is as strong as its activation beside the rim's, or as it is far from the middle of valence and
@@ -173,8 +173,8 @@ def _mix(feeling: Feeling) -> tuple[Mapping[str, float], float]:
 
 
 KINDS = (
-    Kind(Emotion, timing, expand, check, parameters=PARAMETERS),
-    Kind(
+    BehaviourKind(Emotion, timing, expand, check, parameters=PARAMETERS),
+    BehaviourKind(
         Mood,
         timing_of_mood,
         expand_mood,

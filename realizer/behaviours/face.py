@@ -12,8 +12,8 @@ from realizer import tables
 from realizer.animation.axis import Target, au
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.table_timing import from_gaps, preferred
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.table_timing import from_gaps, timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
@@ -25,32 +25,34 @@ POINTS = ("start", "attackPeak", "relax", "end")
 SETTLE = 0.25
 
 
-def timing_of_lexeme(node: FaceLexeme, world: World) -> Timing:
-    return from_gaps(POINTS, world.library[node.lexeme].gaps)
+def timing_of_lexeme(node: FaceLexeme, context: PlanningContext) -> Timing:
+    return from_gaps(POINTS, context.library[node.lexeme].gaps)
 
 
-def timing_of_facs(node: FaceFacs, world: World) -> Timing:
-    return preferred("faceFacs")
+def timing_of_facs(node: FaceFacs, context: PlanningContext) -> Timing:
+    return timing_from_table("faceFacs")
 
 
-def timing_of_face(node: Face, world: World) -> Timing:
-    return preferred("face")
+def timing_of_face(node: Face, context: PlanningContext) -> Timing:
+    return timing_from_table("face")
 
 
-def timing_of_shift(node: FaceShift, world: World) -> Timing:
-    return preferred("faceShift")
+def timing_of_shift(node: FaceShift, context: PlanningContext) -> Timing:
+    return timing_from_table("faceShift")
 
 
-def expand_part(node: Part, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """0 at start, (1 + overshoot) amount at attackPeak, settling to amount, held to relax, 0 at end."""
-    return _rise_and_fall({t: {node.overshoot: v} for t, v in _targets(node, world).items()}, times, node.id)
+    return _rise_and_fall(
+        {t: {node.overshoot: v} for t, v in _targets(node, context).items()}, times, node.id
+    )
 
 
-def expand_face(node: Face, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_face(node: Face, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Its parts at one time; where several move one AU the stronger one shows."""
     asked: dict[Target, dict[float, float]] = {}
     for part in node.parts:
-        for target, value in _targets(part, world).items():
+        for target, value in _targets(part, context).items():
             # (1 + o)(1 + p) - 1: the compound's overshoot is laid over its parts'.
             overshoot = (1 + node.overshoot) * (1 + part.overshoot) - 1
             curve = asked.setdefault(target, {})
@@ -58,11 +60,11 @@ def expand_face(node: Face, times: Float64, world: World) -> tuple[Channel, ...]
     return _rise_and_fall(asked, times, node.id)
 
 
-def expand_shift(node: FaceShift, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """From start to end the new base face rises, and stays."""
     values: dict[Target, float] = {}
     for part in node.parts:
-        for target, value in _targets(part, world).items():
+        for target, value in _targets(part, context).items():
             values[target] = max(values.get(target, 0.0), value * node.amount)
     return tuple(
         Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=node.id)
@@ -70,13 +72,13 @@ def expand_shift(node: FaceShift, times: Float64, world: World) -> tuple[Channel
     )
 
 
-def check_part(node: Part, world: World) -> tuple[Fault, ...]:
+def check_part(node: Part, context: PlanningContext) -> tuple[Fault, ...]:
     """An unknown lexeme or AU is fatal; a side of an AU that has none is not."""
-    return _faults((node,), world)
+    return _faults((node,), context)
 
 
-def check_compound(node: Compound, world: World) -> tuple[Fault, ...]:
-    return _faults(node.parts, world)
+def check_compound(node: Compound, context: PlanningContext) -> tuple[Fault, ...]:
+    return _faults(node.parts, context)
 
 
 def _rise_and_fall(
@@ -98,20 +100,20 @@ def _rise_and_fall(
     return tuple(channels)
 
 
-def _targets(node: Part, world: World) -> dict[Target, float]:
+def _targets(node: Part, context: PlanningContext) -> dict[Target, float]:
     """Column -> value at the sustained part."""
     if isinstance(node, FaceFacs):
         return dict.fromkeys(au(node.au, node.side), node.amount)
-    return pose_channels.columns(world.library[node.lexeme].aus, node.amount)
+    return pose_channels.columns(context.library[node.lexeme].aus, node.amount)
 
 
-def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
+def _faults(parts: Iterable[Part], context: PlanningContext) -> tuple[Fault, ...]:
     faults = []
     known = tables.by_number()
     for part in parts:
         if isinstance(part, FaceLexeme):
-            if part.lexeme not in world.library:
-                faults.append(pose_channels.unknown("lexeme", part.lexeme, world.library))
+            if part.lexeme not in context.library:
+                faults.append(pose_channels.unknown_word("lexeme", part.lexeme, context.library))
         elif part.au not in known:
             said = f"au: wanted a FACS action unit, got {part.au}; near: {tables.nearest(part.au)}"
             faults.append(Fault("CANNOT_CREATE_BEHAVIOR", said))
@@ -127,15 +129,17 @@ def _faults(parts: Iterable[Part], world: World) -> tuple[Fault, ...]:
     return tuple(faults)
 
 
-def claims_of_shift(node: FaceShift, world: World) -> frozenset[str]:
+def claims_of_shift(node: FaceShift, context: PlanningContext) -> frozenset[str]:
     """A face has one resting state."""
     return frozenset({"base face"})
 
 
 AMOUNT = {"amount": "amount"}
 KINDS = (
-    Kind(FaceLexeme, timing_of_lexeme, expand_part, check_part, parameters=AMOUNT),
-    Kind(FaceFacs, timing_of_facs, expand_part, check_part, parameters=AMOUNT),
-    Kind(Face, timing_of_face, expand_face, check_compound, parameters=AMOUNT),
-    Kind(FaceShift, timing_of_shift, expand_shift, check_compound, claims=claims_of_shift, region="face"),
+    BehaviourKind(FaceLexeme, timing_of_lexeme, expand_part, check_part, parameters=AMOUNT),
+    BehaviourKind(FaceFacs, timing_of_facs, expand_part, check_part, parameters=AMOUNT),
+    BehaviourKind(Face, timing_of_face, expand_face, check_compound, parameters=AMOUNT),
+    BehaviourKind(
+        FaceShift, timing_of_shift, expand_shift, check_compound, claims=claims_of_shift, region="face"
+    ),
 )

@@ -11,23 +11,23 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.behaviours import media
-from realizer.behaviours.fap_visemes import shown
+from realizer.behaviours.fap_visemes import expand_compound
 from realizer.behaviours.key_channels import track
-from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 # 1/s^2; a recording bends less than an expression with which it is tied, and more than what is said.
 RECORDED = 100.0
-MOST_BYTES = 8 * 2**20  # of text; about ten minutes, read in about a second
+MAX_BYTES = 8 * 2**20  # of text; about ten minutes, read in about a second
 
 
-def timing(node: Faps, world: World) -> Timing:
-    return preferred("faps")
+def timing(node: Faps, context: PlanningContext) -> Timing:
+    return timing_from_table("faps")
 
 
-def expand(node: Faps, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Faps, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """There at attackPeak, held to relax, gone at end; they replace what else moves these FAPs."""
     there = np.array([0.0, 1.0, 1.0, 0.0])
     return tuple(
@@ -36,7 +36,7 @@ def expand(node: Faps, times: Float64, world: World) -> tuple[Channel, ...]:
     )
 
 
-def check(node: Faps, world: World) -> tuple[Fault, ...]:
+def check(node: Faps, context: PlanningContext) -> tuple[Fault, ...]:
     """A number that comes twice is fatal, a value that goes too far is not."""
     rows = tables.faps()
     seen: set[int] = set()
@@ -51,20 +51,20 @@ def check(node: Faps, world: World) -> tuple[Fault, ...]:
     return tuple(faults)
 
 
-def claims(node: Faps, world: World) -> frozenset[str]:
+def claims(node: Faps, context: PlanningContext) -> frozenset[str]:
     return frozenset(f"FAP {part.number}" for part in node.values)
 
 
-def timing_of_file(node: FapFile, world: World) -> Timing:
+def timing_of_file(node: FapFile, context: PlanningContext) -> Timing:
     """As long as its frames last, from the first to the last; it stretches."""
-    clip = media.load(node.file_name, world, read)
+    clip = media.load(node.file_name, context, read)
     length = (len(clip.values) - 1) / clip.fps
     return Timing(("start", "end"), np.array([length]), np.zeros(1), np.array([RECORDED]))
 
 
-def expand_file(node: FapFile, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_file(node: FapFile, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Its frames from start to end, in place of what else moves these FAPs; they come and go smoothly."""
-    clip = media.load(node.file_name, world, read)
+    clip = media.load(node.file_name, context, read)
     keys = np.linspace(times[0], times[-1], len(clip.values))
     return tuple(
         track(fap(number), keys, clip.values[:, number - 1].astype(np.float64), node.id)
@@ -72,11 +72,11 @@ def expand_file(node: FapFile, times: Float64, world: World) -> tuple[Channel, .
     )
 
 
-def check_file(node: FapFile, world: World) -> tuple[Fault, ...]:
+def check_file(node: FapFile, context: PlanningContext) -> tuple[Fault, ...]:
     """A file that cannot be read is fatal; what of FAP 1 and 2 has no face, and values too far, are not."""
-    if faults := media.faults(node.file_name, world, read):
+    if faults := media.faults(node.file_name, context, read):
         return faults
-    clip = media.load(node.file_name, world, read)
+    clip = media.load(node.file_name, context, read)
     words = [note for note in clip.notes if note.startswith(("FAP 1:", "FAP 2:"))]
     far = [number for number in moved(clip) if out_of_range(number, *_extremes(clip, number))]
     if far:
@@ -85,8 +85,8 @@ def check_file(node: FapFile, world: World) -> tuple[Fault, ...]:
     return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),) if words else ()
 
 
-def claims_of_file(node: FapFile, world: World) -> frozenset[str]:
-    return frozenset(f"FAP {number}" for number in moved(media.load(node.file_name, world, read)))
+def claims_of_file(node: FapFile, context: PlanningContext) -> frozenset[str]:
+    return frozenset(f"FAP {number}" for number in moved(media.load(node.file_name, context, read)))
 
 
 def read(content: bytes) -> FAPClip:
@@ -96,11 +96,11 @@ def read(content: bytes) -> FAPClip:
         MediaError: fewer than two frames, or too much text.
         RealizerError: no FAP text.
     """
-    if len(content) > MOST_BYTES:
+    if len(content) > MAX_BYTES:
         raise media.MediaError(
-            f"wanted at most {MOST_BYTES // 2**20} MiB of FAP text, got {len(content)} bytes"
+            f"wanted at most {MAX_BYTES // 2**20} MiB of FAP text, got {len(content)} bytes"
         )
-    clip = shown(read_fap(content))
+    clip = expand_compound(read_fap(content))
     if len(clip.values) < 2:
         raise media.MediaError(f"wanted at least two frames, got {len(clip.values)}")
     return clip
@@ -127,6 +127,8 @@ def _extremes(clip: FAPClip, number: int) -> tuple[float, float]:
 
 
 KINDS = (
-    Kind(Faps, timing, expand, check, claims=claims, parameters={"amount": 1.0}),
-    Kind(FapFile, timing_of_file, expand_file, check_file, claims=claims_of_file, parameters={"amount": 1.0}),
+    BehaviourKind(Faps, timing, expand, check, claims=claims, parameters={"amount": 1.0}),
+    BehaviourKind(
+        FapFile, timing_of_file, expand_file, check_file, claims=claims_of_file, parameters={"amount": 1.0}
+    ),
 )

@@ -31,7 +31,7 @@ def fap_expressions() -> tuple[FapExpression, ...]:
     return tables.read_csv(tables.text_of("fap_expressions.csv"), FapExpression, "fap_expressions.csv")
 
 
-def shown(clip: FAPClip) -> FAPClip:
+def expand_compound(clip: FAPClip) -> FAPClip:
     """The clip as faces of FAPs 3 to 68 play it; one without FAP 1 and 2 as it is.
 
     - Visemes and expressions are mixed as ISO/IEC 14496-2 says: viseme_select1 x blend / 63 +

@@ -11,9 +11,9 @@ from bml_schema import Gaze, GazeShift
 from realizer import tables
 from realizer.animation.axis import au, presence
 from realizer.animation.channel import Channel, Layer
-from realizer.behaviours.gaze_targets import Turn, angles, facts, limits, target_faults, turn, within
-from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.gaze_targets import Turn, angles, facts, limited, limits, target_faults, turn
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
@@ -37,7 +37,7 @@ EYES_TAKEN = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
 HEAD_TAKEN = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 
 
-class Aim(NamedTuple):
+class GazeAngles(NamedTuple):
     """Where a gaze ends.
 
     Attributes:
@@ -55,11 +55,11 @@ class Aim(NamedTuple):
     inward: float
 
 
-def aim(node: Gaze | GazeShift, world: World) -> Aim:
+def split_angle(node: Gaze | GazeShift, context: PlanningContext) -> GazeAngles:
     """How eyes and head share the angle: the head its part by influence, but little of a small angle; the
     eyes the rest as far as they turn, and the head again what is left.
     """
-    yaw, pitch, inward = angles(node.target, world)
+    yaw, pitch, inward = angles(node.target, context)
     left, up = DIRECTIONS[node.offset_direction]
     # Behind is behind on the nearer side.
     yaw = (yaw + node.offset_angle * left + 180.0) % 360.0 - 180.0
@@ -69,12 +69,12 @@ def aim(node: Gaze | GazeShift, world: World) -> Aim:
     eyes_most, head_most = limits("eyes"), limits("head") if part > 0 else REST
     size = math.hypot(yaw, pitch)
     asked = _of_head(yaw, part, size, eyes_most[0]), _of_head(pitch, part, size, eyes_most[1])
-    head = within(asked, head_most)
-    return Aim(
-        eyes=within((yaw - head[0], pitch - head[1]), eyes_most),
+    head = limited(asked, head_most)
+    return GazeAngles(
+        eyes=limited((yaw - head[0], pitch - head[1]), eyes_most),
         head=head,
-        first=within((yaw, pitch), eyes_most),
-        away=within((-head[0], -head[1]), eyes_most),
+        first=limited((yaw, pitch), eyes_most),
+        away=limited((-head[0], -head[1]), eyes_most),
         inward=inward,
     )
 
@@ -85,20 +85,20 @@ def _of_head(angle: float, part: float, size: float, eyes: float) -> float:
     return angle - math.copysign(eyes, angle) if abs(angle - head) > eyes else head
 
 
-def timing(node: Gaze, world: World) -> Timing:
-    return preferred("gaze", node.influence or "")
+def timing(node: Gaze, context: PlanningContext) -> Timing:
+    return timing_from_table("gaze", node.influence or "")
 
 
-def timing_of_shift(node: GazeShift, world: World) -> Timing:
-    return preferred("gazeShift", node.influence or "")
+def timing_of_shift(node: GazeShift, context: PlanningContext) -> Timing:
+    return timing_from_table("gazeShift", node.influence or "")
 
 
-def expand(node: Gaze, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Gaze, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """There from start to ready, held to relax, back at end. While it lasts it takes eyes and head from the
     base gaze; EYES takes the eyes only.
     """
     start, ready, relax, end = times.tolist()
-    to = aim(node, world)
+    to = split_angle(node, context)
     there, back = start + _lead(ready - start), relax + _lead(end - relax)
     keys = np.array([start, there, ready, relax, back, end])
     eyes = [REST, to.first, to.eyes, to.eyes, to.away, REST]
@@ -117,10 +117,10 @@ def expand(node: Gaze, times: Float64, world: World) -> tuple[Channel, ...]:
     )
 
 
-def expand_shift(node: GazeShift, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_shift(node: GazeShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """There from start to end, and from then on."""
     start, end = times.tolist()
-    to = aim(node, world)
+    to = split_angle(node, context)
     keys = np.array([start, start + _lead(end - start), end])
     return (
         *turn("eyes", keys, [REST, to.first, to.eyes], layer=Layer.BASE, holds=True, source=node.id),
@@ -129,8 +129,8 @@ def expand_shift(node: GazeShift, times: Float64, world: World) -> tuple[Channel
     )
 
 
-def check(node: Gaze | GazeShift, world: World) -> tuple[Fault, ...]:
-    return target_faults(node.target, world)
+def check(node: Gaze | GazeShift, context: PlanningContext) -> tuple[Fault, ...]:
+    return target_faults(node.target, context)
 
 
 def _lead(length: float) -> float:
@@ -148,17 +148,17 @@ def _converge(
     return (Channel(au(66)[0], times, values, layer=layer, holds=holds, source=source),)
 
 
-def claims(node: Gaze, world: World) -> frozenset[str]:
+def claims(node: Gaze, context: PlanningContext) -> frozenset[str]:
     """Every influence takes the eyes: one cannot look at two things."""
     return frozenset({"gaze"})
 
 
-def claims_of_shift(node: GazeShift, world: World) -> frozenset[str]:
+def claims_of_shift(node: GazeShift, context: PlanningContext) -> frozenset[str]:
     """A base state can change to one other at a time; a temporary gaze does not mind."""
     return frozenset({"base gaze"})
 
 
 KINDS = (
-    Kind(Gaze, timing, expand, check, claims=claims),
-    Kind(GazeShift, timing_of_shift, expand_shift, check, claims=claims_of_shift, region="eyes"),
+    BehaviourKind(Gaze, timing, expand, check, claims=claims),
+    BehaviourKind(GazeShift, timing_of_shift, expand_shift, check, claims=claims_of_shift, region="eyes"),
 )

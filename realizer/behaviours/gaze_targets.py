@@ -14,7 +14,7 @@ import numpy as np
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
-from realizer.behaviours.kind import Fault, Position, World
+from realizer.behaviours.kind import Fault, PlanningContext, Position
 from realizer.core.array_types import Float64
 
 FILE = "gaze.toml"
@@ -37,30 +37,30 @@ def limits(part: str) -> Turn:
     return facts()[part]["yaw"], facts()[part]["pitch"]
 
 
-def within(turn: Turn, most: Turn) -> Turn:
+def limited(turn: Turn, most: Turn) -> Turn:
     """As much of a turn as there can be."""
     (yaw, pitch), (most_yaw, most_pitch) = turn, most
     return max(-most_yaw, min(most_yaw, yaw)), max(-most_pitch, min(most_pitch, pitch))
 
 
-def position(target: str, world: World) -> Position | None:
+def position(target: str, context: PlanningContext) -> Position | None:
     """Where a target is, in metres: a point "x,y,z" or a name of the scene, either case; None if nowhere."""
     if match := POINT.fullmatch(target):
         x, y, z = (float(number) for number in match.groups())
         return x, y, z
-    if world.scene is None:
+    if context.scene is None:
         return None
-    if target in world.scene:
-        return world.scene[target]
-    return next((place for name, place in world.scene.items() if name.lower() == target.lower()), None)
+    if target in context.scene:
+        return context.scene[target]
+    return next((place for name, place in context.scene.items() if name.lower() == target.lower()), None)
 
 
-def angles(target: str, world: World) -> tuple[float, float, float]:
+def angles(target: str, context: PlanningContext) -> tuple[float, float, float]:
     """Yaw (positive to the character's left), pitch (positive up) and how far each eye turns in, degrees.
 
     What is not known, and a target between the eyes, is straight ahead and far away.
     """
-    x, y, z = position(target, world) or (0.0, 0.0, 0.0)
+    x, y, z = position(target, context) or (0.0, 0.0, 0.0)
     distance = math.sqrt(x * x + y * y + z * z)
     if distance < 1e-6:
         return 0.0, 0.0, 0.0
@@ -70,11 +70,11 @@ def angles(target: str, world: World) -> tuple[float, float, float]:
     return yaw, pitch, inward
 
 
-def target_faults(target: str, world: World) -> tuple[Fault, ...]:
+def target_faults(target: str, context: PlanningContext) -> tuple[Fault, ...]:
     """NO_SUCH_TARGET, not fatal, for a name that is not in a declared scene."""
-    if world.scene is None or position(target, world) is not None:
+    if context.scene is None or position(target, context) is not None:
         return ()
-    near = difflib.get_close_matches(target, list(world.scene), n=3) or sorted(world.scene)[:5]
+    near = difflib.get_close_matches(target, list(context.scene), n=3) or sorted(context.scene)[:5]
     wanted = f"one of {', '.join(near)}" if near else 'a point such as "0,0,1", as the scene is empty'
     return (
         Fault(

@@ -11,10 +11,10 @@ from bml_schema import Head, HeadDirectionShift
 from realizer import tables
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
-from realizer.behaviours.gaze_targets import angles, limits, target_faults, turn, within
-from realizer.behaviours.kind import Fault, Kind, World
-from realizer.behaviours.pose_channels import unknown
-from realizer.behaviours.table_timing import from_gaps, preferred
+from realizer.behaviours.gaze_targets import angles, limited, limits, target_faults, turn
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
+from realizer.behaviours.pose_channels import unknown_word
+from realizer.behaviours.table_timing import from_gaps, timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import head_lexemes
@@ -28,7 +28,7 @@ SAME = Gap("same", 0.0, 0.0, 1e4, "BML 1.0 gives the plain stroke of a repeated 
 BACK = {51: 62, 52: 61, 53: 64, 54: 63}
 
 
-def timing(node: Head, world: World) -> Timing:
+def timing(node: Head, context: PlanningContext) -> Timing:
     """start ready strokeStart stroke strokeEnd relax end; with repetition n > 1 instead of the stroke
     stroke:1 .. stroke:n, and `stroke` with the last of them.
     """
@@ -49,7 +49,7 @@ def _timing(lexeme: str, repetition: int) -> Timing:
     )
 
 
-def expand(node: Head, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Head, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """The lexeme's poses at its sync points; between two strokes, half way, the head is back. The eyes stay
     on whom they look at, as far as the lexeme says.
     """
@@ -83,33 +83,33 @@ def _turned(number: int, keys: Float64, turned: Float64, source: str) -> Channel
     return Channel(au(number)[0], keys, values, layer=Layer.HEAD, source=source)
 
 
-def check(node: Head, world: World) -> tuple[Fault, ...]:
+def check(node: Head, context: PlanningContext) -> tuple[Fault, ...]:
     known = head_lexemes()
-    return () if node.lexeme.upper() in known else (unknown("lexeme", node.lexeme, known),)
+    return () if node.lexeme.upper() in known else (unknown_word("lexeme", node.lexeme, known),)
 
 
-def timing_of_shift(node: HeadDirectionShift, world: World) -> Timing:
-    return preferred("headDirectionShift")
+def timing_of_shift(node: HeadDirectionShift, context: PlanningContext) -> Timing:
+    return timing_from_table("headDirectionShift")
 
 
-def expand_shift(node: HeadDirectionShift, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand_shift(node: HeadDirectionShift, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """From start to end the head turns to the target, as far as a head turns, and stays."""
-    yaw, pitch, _ = angles(node.target, world)
-    turns = [(0.0, 0.0), within((yaw, pitch), limits("head"))]
+    yaw, pitch, _ = angles(node.target, context)
+    turns = [(0.0, 0.0), limited((yaw, pitch), limits("head"))]
     return turn("head", times, turns, layer=Layer.BASE, holds=True, source=node.id)
 
 
-def check_shift(node: HeadDirectionShift, world: World) -> tuple[Fault, ...]:
-    return target_faults(node.target, world)
+def check_shift(node: HeadDirectionShift, context: PlanningContext) -> tuple[Fault, ...]:
+    return target_faults(node.target, context)
 
 
-def claims_of_shift(node: HeadDirectionShift, world: World) -> frozenset[str]:
+def claims_of_shift(node: HeadDirectionShift, context: PlanningContext) -> frozenset[str]:
     return frozenset({"base head"})
 
 
 KINDS = (
-    Kind(Head, timing, expand, check, parameters={"amount": "amount"}),
-    Kind(
+    BehaviourKind(Head, timing, expand, check, parameters={"amount": "amount"}),
+    BehaviourKind(
         HeadDirectionShift, timing_of_shift, expand_shift, check_shift, claims=claims_of_shift, region="head"
     ),
 )

@@ -8,17 +8,17 @@ from bml_schema import Idle
 from realizer.animation.axis import presence
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.blinks import Fewer
-from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
 
-def timing(node: Idle, world: World) -> Timing:
-    return preferred("idle")
+def timing(node: Idle, context: PlanningContext) -> Timing:
+    return timing_from_table("idle")
 
 
-def expand(node: Idle, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """What is taken from blinks and motion rises from start to end, and stays.
 
     Both channels are there even where nothing is taken: they replace what an earlier one took.
@@ -31,8 +31,8 @@ def expand(node: Idle, times: Float64, world: World) -> tuple[Channel, ...]:
     )
 
 
-def claims(node: Idle, world: World) -> frozenset[str]:
+def claims(node: Idle, context: PlanningContext) -> frozenset[str]:
     return frozenset({"idle face"})
 
 
-KINDS = (Kind(Idle, timing, expand, claims=claims, region="idle"),)
+KINDS = (BehaviourKind(Idle, timing, expand, claims=claims, region="idle"),)

@@ -14,7 +14,7 @@ from realizer.animation.axis import Target, au, fap
 from realizer.animation.channel import Channel
 from realizer.behaviours.fap_values import RECORDED, out_of_range
 from realizer.behaviours.key_channels import track
-from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
@@ -28,7 +28,7 @@ PART = {
 WANTED = {"FAPS": 'FAP numbers 3..68 such as "31 32"', "FACS": 'action units such as "1.BOTH 12.LEFT"'}
 
 
-class Bad(Exception):
+class KeyframeError(Exception):
     """What is wrong with a facekeyframe, as a sentence."""
 
 
@@ -47,13 +47,13 @@ class Keys:
     values: Float64
 
 
-def timing(node: FaceKeyframe, world: World) -> Timing:
+def timing(node: FaceKeyframe, context: PlanningContext) -> Timing:
     """As long as from its first to its last key; it stretches."""
     times = _keys(node).times
     return Timing(("start", "end"), times[-1:] - times[0], np.zeros(1), np.array([RECORDED]))
 
 
-def expand(node: FaceKeyframe, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: FaceKeyframe, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Its keys, the first at start and the last at end; what is not 0 there gets there and back."""
     keys = _keys(node)
     first, last = keys.times[0], keys.times[-1]
@@ -67,11 +67,11 @@ def expand(node: FaceKeyframe, times: Float64, world: World) -> tuple[Channel, .
     return tuple(channels)
 
 
-def check(node: FaceKeyframe, world: World) -> tuple[Fault, ...]:
+def check(node: FaceKeyframe, context: PlanningContext) -> tuple[Fault, ...]:
     """What cannot be read is fatal, a FAP that goes too far is not."""
     try:
         keys = _keys(node)
-    except Bad as error:
+    except KeyframeError as error:
         return (Fault("CANNOT_CREATE_BEHAVIOR", str(error)),)
     least, most = keys.values.min(axis=0), keys.values.max(axis=0)
     return tuple(
@@ -82,16 +82,18 @@ def check(node: FaceKeyframe, world: World) -> tuple[Fault, ...]:
     )
 
 
-def claims(node: FaceKeyframe, world: World) -> frozenset[str]:
+def claims(node: FaceKeyframe, context: PlanningContext) -> frozenset[str]:
     """FAPs replace each other, so two behaviours cannot have the same; AUs blend."""
     return frozenset(f"FAP {part}" for part in _keys(node).parts if isinstance(part, int))
 
 
 def _keys(node: FaceKeyframe) -> Keys:
     if node.type not in PART:
-        raise Bad(f"type: wanted FAPS or FACS, as faces are moved by parameters here, got {node.type}")
+        raise KeyframeError(
+            f"type: wanted FAPS or FACS, as faces are moved by parameters here, got {node.type}"
+        )
     if node.interpolator is None:
-        raise Bad(f"wanted <FaceInterpolator parts=...> with keys of {WANTED[node.type]}, got none")
+        raise KeyframeError(f"wanted <FaceInterpolator parts=...> with keys of {WANTED[node.type]}, got none")
     return _read(node.type, node.interpolator.parts, node.interpolator.keys)
 
 
@@ -100,7 +102,7 @@ def _read(type: str, parts: str, text: str) -> Keys:
     found = _parts(type, parts)
     lines = [line.split() for line in text.splitlines() if line.strip()]
     if len(lines) < 2:
-        raise Bad(f"keys: wanted at least two lines, got {len(lines)}")
+        raise KeyframeError(f"keys: wanted at least two lines, got {len(lines)}")
     rows = _at_once(lines, len(found) + 1) if PLAIN.fullmatch(text) else None
     if rows is None or (type == "FACS" and not ((rows[:, 1:] >= 0) & (rows[:, 1:] <= 1)).all()):
         rows = _by_lines(type, lines, len(found))
@@ -127,14 +129,14 @@ def _by_lines(type: str, lines: list[list[str]], count: int) -> Float64:
         place, said = f"line {row + 1} of the keys", " ".join(words)[:60]
         wanted = f"wanted a time and {count} value{'s' * (count != 1)}"
         if len(words) != count + 1 or not all(map(NUMBER.fullmatch, words)):
-            raise Bad(f"{place}: {wanted}, got {said!r}")
+            raise KeyframeError(f"{place}: {wanted}, got {said!r}")
         rows[row] = [float(word) for word in words]
         if not np.all(np.abs(rows[row]) <= MOST):
-            raise Bad(f"{place}: wanted numbers within a million, got {said!r}")
+            raise KeyframeError(f"{place}: wanted numbers within a million, got {said!r}")
         if rows[row, 0] <= before:
-            raise Bad(f"{place}: wanted a time after {before:g}, got {words[0]}")
+            raise KeyframeError(f"{place}: wanted a time after {before:g}, got {words[0]}")
         if type == "FACS" and not (np.all(rows[row, 1:] >= 0) and np.all(rows[row, 1:] <= 1)):
-            raise Bad(f"{place}: wanted action units 0..1, got {said!r}")
+            raise KeyframeError(f"{place}: wanted action units 0..1, got {said!r}")
         before = rows[row, 0]
     return rows
 
@@ -151,9 +153,9 @@ def _parts(type: str, text: str) -> tuple[int | tuple[int, str], ...]:
             sides = known[int(match[1])].sides
             part = (int(match[1]), (match[2] or "BOTH").upper() if sides else "BOTH")
         if part is None:
-            raise Bad(f"parts: wanted {WANTED[type]}, got {word[:60]!r}")
+            raise KeyframeError(f"parts: wanted {WANTED[type]}, got {word[:60]!r}")
         if part in parts:
-            raise Bad(f"parts: wanted each once, got {word!r} twice")
+            raise KeyframeError(f"parts: wanted each once, got {word!r} twice")
         parts.append(part)
     return tuple(parts)
 
@@ -162,4 +164,4 @@ def _targets(part: int | tuple[int, str]) -> tuple[Target, ...]:
     return (fap(part),) if isinstance(part, int) else au(*part)
 
 
-KINDS = (Kind(FaceKeyframe, timing, expand, check, claims=claims, parameters={"amount": 1.0}),)
+KINDS = (BehaviourKind(FaceKeyframe, timing, expand, check, claims=claims, parameters={"amount": 1.0}),)

@@ -17,7 +17,7 @@ Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class World:
+class PlanningContext:
     """What a document cannot know.
 
     Attributes:
@@ -29,7 +29,7 @@ class World:
         media: the folder that holds the files documents may name; None: there are none.
         clips: id -> sound that a client sent, which documents name as `clip:ID`.
         library: the expressions that documents may name.
-        takes: () -> what moves the character's face (`Face.takes`); None where that is not known.
+        face_inputs: () -> what moves the character's face (`Face.takes`); None where that is not known.
     """
 
     scene: Mapping[str, Position] | None = None
@@ -39,7 +39,7 @@ class World:
     media: Path | None = None
     clips: Mapping[str, Recording] = field(default_factory=dict)
     library: Library = field(default_factory=shipped)
-    takes: Callable[[], Sequence[str] | None] = lambda: None
+    face_inputs: Callable[[], Sequence[str] | None] = lambda: None
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Change:
 
 
 # What a behaviour does to others when it starts.
-Act = Interrupt | Activate | Change
+BlockCommand = Interrupt | Activate | Change
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Kind:
+class BehaviourKind:
     """One behaviour element.
 
     Attributes:
@@ -96,10 +96,10 @@ class Kind:
         expand: (node, times (k,) seconds from block start, world) -> Channels, step 4. Times follow
             `timing(...).points`. Body behaviours show nothing on a face: ().
         check: (node, world) -> faults: unknown lexeme or AU, no such target. Run before timing.
-        say: (node, world) -> what the voice has to say, or None. Only speech has it.
-        act: node -> what it does to other blocks and behaviours when it starts.
-        bend: (node, world) -> Timing of a rigid behaviour that can be made to fit others where nothing else
-            helps; None where it cannot.
+        speech_request: (node, world) -> what the voice has to say, or None. Only speech has it.
+        command: node -> what it does to other blocks and behaviours when it starts.
+        stretch: (node, world) -> Timing of a rigid behaviour that can be made to fit others where nothing
+            else helps; None where it cannot.
         sound: (node, world) -> what sounds from its start to its end; None where it is silent.
         claims: (node, world) -> names of what it needs for itself ("voice", "gaze", "head pitch") from its
             start to its relax (its end where it has none): of two behaviours of a character that claim the
@@ -111,14 +111,14 @@ class Kind:
     """
 
     node: type[Any]
-    timing: Callable[[Any, World], Timing]
-    expand: Callable[[Any, Float64, World], tuple[Channel, ...]]
-    check: Callable[[Any, World], tuple[Fault, ...]] = lambda node, world: ()
-    say: Callable[[Any, World], Say | None] | None = None
-    act: Callable[[Any], Act] | None = None
-    bend: Callable[[Any, World], Timing | None] = lambda node, world: None
-    sound: Callable[[Any, World], Utterance | None] = lambda node, world: None
-    claims: Callable[[Any, World], frozenset[str]] = lambda node, world: frozenset()
+    timing: Callable[[Any, PlanningContext], Timing]
+    expand: Callable[[Any, Float64, PlanningContext], tuple[Channel, ...]]
+    check: Callable[[Any, PlanningContext], tuple[Fault, ...]] = lambda node, context: ()
+    speech_request: Callable[[Any, PlanningContext], Say | None] | None = None
+    command: Callable[[Any], BlockCommand] | None = None
+    stretch: Callable[[Any, PlanningContext], Timing | None] = lambda node, context: None
+    sound: Callable[[Any, PlanningContext], Utterance | None] = lambda node, context: None
+    claims: Callable[[Any, PlanningContext], frozenset[str]] = lambda node, context: frozenset()
     parameters: Mapping[str, str | float] = field(default_factory=dict)
     region: str | None = None
 

@@ -12,69 +12,71 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
-from realizer.behaviours.kind import Fault, World
+from realizer.behaviours.kind import Fault, PlanningContext
 from realizer.core.errors import RealizerError
 
 T = TypeVar("T")
 
-MOST_BYTES = 64 * 2**20
-MOST_NAMES = 1000  # of a folder, looked through for one that is near
-MOST_KEPT = 8  # files
+MAX_BYTES = 64 * 2**20
+MAX_NAMES = 1000  # of a folder, looked through for one that is near
+MAX_CACHED = 8  # files
 
-_loaded: OrderedDict[tuple[Path | None, str, Any], tuple[tuple[int, int], Any]] = OrderedDict()
+_cache: OrderedDict[tuple[Path | None, str, Any], tuple[tuple[int, int], Any]] = OrderedDict()
 
 
 class MediaError(RealizerError):
     """A file that cannot be played; the text says what was wanted and what came."""
 
 
-def load(name: str, world: World, read: Callable[[bytes], T]) -> T:
+def load(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
     """What `read` makes of a file; it is read once, and again by `faults` when it has changed since.
 
     Raises:
         MediaError: no such file, or none that can be read.
     """
-    kept = _loaded.get((world.media, name, read))
-    value: T = kept[1] if kept is not None else _read(name, world, read)
+    kept = _cache.get((context.media, name, read))
+    value: T = kept[1] if kept is not None else _read(name, context, read)
     return value
 
 
-def faults(name: str, world: World, read: Callable[[bytes], Any]) -> tuple[Fault, ...]:
+def faults(name: str, context: PlanningContext, read: Callable[[bytes], Any]) -> tuple[Fault, ...]:
     """Why a file cannot be played; it is looked at anew."""
     try:
-        _read(name, world, read)
+        _read(name, context, read)
     except MediaError as error:
         return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {error}"),)
     return ()
 
 
-def _read(name: str, world: World, read: Callable[[bytes], T]) -> T:
-    path = media_file(name, world)
+def _read(name: str, context: PlanningContext, read: Callable[[bytes], T]) -> T:
+    path = media_file(name, context)
     try:
         found = path.stat()
-        stamp, key = (found.st_mtime_ns, found.st_size), (world.media, name, read)
-        kept = _loaded.get(key)
+        stamp, key = (found.st_mtime_ns, found.st_size), (context.media, name, read)
+        kept = _cache.get(key)
         if kept is not None and kept[0] == stamp:
             known: T = kept[1]
             return known
-        if found.st_size > MOST_BYTES:
+        if found.st_size > MAX_BYTES:
             raise MediaError(
-                f"wanted at most {MOST_BYTES // 2**20} MiB, got {_shown(name)} of {found.st_size} bytes"
+                f"wanted at most {MAX_BYTES // 2**20} MiB, got {_quoted_name(name)} of {found.st_size} bytes"
             )
         content = path.read_bytes()
     except OSError as error:
-        raise MediaError(f"wanted a file that can be read, got {_shown(name)}: {error.strerror}") from None
+        raise MediaError(
+            f"wanted a file that can be read, got {_quoted_name(name)}: {error.strerror}"
+        ) from None
     try:
         value = read(content)
     except RealizerError as error:
-        raise MediaError(f"{_shown(name)}: {error}") from None
-    _loaded[key] = stamp, value
-    while len(_loaded) > MOST_KEPT:
-        _loaded.popitem(last=False)
+        raise MediaError(f"{_quoted_name(name)}: {error}") from None
+    _cache[key] = stamp, value
+    while len(_cache) > MAX_CACHED:
+        _cache.popitem(last=False)
     return value
 
 
-def media_file(name: str, world: World) -> Path:
+def media_file(name: str, context: PlanningContext) -> Path:
     """The file that a document names, inside `world.media`.
 
     Names are relative to the folder, with "/" or, as old documents have it, with "\\". A file: URL and a path
@@ -83,10 +85,10 @@ def media_file(name: str, world: World) -> Path:
     Raises:
         MediaError: no folder, a name that leads elsewhere, or no such file.
     """
-    if world.media is None:
+    if context.media is None:
         raise MediaError("wanted a media folder (--media DIR), which files are read from, got none")
     elsewhere, parts = _parts(name)
-    folder = world.media.resolve()
+    folder = context.media.resolve()
     for first in range(len(parts) if elsewhere else 1):
         try:
             path = folder.joinpath(*parts[first:]).resolve()
@@ -95,12 +97,12 @@ def media_file(name: str, world: World) -> Path:
             continue
         if there and not inside:
             raise MediaError(
-                f"wanted a file inside the media folder, got {_shown(name)}, a link that leads out"
+                f"wanted a file inside the media folder, got {_quoted_name(name)}, a link that leads out"
             )
         if there:
             return path
     near = _near(folder, parts)
-    raise MediaError(f"wanted a file of the media folder, got {_shown(name)}{near}")
+    raise MediaError(f"wanted a file of the media folder, got {_quoted_name(name)}{near}")
 
 
 def _parts(name: str) -> tuple[bool, list[str]]:
@@ -109,18 +111,18 @@ def _parts(name: str) -> tuple[bool, list[str]]:
     if text.lower().startswith("file:"):
         text, elsewhere = unquote(urlsplit(text.replace("\\", "/")).path), True
     elif re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", text):
-        raise MediaError(f"wanted a file of the media folder, got an address: {_shown(name)}")
+        raise MediaError(f"wanted a file of the media folder, got an address: {_quoted_name(name)}")
     text = text.replace("\\", "/")
     drive = re.match(r"/*[A-Za-z]:", text)
     if drive:
         text, elsewhere = text[drive.end() :], True
     if text.startswith("/") and not elsewhere:
-        raise MediaError(f"wanted a name relative to the media folder, got {_shown(name)}")
+        raise MediaError(f"wanted a name relative to the media folder, got {_quoted_name(name)}")
     parts = [part for part in text.split("/") if part not in ("", ".")]
     if ".." in parts:
-        raise MediaError(f'wanted a name inside the media folder, without "..", got {_shown(name)}')
+        raise MediaError(f'wanted a name inside the media folder, without "..", got {_quoted_name(name)}')
     if not parts:
-        raise MediaError(f"wanted the name of a file, got {_shown(name)}")
+        raise MediaError(f"wanted the name of a file, got {_quoted_name(name)}")
     return elsewhere, parts
 
 
@@ -131,7 +133,7 @@ def _near(folder: Path, parts: list[str]) -> str:
         if not beside.is_relative_to(folder):
             return ""
         with os.scandir(beside) as entries:
-            names = [entry.name for entry in islice(entries, MOST_NAMES)]
+            names = [entry.name for entry in islice(entries, MAX_NAMES)]
     except (OSError, RuntimeError, ValueError):
         return ""
     lower = {name.lower(): name for name in names}
@@ -139,5 +141,5 @@ def _near(folder: Path, parts: list[str]) -> str:
     return f', did you mean "{"/".join([*parts[:-1], lower[near[0]]])}"?' if near else ""
 
 
-def _shown(name: str) -> str:
+def _quoted_name(name: str) -> str:
     return repr(name if len(name) <= 80 else name[:80] + "...")

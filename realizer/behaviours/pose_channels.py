@@ -25,7 +25,7 @@ def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target,
     return values
 
 
-def shown(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
+def hold(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
     """Channels that are 0 at start, there from attackPeak to relax, 0 at end: times (4,)."""
     return tuple(
         Channel(target, times, np.array([0.0, value, value, 0.0]), source=source)
@@ -34,7 +34,7 @@ def shown(values: Mapping[Target, float], times: Float64, source: str) -> tuple[
     )
 
 
-def kept(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
+def keep_base(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
     """Channels of a base state that rise from start to end, and stay: times (2,)."""
     return tuple(
         Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=source)
@@ -42,7 +42,7 @@ def kept(values: Mapping[Target, float], times: Float64, source: str) -> tuple[C
     )
 
 
-def unknown(attribute: str, word: str, known: Iterable[str]) -> Fault:
+def unknown_word(attribute: str, word: str, known: Iterable[str]) -> Fault:
     """The fault of a word that is none of those known, with those near it."""
     names = {name.upper(): name for name in known}
     got = word if len(word) <= 60 else word[:60] + "..."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 
 from realizer.behaviours import media
-from realizer.behaviours.kind import Fault, World
+from realizer.behaviours.kind import Fault, PlanningContext
 from realizer.behaviours.media import MediaError
 from realizer.behaviours.sound_file import read_sound
 from realizer.speech.utterance import Recording
@@ -13,23 +13,23 @@ from realizer.speech.utterance import Recording
 CLIP = "clip:"  # before the id of a clip
 
 
-def recording(name: str, world: World) -> Recording:
+def recording(name: str, context: PlanningContext) -> Recording:
     """The recording of a name.
 
     Raises:
         MediaError: there is none, or it cannot be read.
     """
     id = _clip(name)
-    return media.load(name, world, read_sound) if id is None else _sent(id, world)
+    return media.load(name, context, read_sound) if id is None else _client_clip(id, context)
 
 
-def faults(name: str, world: World) -> tuple[Fault, ...]:
+def faults(name: str, context: PlanningContext) -> tuple[Fault, ...]:
     """Why a recording cannot be played."""
     id = _clip(name)
     if id is None:
-        return media.faults(name, world, read_sound)
+        return media.faults(name, context, read_sound)
     try:
-        _sent(id, world)
+        _client_clip(id, context)
     except MediaError as error:
         return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {error}"),)
     return ()
@@ -39,9 +39,9 @@ def _clip(name: str) -> str | None:
     return name.strip()[len(CLIP) :] if name.strip().startswith(CLIP) else None
 
 
-def _sent(id: str, world: World) -> Recording:
-    if id not in world.clips:
-        near = difflib.get_close_matches(id, list(world.clips), n=1)
+def _client_clip(id: str, context: PlanningContext) -> Recording:
+    if id not in context.clips:
+        near = difflib.get_close_matches(id, list(context.clips), n=1)
         meant = f', did you mean "{CLIP}{near[0]}"?' if near else ""
         raise MediaError(f"wanted a clip that was sent to its last piece, got {CLIP + id!r}{meant}")
-    return world.clips[id]
+    return context.clips[id]

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from realizer.behaviours.kind import Kind
+from realizer.behaviours.kind import BehaviourKind
 from realizer.core.registry import Registry
 
 
 def _is_family(value: Any) -> bool:
-    return isinstance(value, tuple) and all(isinstance(kind, Kind) for kind in value)
+    return isinstance(value, tuple) and all(isinstance(kind, BehaviourKind) for kind in value)
 
 
-FAMILIES: Registry[tuple[Kind, ...]] = Registry(
+FAMILIES: Registry[tuple[BehaviourKind, ...]] = Registry(
     "realizer.behaviours",
     {
         "face": "realizer.behaviours.face:KINDS",
@@ -38,8 +38,8 @@ FAMILIES: Registry[tuple[Kind, ...]] = Registry(
 )
 
 
-def _kinds() -> Mapping[str, Kind]:
-    kinds: dict[str, Kind] = {}
+def _kinds() -> Mapping[str, BehaviourKind]:
+    kinds: dict[str, BehaviourKind] = {}
     for _, family in FAMILIES.working():
         for kind in family:
             kinds.setdefault(kind.tag, kind)  # the first counts: a plug-in replaces no element of ours
@@ -47,5 +47,5 @@ def _kinds() -> Mapping[str, Kind]:
 
 
 # Clark tag of an element -> its behaviour; -> the class that the parser makes of it.
-KINDS: Mapping[str, Kind] = _kinds()
+KINDS: Mapping[str, BehaviourKind] = _kinds()
 VOCABULARY: Mapping[str, type[Any]] = MappingProxyType({tag: kind.node for tag, kind in KINDS.items()})

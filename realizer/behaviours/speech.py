@@ -12,7 +12,7 @@ import numpy as np
 from bml_schema import AudioFile, Speech, Sync
 from realizer.animation.channel import Channel
 from realizer.behaviours import recordings
-from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.behaviours.media import MediaError
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
@@ -27,7 +27,7 @@ LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 
 
 @dataclass(frozen=True)
-class Spoken:
+class SpokenContent:
     """What is really said: inner SSML, its marks in order, its language if it says so."""
 
     ssml: str
@@ -35,30 +35,30 @@ class Spoken:
     language: str | None = None
 
 
-def say(node: Speech, world: World) -> Say | None:
+def speech_request(node: Speech, context: PlanningContext) -> Say | None:
     """The description of highest priority that is SSML, or else the text with its syncs as marks.
 
     A description that is an audio file says how it sounds; what is said in it stands in the others, or came
     with the clip. Where nobody tells, the mouth goes by loudness.
     """
-    recording = _recording(node, world)
-    spoken = _spoken(node)
+    recording = _recording(node, context)
+    spoken = _spoken_content(node)
     if spoken is None and recording is not None:
-        spoken = Spoken(escape(recording.text or ""), ())
+        spoken = SpokenContent(escape(recording.text or ""), ())
     if spoken is None or len(spoken.ssml) > MOST_TEXT:
         return None
-    language = spoken.language or world.language
+    language = spoken.language or context.language
     return Say(spoken.ssml, spoken.marks, language=language, recording=recording)
 
 
-def timing(node: Speech, world: World) -> Timing:
+def timing(node: Speech, context: PlanningContext) -> Timing:
     """Rigid: start, the sync points in the order of their times, end.
 
     Raises:
         KeyError: the voice has not spoken: no `world.utterances[node.id]`.
     """
-    utterance = world.utterances[node.id]
-    spoken = _spoken(node) or Spoken("", ())
+    utterance = context.utterances[node.id]
+    spoken = _spoken_content(node) or SpokenContent("", ())
     heard = {
         name: min(max(time, 0.0), utterance.duration)
         for name, time in utterance.marks.items()
@@ -74,21 +74,21 @@ def timing(node: Speech, world: World) -> Timing:
     return Timing(points, gaps, gaps, np.ones(len(gaps)), rigid=True)
 
 
-def bend(node: Speech, world: World) -> Timing | None:
+def stretch(node: Speech, context: PlanningContext) -> Timing | None:
     """As `timing`, but evenly longer or shorter as far as the voice can make it; None where it cannot."""
-    least, most = world.utterances[node.id].stretch
+    least, most = context.utterances[node.id].stretch
     if least == most:
         return None
-    natural = timing(node, world)
+    natural = timing(node, context)
     gaps = natural.preferred
     # Springs as stiff as their gaps are short give way evenly, as one rate of speech does.
     stiffness = BEND / np.maximum(gaps, SHORT)
     return Timing(natural.points, gaps, gaps * least, stiffness, most=gaps * most)
 
 
-def expand(node: Speech, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Lips, jaw and tongue, from the phonemes."""
-    utterance, start = world.utterances[node.id], float(times[0])
+    utterance, start = context.utterances[node.id], float(times[0])
     parts = utterance.parts or ((0.0, utterance),)
     return tuple(channel.named(node.id) for at, part in parts for channel in _lips(part, start + at))
 
@@ -110,16 +110,16 @@ def _lips(utterance: Utterance, start: float) -> tuple[Channel, ...]:
     return channels
 
 
-def check(node: Speech, world: World) -> tuple[Fault, ...]:
+def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
     """Nothing to say is fatal, and more than a voice takes; a recording that is not there is spoken.
 
     What the voice could not say as it is written is one fault that is not fatal.
     """
-    spoken = _spoken(node)
+    spoken = _spoken_content(node)
     name = _audio_file(node)
-    faults = recordings.faults(name, world) if name is not None else ()
+    faults = recordings.faults(name, context) if name is not None else ()
     if spoken is None and name is not None and not faults:
-        spoken = Spoken("", ())
+        spoken = SpokenContent("", ())
     if spoken is None and faults:
         words = f"speech: {faults[0].text}"
     elif spoken is None:
@@ -130,7 +130,7 @@ def check(node: Speech, world: World) -> tuple[Fault, ...]:
             "say it in several behaviours"
         )
     else:
-        unsaid = world.utterances[node.id].warnings if node.id in world.utterances else ()
+        unsaid = context.utterances[node.id].warnings if node.id in context.utterances else ()
         if unsaid:
             words = f"speech: {'; '.join(unsaid)}"
             faults = (*faults, Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", words))
@@ -138,7 +138,7 @@ def check(node: Speech, world: World) -> tuple[Fault, ...]:
     return (Fault("CANNOT_CREATE_BEHAVIOR", words),)
 
 
-def _spoken(node: Speech) -> Spoken | None:
+def _spoken_content(node: Speech) -> SpokenContent | None:
     for description in sorted(node.descriptions, key=lambda d: -d.priority):
         if description.priority < 0 and node.text is not None:
             break  # the core form has priority 0
@@ -151,7 +151,7 @@ def _spoken(node: Speech) -> Spoken | None:
         for part in node.text.parts
     ]
     marks = tuple(part.id for part in node.text.parts if isinstance(part, Sync))
-    return Spoken("".join(parts), marks, node.text.language or None)
+    return SpokenContent("".join(parts), marks, node.text.language or None)
 
 
 def _audio_file(node: Speech) -> str | None:
@@ -166,18 +166,18 @@ def _audio_file(node: Speech) -> str | None:
     return None
 
 
-def _recording(node: Speech, world: World) -> Recording | None:
+def _recording(node: Speech, context: PlanningContext) -> Recording | None:
     """What is played instead of a voice; `check` has said why where there is none."""
     name = _audio_file(node)
     if name is None:
         return None
     try:
-        return recordings.recording(name, world)
+        return recordings.recording(name, context)
     except MediaError:
         return None
 
 
-def _inside(content: str) -> Spoken | None:
+def _inside(content: str) -> SpokenContent | None:
     """What stands inside <speak>, without namespaces; None for what is not one whole element.
 
     The content comes from the parser, which lets no DTD and no entities through.
@@ -192,7 +192,7 @@ def _inside(content: str) -> Spoken | None:
     inner = escape(speak.text or "") + "".join(
         ElementTree.tostring(child, encoding="unicode") for child in speak
     )
-    return Spoken(inner, marks, speak.get(LANG))
+    return SpokenContent(inner, marks, speak.get(LANG))
 
 
 def _places(node: Speech) -> dict[str, float]:
@@ -208,23 +208,23 @@ def _places(node: Speech) -> dict[str, float]:
     return {name: place / length if length else 0.0 for name, place in places.items()}
 
 
-def sound(node: Speech, world: World) -> Utterance | None:
-    return world.utterances.get(node.id)
+def sound(node: Speech, context: PlanningContext) -> Utterance | None:
+    return context.utterances.get(node.id)
 
 
-def claims(node: Speech, world: World) -> frozenset[str]:
+def claims(node: Speech, context: PlanningContext) -> frozenset[str]:
     """A character has one voice."""
     return frozenset({"voice"})
 
 
 KINDS = (
-    Kind(
+    BehaviourKind(
         Speech,
         timing,
         expand,
         check,
-        say,
-        bend=bend,
+        speech_request,
+        stretch=stretch,
         sound=sound,
         claims=claims,
         parameters={"volume": 100.0},

@@ -10,7 +10,7 @@ from realizer.scheduling.timing import Timing
 from realizer.tables.timing import Gap, gaps
 
 
-def preferred(element: str, variant: str = "") -> Timing:
+def timing_from_table(element: str, variant: str = "") -> Timing:
     """What `element` wants of time; `variant` is a lexeme or an influence that may want other times."""
     row = gaps(element, variant)
     return from_gaps(row.points, row.gaps)

@@ -10,7 +10,7 @@ from bml_schema import Timeline as Node
 from realizer.animation.axis import Target, presence, rank
 from realizer.animation.channel import Channel
 from realizer.behaviours import media, pose_channels
-from realizer.behaviours.kind import Fault, Kind, World
+from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.core.array_types import Float64
 from realizer.expressions.spans import lasts, spans
 from realizer.expressions.timeline import Timeline, Track, faults_of, remarks
@@ -23,45 +23,49 @@ STIFFNESS = 4.0
 CHANGE = 0.2
 
 
-def timing(node: Node, world: World) -> Timing:
+def timing(node: Node, context: PlanningContext) -> Timing:
     """As long as its longest channel; it stretches as a whole."""
-    length = lasts(_timeline(node, world), world.library)
+    length = lasts(_timeline(node, context), context.library)
     return Timing(("start", "end"), np.array([length]), np.array([0.04]), np.array([STIFFNESS]))
 
 
-def expand(node: Node, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Node, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Its tracks side by side; where two show one action unit the stronger one shows."""
-    timeline = _timeline(node, world)
+    timeline = _timeline(node, context)
     start, end = float(times[0]), float(times[-1])
-    scale = (end - start) / lasts(timeline, world.library)
-    shown = (channel for track in timeline.tracks for channel in _channels(track, start, scale, node, world))
+    scale = (end - start) / lasts(timeline, context.library)
+    shown = (
+        channel for track in timeline.tracks for channel in _channels(track, start, scale, node, context)
+    )
     return (*shown, *_mixing(timeline, start, end, node.id))
 
 
-def check(node: Node, world: World) -> tuple[Fault, ...]:
+def check(node: Node, context: PlanningContext) -> tuple[Fault, ...]:
     """A file that cannot be read, and expressions that are not in the library, are fatal: all in one.
 
     What the face cannot mix as the file asks is told, and it plays.
     """
-    if faults := media.faults(node.file_name, world, read_timeline):
+    if faults := media.faults(node.file_name, context, read_timeline):
         return tuple(replace(fault, text=fault.text.replace("\n", "; ")) for fault in faults)
-    timeline = _timeline(node, world)
-    if wrong := faults_of(timeline, world.library):
+    timeline = _timeline(node, context)
+    if wrong := faults_of(timeline, context.library):
         return (Fault("CANNOT_CREATE_BEHAVIOR", f"fileName: {node.file_name!r}: {'; '.join(wrong)}"),)
-    takes = world.takes() if timeline.mixer == "successive" else None
+    takes = context.face_inputs() if timeline.mixer == "successive" else None
     return tuple(
         Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"fileName: {node.file_name!r}: {remark}", fatal=False)
         for remark in remarks(timeline, takes)
     )
 
 
-def _timeline(node: Node, world: World) -> Timeline:
-    return media.load(node.file_name, world, read_timeline)
+def _timeline(node: Node, context: PlanningContext) -> Timeline:
+    return media.load(node.file_name, context, read_timeline)
 
 
-def _channels(track: Track, start: float, scale: float, node: Node, world: World) -> list[Channel]:
-    shown = spans(track, world.library)
-    whole = [_pose(span.entry.expression, span.entry.intensity, world) for span in shown]
+def _channels(
+    track: Track, start: float, scale: float, node: Node, context: PlanningContext
+) -> list[Channel]:
+    shown = spans(track, context.library)
+    whole = [_pose(span.entry.expression, span.entry.intensity, context) for span in shown]
     keys = [start + shown[0].start * scale]
     for span in shown:
         keys += [start + span.reached * scale, start + span.left * scale]
@@ -93,9 +97,9 @@ def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[C
     ]
 
 
-def _pose(name: str, intensity: float, world: World) -> dict[Target, float]:
-    found = world.library.get(name)
+def _pose(name: str, intensity: float, context: PlanningContext) -> dict[Target, float]:
+    found = context.library.get(name)
     return {} if found is None else pose_channels.columns(found.aus, intensity)
 
 
-KINDS = (Kind(Node, timing, expand, check, parameters={"amount": 1.0}),)
+KINDS = (BehaviourKind(Node, timing, expand, check, parameters={"amount": 1.0}),)

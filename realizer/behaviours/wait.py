@@ -8,8 +8,8 @@ import numpy as np
 
 from bml_schema import Wait
 from realizer.animation.channel import Channel
-from realizer.behaviours.kind import Kind, World
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 
@@ -17,16 +17,16 @@ from realizer.scheduling.timing import Timing
 STATED = 1000.0
 
 
-def timing(node: Wait, world: World) -> Timing:
+def timing(node: Wait, context: PlanningContext) -> Timing:
     """As long as `duration` says; without one, as long as its references say."""
-    wanted = preferred("wait")
+    wanted = timing_from_table("wait")
     if not node.duration:
         return wanted
     return replace(wanted, preferred=np.array([node.duration]), stiffness=np.array([STATED]))
 
 
-def expand(node: Wait, times: Float64, world: World) -> tuple[Channel, ...]:
+def expand(node: Wait, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     return ()
 
 
-KINDS = (Kind(Wait, timing, expand),)
+KINDS = (BehaviourKind(Wait, timing, expand),)

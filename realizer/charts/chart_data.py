@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterable
 from bml_schema import Behaviour, Block, Place
 from realizer.charts.links import Link, links_of
 from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Point, Spoken
-from realizer.playback.active_block import Playing
-from realizer.playback.block_links import instants
-from realizer.playback.block_store import Cast
+from realizer.playback.active_block import ActiveBlock
+from realizer.playback.block_links import external_times
+from realizer.playback.block_store import BlockStore
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 
-def lines_of(cast: Cast, schedules: Iterable[Schedule]) -> list[BlockLine]:
+def lines_of(cast: BlockStore, schedules: Iterable[Schedule]) -> list[BlockLine]:
     """The blocks of a player, one for each schedule that its `submit` gave."""
-    playing = {id(p.first): p for p in cast.all()}
+    playing = {id(p.first_schedule): p for p in cast.all()}
     out = []
     for schedule in schedules:
         known = playing.get(id(schedule))
@@ -24,7 +24,7 @@ def lines_of(cast: Cast, schedules: Iterable[Schedule]) -> list[BlockLine]:
     return out
 
 
-def line_of(playing: Playing, schedule_of: Callable[[str], Schedule | None]) -> BlockLine:
+def line_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]) -> BlockLine:
     """Return the chart of a block in its present state.
 
     Args:
@@ -33,30 +33,32 @@ def line_of(playing: Playing, schedule_of: Callable[[str], Schedule | None]) -> 
     block, schedule = playing.block, playing.schedule
     known = math.isfinite(schedule.start)
     start = schedule.start if known else None
-    links = links_of(block, schedule, instants(schedule_of, schedule.start if known else 0.0))
+    links = links_of(block, schedule, external_times(schedule_of, schedule.start if known else 0.0))
     own = tuple(
         _line(playing, node, start, tuple(links.get(node.id, ())))
         for node in block.behaviours
         if node.id in schedule.times
     )
-    warnings = tuple(dict.fromkeys((*playing.first.warnings, *schedule.warnings)))
+    warnings = tuple(dict.fromkeys((*playing.first_schedule.warnings, *schedule.warnings)))
     dropped = [d for w in warnings if (d := _dropped(w, block, schedule)) is not None]
     names = {d.id for d in dropped}
-    dropped += [_cut(playing, id) for id in playing.first.times if id not in (*names, *schedule.times)]
+    dropped += [
+        _cut(playing, id) for id in playing.first_schedule.times if id not in (*names, *schedule.times)
+    ]
     end = playing.end if known else None
     return BlockLine(
         block.id, block.character_id, playing.state.value, start, end, own, tuple(dropped), warnings
     )
 
 
-def _line(playing: Playing, node: Behaviour, start: float | None, links: tuple[Link, ...]) -> Line:
+def _line(playing: ActiveBlock, node: Behaviour, start: float | None, links: tuple[Link, ...]) -> Line:
     names, times = playing.schedule.points[node.id], playing.schedule.times[node.id].tolist()
     points = tuple(
         Point(name, time, None if start is None else start + time)
         for name, time in zip(names, times, strict=True)
     )
     place = playing.block.places.get(node.id)
-    utterance = playing.world.utterances.get(node.id)
+    utterance = playing.context.utterances.get(node.id)
     words = utterance.words if utterance is not None else ()
     return Line(
         node.id,
@@ -120,10 +122,10 @@ def _element(place: Place | None) -> str | None:
     return place.path.rpartition("/")[2].partition("[")[0].rpartition(":")[2] or None
 
 
-def _cut(playing: Playing, id: str) -> Dropped:
+def _cut(playing: ActiveBlock, id: str) -> Dropped:
     """Return the behaviours that ended before they began."""
     place, state = playing.block.places.get(id), playing.state.value
-    when = "" if playing.stopped is None else f" at {playing.stopped:.3f} s"
+    when = "" if playing.stopped_at is None else f" at {playing.stopped_at:.3f} s"
     # A block that waited is without it by now.
     tag = next((node.tag for node in playing.block.behaviours if node.id == id), None)
     return Dropped(

@@ -112,7 +112,7 @@ class _Advisor:
 
         kind, times = player.kinds[node.tag], schedule.times[node.id]
         seconds = float(times[-1] - times[0])
-        if not node.syncs or kind.act is not None or kind.say is not None:
+        if not node.syncs or kind.command is not None or kind.speech_request is not None:
             return
         if 0 < seconds < SHORT:
             said = f"lasts {seconds:.3g} s from start to end, less than a frame"
@@ -122,7 +122,7 @@ class _Advisor:
             return
         if kind.region is None and not node.sync_points[1:-1]:
             return  # nothing that rises or falls: a wait, a sound
-        timing = kind.timing(node, replace(player.world, utterances={}))
+        timing = kind.timing(node, replace(player.context, utterances={}))
         spread = 1 / np.sqrt(timing.stiffness)
         for n, gap in enumerate(np.diff(times).tolist()):
             usual = float(timing.preferred[n])

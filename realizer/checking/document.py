@@ -48,10 +48,10 @@ def checked(file: str, source: Source, text: bytes | str, player: Player) -> Ite
     items = list(read(text, VOCABULARY))
     for item, whole in zip(items, without_faults(source, items), strict=True):
         if isinstance(item, Block):
-            said = synthesize(player.wants(item), voice)
+            said = synthesize(player.speech_requests(item), voice)
             schedule, warnings = examine(item, player, said)
             if whole is not None:
-                warnings += hidden(item, whole, player, replace(player.world, utterances=dict(said)))
+                warnings += hidden(item, whole, player, replace(player.context, utterances=dict(said)))
             yield Checked(_explained(file, source, warnings), item, schedule, said)
         else:
             yield Checked(_explained(file, source, [parse_warning(item)]))
@@ -69,7 +69,7 @@ def examine(block: Block, player: Player, said: Mapping[str, Utterance]) -> tupl
         said: the silent voice's utterances of its speeches.
     """
     warnings = [Warning(p.id, p.type, str(p)) for p in block.problems]
-    world = replace(player.world, utterances=dict(said))
+    world = replace(player.context, utterances=dict(said))
     bad: set[str] = set()
     for node in block.behaviours:
         kind = player.kinds.get(node.tag)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bml_schema import Block, BMLError, Problem, read
 from bml_schema.source import Source
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import VOCABULARY
 from realizer.checking.explain import attributes_of
 from realizer.playback.player import Player
@@ -44,7 +44,7 @@ def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Bl
     return [item if isinstance(item, Block) else None for item in again]
 
 
-def hidden(block: Block, whole: Block, player: Player, world: World) -> Iterator[Warning]:
+def hidden(block: Block, whole: Block, player: Player, world: PlanningContext) -> Iterator[Warning]:
     """Return the faults of the behaviours that a block has only without its faults.
 
     Args:

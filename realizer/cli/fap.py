@@ -35,7 +35,7 @@ def fap() -> None:
 @click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
 def info(file: str, as_json: bool) -> None:
     """Say how long a file is, at what rate, what it moves and how far."""
-    from realizer.behaviours.fap_visemes import shown
+    from realizer.behaviours.fap_visemes import expand_compound
     from realizer.tables import faps
 
     clip = _read(file)
@@ -47,7 +47,7 @@ def info(file: str, as_json: bool) -> None:
         "visemes": sorted({int(v) for v in clip.visemes[:, :2].flat if v}),
         "expressions": sorted({int(v) for v in clip.expressions[:, [0, 2]].flat if v}),
     }
-    notes = shown(clip).notes
+    notes = expand_compound(clip).notes
     if as_json:
         moved = {
             row.name: dict(zip(("least", "most"), extremes[row.fap], strict=True)) | {"unit": row.unit}
@@ -83,7 +83,7 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
     \b
     realizer fap convert greta.fap -o clean.fap --fps 30
     """
-    from realizer.behaviours.fap_visemes import shown
+    from realizer.behaviours.fap_visemes import expand_compound
     from realizer.core.atomic_files import write_text
     from realizer.outputs.fap_clip_files import ENCODINGS, limited
 
@@ -94,7 +94,7 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
         )
     clip = _read(file)
     if expand:
-        clip = shown(clip)
+        clip = expand_compound(clip)
     clip = clip if fps is None else clip.resampled(fps)
     if suffix == ".fap":
         clip = limited(clip)
@@ -125,10 +125,10 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
 
     from bml_schema.documents import MAX_BYTES
     from realizer.behaviours.fap_document import document_of
-    from realizer.behaviours.fap_visemes import shown
+    from realizer.behaviours.fap_visemes import expand_compound
     from realizer.core.errors import RealizerError
 
-    clip = shown(_read(file))
+    clip = expand_compound(_read(file))
     _tell(context, file, clip)
     if len(clip.values) == 1:
         count = 1 + max(1, round(HELD * clip.fps))

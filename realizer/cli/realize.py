@@ -126,7 +126,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
     from realizer.pipeline import play
 
     realization = play(texts, chosen.play_options(options.read_scene(chosen.scene)), chosen.voice)
-    if any(speaking.utterance.pcm is None for speaking in realization.speaking):
+    if any(speaking.utterance.pcm is None for speaking in realization.speeches):
         options.tell_silence(chosen.voice)
     options.tell(realization.warnings)
     if writer is None:
@@ -134,7 +134,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
         sys.stdout.write("\n")
         sys.stdout.flush()
     elif output is not None:
-        if not realization.plays:
+        if not realization.has_content:
             click.echo(f"{output}: not written, as there is nothing to play", err=True)
             return 1
         try:
@@ -153,7 +153,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
                 f"{output}: {realization.duration:.2f} s, {realization.frames} frames at {chosen.fps:g} fps"
             )
             click.echo(words, err=True)
-    return 1 if realization.refused or (strict and any(s.dropped for s in realization.schedules)) else 0
+    return 1 if realization.refusals or (strict and any(s.dropped for s in realization.schedules)) else 0
 
 
 @click.command()
@@ -262,7 +262,7 @@ def _lines(player: Player, accepted: list[Schedule]) -> list[BlockLine]:
     """The blocks of these schedules as charts and their data show them."""
     from realizer.charts.chart_data import lines_of
 
-    return lines_of(player.cast, accepted)
+    return lines_of(player.blocks, accepted)
 
 
 def _table(planned: Schedule) -> str:

@@ -11,7 +11,7 @@ from realizer.outputs import speech_spans
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.active_block import Speaking
+    from realizer.playback.active_block import ScheduledSpeech
     from realizer.realization import Realization
 
 # As subtitles are usually made: about 40 letters a line, a new one where the voice rests.
@@ -32,7 +32,7 @@ STYLE = (
 
 def captions(realization: Realization) -> tuple[Span, ...]:
     """Spans in order that do not overlap; what is said at once stands in lines of its own."""
-    lines = [line for speaking in realization.speaking for line in _lines(speaking)]
+    lines = [line for speaking in realization.speeches for line in _lines(speaking)]
     bounds = sorted({time for line in lines for time in (line.start, line.end)})
     found = []
     for start, end in pairwise(bounds):
@@ -42,7 +42,7 @@ def captions(realization: Realization) -> tuple[Span, ...]:
     return tuple(found)
 
 
-def _lines(speaking: Speaking) -> Iterator[Span]:
+def _lines(speaking: ScheduledSpeech) -> Iterator[Span]:
     """The words of an utterance by the line; each stays a little, but not into the next."""
     lines: list[Span] = []
     for word in speech_spans.words(speaking):

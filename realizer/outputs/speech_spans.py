@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from realizer.playback.active_block import Speaking
+    from realizer.playback.active_block import ScheduledSpeech
     from realizer.realization import Realization
     from realizer.speech.utterance import Phoneme, Word
 
@@ -23,12 +23,12 @@ class Span:
     text: str
 
 
-def words(speaking: Speaking) -> Iterator[Span]:
+def words(speaking: ScheduledSpeech) -> Iterator[Span]:
     """The words of one utterance, in order, as far as it sounds."""
     return _heard(speaking, ((word, word.text) for word in speaking.utterance.words))
 
 
-def phonemes(speaking: Speaking) -> Iterator[Span]:
+def phonemes(speaking: ScheduledSpeech) -> Iterator[Span]:
     """Its phonemes, as they are written in IPA; pauses are left out."""
     return _heard(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
 
@@ -44,7 +44,7 @@ def points(realization: Realization) -> tuple[tuple[float, str], ...]:
     return tuple(sorted(found))
 
 
-def _heard(speaking: Speaking, told: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
+def _heard(speaking: ScheduledSpeech, told: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
     for part, text in told:
         start = speaking.start + part.start
         end = min(speaking.start + part.end, speaking.until)

@@ -18,7 +18,7 @@ from realizer.outputs.output import Drawing, Output
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
-    from realizer.playback.active_block import Speaking
+    from realizer.playback.active_block import ScheduledSpeech
     from realizer.realization import Realization
 
 RATE = 22050  # Hz; what TalkingHead takes PCM for where nobody says otherwise
@@ -39,11 +39,11 @@ def encode_talkinghead(realization: Realization) -> str:
     each; `markers` the names of sync points, to be replaced by functions where they are wanted; `audio`, to
     be handed over as `[bytes]`, is base64 of 16-bit mono PCM at `sampleRate`.
     """
-    mine = tuple(s for s in realization.speaking if s.character == 0)
+    mine = tuple(s for s in realization.speeches if s.character == 0)
     words = [word for speaking in mine for word in speech_spans.words(speaking)]
     visemes = [viseme for speaking in mine for viseme in _visemes(speaking)]
     points = speech_spans.points(realization)
-    sound = replace(realization, speaking=mine).sound(RATE)
+    sound = replace(realization, speeches=mine).sound(RATE)
     content = {
         **_timed("words", "w", words),
         **_timed("visemes", "v", visemes),
@@ -69,7 +69,7 @@ def _timed(name: str, letter: str, spans: Iterable[Span]) -> dict[str, Any]:
     }
 
 
-def _visemes(speaking: Speaking) -> Iterator[Span]:
+def _visemes(speaking: ScheduledSpeech) -> Iterator[Span]:
     """The strongest viseme of each sound; neighbours that are the same are one."""
     names = {row.viseme: NAMES.get(row.name, row.name) for row in oculus_visemes()}
     now: Span | None = None

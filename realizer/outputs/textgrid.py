@@ -25,7 +25,7 @@ def encode_textgrid(realization: Realization) -> str:
     end = max([realization.duration, 1 / realization.fps, *_ends(realization)])
     tiers = []
     for index, name in enumerate(realization.characters):
-        mine = [speaking for speaking in realization.speaking if speaking.character == index]
+        mine = [speaking for speaking in realization.speeches if speaking.character == index]
         mine.sort(key=lambda speaking: speaking.start)
         prefix = f"{name or index} " if index else ""
         tiers.append(_intervals(f"{prefix}words", end, (w for s in mine for w in speech_spans.words(s))))
@@ -89,7 +89,7 @@ def _head(kind: str, name: str, end: float) -> list[str]:
 
 
 def _ends(realization: Realization) -> Iterator[float]:
-    for speaking in realization.speaking:
+    for speaking in realization.speeches:
         for spans in (speech_spans.words(speaking), speech_spans.phonemes(speaking)):
             yield from (span.end for span in spans)
     yield from (time for time, _ in speech_spans.points(realization))

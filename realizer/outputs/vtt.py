@@ -47,7 +47,7 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
 
 
 def _cues(realization: Realization) -> Iterator[_Cue]:
-    for speaking in realization.speaking:
+    for speaking in realization.speeches:
         for kind, spans in (
             ("word", speech_spans.words(speaking)),
             ("phoneme", speech_spans.phonemes(speaking)),

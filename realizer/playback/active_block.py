@@ -10,18 +10,18 @@ import numpy as np
 from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel, Gain, Layer, later
 from realizer.animation.crossfade import joined
-from realizer.behaviours.kind import Kind, World
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core.array_types import Float64
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent, State, next_state
-from realizer.playback.character import RELAX, Shift
-from realizer.playback.references import abroad
+from realizer.playback.character import RELAX, BaseShift
+from realizer.playback.references import external_refs
 from realizer.playback.resources import claims
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Utterance
 
 # Sound and lips stop faster than a face relaxes, so that a barge-in is heard at once.
-HUSH = 0.12  # s
+SPEECH_FADE = 0.12  # s
 # Times that differ by less are the same, solved again.
 SAME = 1e-9  # s
 # A word that lacks no more than this has sounded to its end.
@@ -29,7 +29,7 @@ HEARD = 1e-4  # s
 
 
 @dataclass(frozen=True, eq=False)
-class Speaking:
+class ScheduledSpeech:
     """An utterance that sounds from `start` on, cut off (with a short fade) at `until` if that is sooner."""
 
     start: float
@@ -38,7 +38,7 @@ class Speaking:
     character: int
     gains: tuple[Gain, ...] = ()
 
-    def whole(self, now: float) -> bool:
+    def is_complete(self, now: float) -> bool:
         """Whether it has sounded to its end."""
         return min(self.until, now) >= self.start + self.utterance.duration - HEARD
 
@@ -49,57 +49,57 @@ class Speaking:
 
 
 @dataclass(frozen=True, eq=False)
-class Wait:
+class Dependency:
     """A block does not start before another one has ended, or subsides."""
 
-    block: Playing
+    block: ActiveBlock
     subsiding: bool = False
 
     @property
     def until(self) -> float:
-        return self.block.subsides if self.subsiding else self.block.end
+        return self.block.subsides_at if self.subsiding else self.block.end
 
 
 @dataclass(eq=False)
-class Playing:
+class ActiveBlock:
     """A block that was accepted, until it has ended and its last frames are past.
 
     Attributes:
         plan: its schedule has the start; inf while that is not known (it was not activated).
-        world: what it was planned with.
+        context: what it was planned with.
         character: whose face it moves.
         number: order of acceptance.
         order: at one instant it reports before blocks of a higher one.
-        floor: it does not start sooner, seconds on the session clock.
-        waits: nor before these; empty once it has started.
+        not_before: it does not start sooner, seconds on the session clock.
+        dependencies: nor before these; empty once it has started.
         followers: the blocks that wait for it.
-        stopped: when it was cut off.
-        abroad: its references into other blocks.
-        first: its schedule as it was when the block was accepted.
+        stopped_at: when it was cut off.
+        external_refs: its references into other blocks.
+        first_schedule: its schedule as it was when the block was accepted.
         channels, shifts, speech: by behaviour, on the session clock; empty while the start is not known.
     """
 
     plan: Plan
-    kinds: Mapping[str, Kind]
-    world: World
+    kinds: Mapping[str, BehaviourKind]
+    context: PlanningContext
     character: int
     number: int
-    floor: float
-    waits: list[Wait] = field(default_factory=list)
+    not_before: float
+    dependencies: list[Dependency] = field(default_factory=list)
     state: State = State.LURKING
-    stopped: float | None = None
+    stopped_at: float | None = None
     channels: dict[str, tuple[Channel, ...]] = field(default_factory=dict)
-    shifts: dict[str, Shift] = field(default_factory=dict)
-    speech: dict[str, Speaking] = field(default_factory=dict)
-    followers: list[Playing] = field(default_factory=list)
+    shifts: dict[str, BaseShift] = field(default_factory=dict)
+    speech: dict[str, ScheduledSpeech] = field(default_factory=dict)
+    followers: list[ActiveBlock] = field(default_factory=list)
     order: int = 0
-    abroad: tuple[SyncRef, ...] = field(init=False)
-    first: Schedule = field(init=False)
+    external_refs: tuple[SyncRef, ...] = field(init=False)
+    first_schedule: Schedule = field(init=False)
 
     def __post_init__(self) -> None:
-        self.first = self.plan.schedule
-        self.abroad = abroad(self.block)
-        for wait in self.waits:
+        self.first_schedule = self.plan.schedule
+        self.external_refs = external_refs(self.block)
+        for wait in self.dependencies:
             wait.block.followers.append(self)
 
     @property
@@ -113,22 +113,22 @@ class Playing:
     @property
     def latest(self) -> Schedule:
         """What has become of `first`, with the warnings of both."""
-        first = self.first
+        first = self.first_schedule
         if self.start == float("inf"):
             return first
         more = tuple(w for w in self.schedule.warnings if w not in first.warnings)
         return replace(self.schedule, warnings=first.warnings + more)
 
     @property
-    def begun(self) -> bool:
+    def has_begun(self) -> bool:
         return self.state in (State.IN_EXEC, State.SUBSIDING)
 
     @property
-    def done(self) -> bool:
+    def is_done(self) -> bool:
         return self.state in (State.DONE, State.INTERRUPTED, State.REVOKED)
 
     @property
-    def waiting(self) -> bool:
+    def is_waiting(self) -> bool:
         """It was not started yet."""
         return self.state in (State.PENDING, State.LURKING)
 
@@ -140,27 +140,27 @@ class Playing:
     @property
     def end(self) -> float:
         """When its end is due."""
-        return self.schedule.end if self.stopped is None else self.stopped
+        return self.schedule.end if self.stopped_at is None else self.stopped_at
 
-    def said(self, now: float) -> str | None:
+    def words_spoken(self, now: float) -> str | None:
         """Where its speech was cut off: all words that have sounded to their end; None where it was not."""
-        spoken = [b for b in self.world.utterances if b in self.first.times]
+        spoken = [b for b in self.context.utterances if b in self.first_schedule.times]
         heard = [self.speech[b] for b in spoken if b in self.speech]
-        if len(heard) == len(spoken) and all(s.whole(now) for s in heard):
+        if len(heard) == len(spoken) and all(s.is_complete(now) for s in heard):
             return None
         order = sorted(heard, key=lambda s: s.start)
         return " ".join(word for s in order for word in s.words(now))
 
     @property
-    def gone(self) -> float:
+    def invisible_after(self) -> float:
         """When nothing of it is to be seen any more."""
         return self.end + (RELAX if self.state is State.INTERRUPTED else 0.0)
 
     @property
-    def subsides(self) -> float:
+    def subsides_at(self) -> float:
         """When every behaviour is past its relax, or its end where it has no relax."""
-        if self.stopped is not None:
-            return self.stopped
+        if self.stopped_at is not None:
+            return self.stopped_at
         last = 0.0
         for points, times in zip(self.schedule.points.values(), self.schedule.times.values(), strict=True):
             last = max(last, float(times[points.index("relax") if "relax" in points else -1]))
@@ -171,21 +171,21 @@ class Playing:
         """When it may start: inf while it is not activated, or waits for one that is not."""
         if self.state is State.PENDING:
             return float("inf")
-        return max([self.floor, *(wait.until for wait in self.waits)])
+        return max([self.not_before, *(wait.until for wait in self.dependencies)])
 
     def change_state(self, event: BlockEvent) -> None:
         """Take the state that follows from an event."""
         self.state = next_state(self.state, event)
 
-    def await_too(self, wait: Wait) -> None:
+    def add_dependency(self, wait: Dependency) -> None:
         """Wait for one more block."""
-        self.waits.append(wait)
+        self.dependencies.append(wait)
         wait.block.followers.append(self)
 
-    def lay(self, plan: Plan, start: float) -> None:
+    def apply_plan(self, plan: Plan, start: float) -> None:
         """Take a plan, or the one it has, and a start: everything comes to stand on the session clock."""
         if plan.block is not self.block:
-            self.abroad = abroad(plan.block)
+            self.external_refs = external_refs(plan.block)
         if start != plan.schedule.start:
             late = start - plan.schedule.start
             held = tuple(claim.shifted(late) for claim in plan.claims)
@@ -200,13 +200,13 @@ class Playing:
             own = self._placed(behaviour, plan.channels.get(behaviour, ()))
             begin, end = start + float(times[0]), start + float(times[-1])
             if kind.region is not None:
-                self.shifts[behaviour] = Shift.of(begin, end, kind.region, own)
+                self.shifts[behaviour] = BaseShift.of(begin, end, kind.region, own)
             elif own:
                 self.channels[behaviour] = own
-            sound = kind.sound(node, self.world)
+            sound = kind.sound(node, self.context)
             if sound is not None:
                 whole = end - begin >= sound.duration - 1e-6
-                self.speech[behaviour] = Speaking(
+                self.speech[behaviour] = ScheduledSpeech(
                     begin, float("inf") if whole else end, sound, self.character
                 )
 
@@ -236,14 +236,16 @@ class Playing:
         self.plan = replace(self.plan, schedule=own)
         for behaviour in changed:
             node = self.block[behaviour]
-            shown = self.kinds[node.tag].expand(node, times[behaviour], self.world)
+            shown = self.kinds[node.tag].expand(node, times[behaviour], self.context)
             new = self._placed(behaviour, shown)
             begun = self.start + float(before.times[behaviour][0]) < now
             region = self.kinds[node.tag].region
             if region is not None:
                 old = self.shifts[behaviour].channels
                 begin, end = (self.start + float(times[behaviour][k]) for k in (0, -1))
-                self.shifts[behaviour] = Shift.of(begin, end, region, joined(old, new, now) if begun else new)
+                self.shifts[behaviour] = BaseShift.of(
+                    begin, end, region, joined(old, new, now) if begun else new
+                )
             elif new:
                 old = self.channels.get(behaviour, ())
                 self.channels[behaviour] = joined(old, new, now) if begun else new
@@ -251,17 +253,17 @@ class Playing:
                 late = float(times[behaviour][0]) - float(before.times[behaviour][0])
                 heard = self.speech[behaviour]
                 self.speech[behaviour] = replace(heard, start=heard.start + late, until=heard.until + late)
-        self.plan = replace(self.plan, claims=tuple(claims(self.block, own, self.kinds, self.world)))
+        self.plan = replace(self.plan, claims=tuple(claims(self.block, own, self.kinds, self.context)))
         return changed
 
-    def respeak(self, behaviour: str, utterance: Utterance, now: float) -> None:
+    def update_speech(self, behaviour: str, utterance: Utterance, now: float) -> None:
         """Take another utterance of a speech; its points that have passed stay where they were.
 
         The schedule is as before: `retime` gives it the times that follow.
         """
-        self.world = replace(self.world, utterances={**self.world.utterances, behaviour: utterance})
+        self.context = replace(self.context, utterances={**self.context.utterances, behaviour: utterance})
         node = self.block[behaviour]
-        wanted = self.kinds[node.tag].timing(node, self.world)
+        wanted = self.kinds[node.tag].timing(node, self.context)
         was = dict(zip(self.schedule.points[behaviour], self.schedule.times[behaviour], strict=True))
         local = now - self.start
         at: list[float] = []
@@ -304,7 +306,7 @@ class Playing:
             elif local < at[-1]:
                 points[behaviour], times[behaviour] = self._cut_times(behaviour, names, at, local, ends)
                 self.channels[behaviour] = tuple(
-                    c.faded(now, now + (HUSH if c.layer is Layer.SPEECH else RELAX))
+                    c.faded(now, now + (SPEECH_FADE if c.layer is Layer.SPEECH else RELAX))
                     for c in self.channels.get(behaviour, ())
                 )
                 if behaviour in self.speech:
@@ -314,7 +316,7 @@ class Playing:
         timings = {b: timing for b, timing in self.plan.timings.items() if b not in behaviours}
         schedule = replace(self.schedule, points=points, times=times)
         # A block that waits may be planned anew.
-        block = without(self.block, never).block if never and self.waiting else self.block
+        block = without(self.block, never).block if never and self.is_waiting else self.block
         self.plan = replace(self.plan, block=block, schedule=schedule, claims=left, timings=timings)
 
     def _cut_times(
@@ -324,7 +326,7 @@ class Playing:
         if "relax" in names:
             kept.setdefault("relax", local)
         shown = "relax" in names or behaviour in self.channels or behaviour in self.shifts
-        relax = 0.0 if ends else HUSH if behaviour in self.speech else RELAX if shown else 0.0
+        relax = 0.0 if ends else SPEECH_FADE if behaviour in self.speech else RELAX if shown else 0.0
         kept["end"] = min(local + relax, float(at[-1]))
         return tuple(kept), np.array(list(kept.values()))
 
@@ -337,7 +339,7 @@ class Playing:
             own = self.channels.get(behaviour, ())
             self.channels[behaviour] = tuple(replace(c, gains=(*c.gains, *gains)) for c in own)
 
-    def moving(self) -> Iterator[Channel]:
+    def moving_channels(self) -> Iterator[Channel]:
         """Its channels that are not base states."""
         for own in self.channels.values():
             yield from own

@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bml_schema import Block
-from realizer.playback.active_block import Wait
+from realizer.playback.active_block import Dependency
 from realizer.playback.block_states import BlockEvent, State, next_state
 
 
 @dataclass(eq=False)
-class Fate:
+class AnnouncedBlock:
     """What was done to a block before it came.
 
     Attributes:
         state: IN_PREP, or REVOKED where it was ended; that was reported.
         activated: it need not wait for activation.
-        waits: what was put before it.
+        dependencies: what was put before it.
     """
 
     block: Block
     state: State = State.IN_PREP
     activated: bool = False
-    waits: list[Wait] = field(default_factory=list)
+    dependencies: list[Dependency] = field(default_factory=list)
 
     @property
     def revoked(self) -> bool:
@@ -33,25 +33,25 @@ class Fate:
         self.state = next_state(self.state, event)
 
 
-class Expected:
+class AnnouncedBlocks:
     """The announced blocks of a session, by id."""
 
     def __init__(self) -> None:
-        self._fates: dict[str, Fate] = {}
+        self._blocks: dict[str, AnnouncedBlock] = {}
 
     def __len__(self) -> int:
-        return len(self._fates)
+        return len(self._blocks)
 
     def __contains__(self, id: str) -> bool:
-        return id in self._fates
+        return id in self._blocks
 
     def add(self, block: Block) -> None:
-        self._fates[block.id] = Fate(block)
+        self._blocks[block.id] = AnnouncedBlock(block)
 
-    def fate(self, id: str) -> Fate | None:
+    def get(self, id: str) -> AnnouncedBlock | None:
         """Of a block that is still to come."""
-        return self._fates.get(id)
+        return self._blocks.get(id)
 
-    def arrive(self, block: Block) -> Fate:
+    def pop(self, block: Block) -> AnnouncedBlock:
         """A block is here, or will not come: what was done to it until now."""
-        return self._fates.pop(block.id, None) or Fate(block)
+        return self._blocks.pop(block.id, None) or AnnouncedBlock(block)

@@ -6,13 +6,13 @@ import numpy as np
 
 from realizer.animation.curves import gain_at
 from realizer.core.array_types import Float32, Int16
-from realizer.playback.active_block import Speaking
+from realizer.playback.active_block import ScheduledSpeech
 
 # Cut-off speech fades this long, so that it does not click, and is over in 50 ms with a packet cut in two.
 CUT = 0.04  # s
 
 
-def heard(speaking: Speaking, rate: int) -> Float32:
+def render_utterance(speaking: ScheduledSpeech, rate: int) -> Float32:
     """(n,) float32: the sound of an utterance at a rate, cut off and faded where it was stopped.
 
     Films and streams are made from it alike. The utterance must have sound.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 from realizer.animation.channel import Gain
-from realizer.behaviours.kind import Act, Activate, Change, Interrupt
-from realizer.playback.active_block import Playing
-from realizer.playback.timeline import Course
+from realizer.behaviours.kind import Activate, BlockCommand, Change, Interrupt
+from realizer.playback.active_block import ActiveBlock
+from realizer.playback.timeline import BlockTimeline
 
 # "At once" takes this long on a face, so that it does not jump, and in a sound, so that it does not click.
 AT_ONCE = {False: 0.1, True: 0.02}  # s
@@ -16,20 +16,20 @@ AT_ONCE = {False: 0.1, True: 0.02}  # s
 class Blocks(Protocol):
     """The blocks of a session, as far as a command changes them."""
 
-    course: Course
+    timeline: BlockTimeline
 
     def activate(self, id: str, now: float) -> bool: ...
 
     def revoke(self, id: str, now: float) -> bool: ...
 
-    def knew(self, id: str) -> bool: ...
+    def has_seen(self, id: str) -> bool: ...
 
 
-class ActFault(Exception):
+class CommandError(Exception):
     """What could not be done; the text says what was wanted and what there was."""
 
 
-def perform(blocks: Blocks, playing: Playing, behaviour: str, act: Act, now: float) -> None:
+def execute(blocks: Blocks, playing: ActiveBlock, behaviour: str, act: BlockCommand, now: float) -> None:
     """Do what a behaviour of a playing block is there for.
 
     Raises:
@@ -40,45 +40,47 @@ def perform(blocks: Blocks, playing: Playing, behaviour: str, act: Act, now: flo
             _interrupt(blocks, act, now)
         case Activate(block):
             if not blocks.activate(block, now):
-                raise ActFault(f"target: wanted a block that was preplanned and waits, got {block!r}")
+                raise CommandError(f"target: wanted a block that was preplanned and waits, got {block!r}")
         case Change():
             until = playing.start + float(playing.schedule.times[behaviour][-1])
             _change(blocks, act, now, until)
 
 
 def _interrupt(blocks: Blocks, act: Interrupt, now: float) -> None:
-    target = blocks.course.cast.find(act.block)
+    target = blocks.timeline.blocks.find(act.block)
     if target is None:
-        if not blocks.revoke(act.block, now) and not blocks.knew(act.block):
-            raise ActFault(f"target: wanted a block, got {act.block!r}, of which nothing was heard")
+        if not blocks.revoke(act.block, now) and not blocks.has_seen(act.block):
+            raise CommandError(f"target: wanted a block, got {act.block!r}, of which nothing was heard")
         return
     named = set(target.schedule.times)
     if act.include is not None and (strange := act.include - named):
-        raise ActFault(f"include: no behaviour {sorted(strange)[0]!r} plays in {act.block}")
+        raise CommandError(f"include: no behaviour {sorted(strange)[0]!r} plays in {act.block}")
     chosen = (named if act.include is None else act.include) - act.exclude
     left = target.unfinished(now)
     if (act.include is None and not act.exclude) or (left and left <= chosen):
-        blocks.course.stop(target, now)
+        blocks.timeline.stop(target, now)
     elif left & chosen:
-        blocks.course.cut(target, left & chosen, now)
+        blocks.timeline.cut(target, left & chosen, now)
 
 
 def _change(blocks: Blocks, act: Change, now: float, until: float) -> None:
-    target = blocks.course.cast.find(act.block)
-    if target is None or act.behaviour not in target.unfinished(now) or not target.begun:
-        raise ActFault(f"target: wanted a behaviour that plays, got {act.block}:{act.behaviour}")
+    target = blocks.timeline.blocks.find(act.block)
+    if target is None or act.behaviour not in target.unfinished(now) or not target.has_begun:
+        raise CommandError(f"target: wanted a behaviour that plays, got {act.block}:{act.behaviour}")
     node = target.block[act.behaviour]
     known = target.kinds[node.tag].parameters
     if act.parameter not in known:
         there = ", ".join(sorted(known)) or "none"
-        raise ActFault(f"paramId: {act.block}:{act.behaviour} has {there}, got {act.parameter!r}")
+        raise CommandError(f"paramId: {act.block}:{act.behaviour} has {there}, got {act.parameter!r}")
     usual = known[act.parameter]
     whole = float(getattr(node, usual) if isinstance(usual, str) else usual)
     if whole <= 0.0:
-        raise ActFault(f"{act.parameter}: wanted one that was above 0, got {act.block}:{act.behaviour} at 0")
+        raise CommandError(
+            f"{act.parameter}: wanted one that was above 0, got {act.block}:{act.behaviour} at 0"
+        )
     sound = act.parameter == "volume"
     if act.to < 0 or (act.initial or 0) < 0:
-        raise ActFault(f"{act.parameter}: wanted 0 or more, got {min(act.to, act.initial or 0):g}")
+        raise CommandError(f"{act.parameter}: wanted 0 or more, got {min(act.to, act.initial or 0):g}")
     soon = now + AT_ONCE[sound]
     gains = [] if act.initial is None else [Gain(now, soon, act.initial / whole)]
     if act.curve is None or until <= soon:
@@ -86,4 +88,4 @@ def _change(blocks: Blocks, act: Change, now: float, until: float) -> None:
     else:
         gains.append(Gain(soon if gains else now, until, act.to / whole, act.curve))
     target.scale(act.behaviour, gains, sound=sound)
-    blocks.course.changed()
+    blocks.timeline.mark_changed()

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from bml_schema import Block, SyncRef
-from realizer.playback.active_block import Playing, Wait
-from realizer.playback.resources import Claim
+from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.resources import ResourceClaim
 from realizer.scheduling.timing import Schedule
 
 FOREVER = float("inf")
 
 
-def awaited(block: Block, character: int, alive: Collection[Playing]) -> list[Wait]:
+def dependencies(block: Block, character: int, alive: Collection[ActiveBlock]) -> list[Dependency]:
     """What a block waits for: BML 1.0's APPEND, all of its character that is known now; BMLA's lists.
 
     Of blocks that wait for each other only the last is named: it ends when all of them have.
@@ -26,9 +26,9 @@ def awaited(block: Block, character: int, alive: Collection[Playing]) -> list[Wa
         if p.block.id in block.append_after
         or (block.composition == "APPEND" and p.character == character and p.start < FOREVER)
     ]
-    before = {id(wait.block) for p in named for wait in p.waits if not wait.subsiding}
-    waits = [Wait(p) for p in named if id(p) not in before]
-    return waits + [Wait(p, subsiding=True) for p in alive if p.block.id in block.chunk_after]
+    before = {id(wait.block) for p in named for wait in p.dependencies if not wait.subsiding}
+    waits = [Dependency(p) for p in named if id(p) not in before]
+    return waits + [Dependency(p, subsiding=True) for p in alive if p.block.id in block.chunk_after]
 
 
 def followers(block: Block) -> list[tuple[str, bool]]:
@@ -36,13 +36,15 @@ def followers(block: Block) -> list[tuple[str, bool]]:
     return [(id, False) for id in block.prepend_before] + [(id, True) for id in block.chunk_before]
 
 
-def ended(block: Block, character: int, alive: Iterable[Playing]) -> list[Playing]:
+def blocks_to_end(block: Block, character: int, alive: Iterable[ActiveBlock]) -> list[ActiveBlock]:
     """The blocks that this one ends when it is taken in: those it interrupts, or replaces."""
     replaces = block.composition == "REPLACE"
     return [p for p in alive if p.block.id in block.interrupt or (replaces and p.character == character)]
 
 
-def held(character: int, alive: Iterable[Playing], without: Iterable[Playing] = ()) -> list[Claim]:
+def existing_claims(
+    character: int, alive: Iterable[ActiveBlock], without: Iterable[ActiveBlock] = ()
+) -> list[ResourceClaim]:
     """What the blocks of a character need for themselves, on the session clock."""
     gone = {id(p) for p in without}
     return [
@@ -53,31 +55,31 @@ def held(character: int, alive: Iterable[Playing], without: Iterable[Playing] = 
     ]
 
 
-def before(waits: Iterable[Wait]) -> set[int]:
+def all_dependencies(waits: Iterable[Dependency]) -> set[int]:
     """The id() of every block that is waited for, by any chain."""
     todo = [wait.block for wait in waits]
     found = {id(p) for p in todo}
     while todo:
-        more = [w.block for w in todo.pop().waits if id(w.block) not in found]
+        more = [w.block for w in todo.pop().dependencies if id(w.block) not in found]
         found.update(map(id, more))
         todo += more
     return found
 
 
-def instants(
+def external_times(
     schedule_of: Callable[[str], Schedule | None],
     start: float,
-    otherwise: Callable[[str], Schedule | None] = lambda id: None,
+    fallback: Callable[[str], Schedule | None] = lambda id: None,
 ) -> Callable[[SyncRef], float | None]:
     """Sync points of other blocks: a reference -> seconds from `start`, None where that is not known.
 
     Args:
         schedule_of: block id -> its schedule, `start` on the session clock; None where there is none.
-        otherwise: where the points are looked for that the schedule does not have any more.
+        fallback: where the points are looked for that the schedule does not have any more.
     """
 
     def instant(ref: SyncRef) -> float | None:
-        for look in (schedule_of, otherwise):
+        for look in (schedule_of, fallback):
             schedule = look(ref.block or "")
             if schedule is None or schedule.start == FOREVER:
                 return None
@@ -99,8 +101,8 @@ def _time(ref: SyncRef, schedule: Schedule) -> float | None:
         return None
 
 
-def stopped(
-    schedule_of: Callable[[str], Schedule | None], blocks: Iterable[Playing], now: float
+def with_stops(
+    schedule_of: Callable[[str], Schedule | None], blocks: Iterable[ActiveBlock], now: float
 ) -> Callable[[str], Schedule | None]:
     """`schedule_of` as it is when some blocks are stopped at `now`: nothing of them is later."""
     gone = {p.block.id for p in blocks}

@@ -7,11 +7,11 @@ from dataclasses import replace
 from itertools import islice
 
 from bml_schema import Block, Feedback
-from realizer.behaviours.kind import Act, Kind, World
+from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
 from realizer.playback import block_links
-from realizer.playback.active_block import Playing, Wait
-from realizer.playback.announced_blocks import Expected, Fate
-from realizer.playback.block_commands import ActFault, perform
+from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks
+from realizer.playback.block_commands import CommandError, execute
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
 from realizer.playback.feedback_events import (
@@ -22,8 +22,8 @@ from realizer.playback.feedback_events import (
     progress,
     sync_progress,
 )
-from realizer.playback.replanning import anticipated, lead
-from realizer.playback.timeline import Course
+from realizer.playback.replanning import anticipators_of, lead_time
+from realizer.playback.timeline import BlockTimeline
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Utterance
 
@@ -32,205 +32,207 @@ FOREVER = float("inf")
 ANTICIPATORS = 2_000
 
 
-class Ensemble:
+class BlockManager:
     """The blocks of one session, and the feedback they owe.
 
     Args:
         kinds: tag -> Kind.
         characters: whose base states the blocks shift; shared with who made them.
-        refuses: (block, what was planned) -> why it is not to be played; None where it is.
+        veto: (block, what was planned) -> why it is not to be played; None where it is.
 
     Attributes:
-        course: when the accepted ones play.
-        cast: the blocks.
+        timeline: when the accepted ones play.
+        blocks: the blocks.
         reports: the feedback that is owed.
     """
 
     def __init__(
         self,
-        kinds: Mapping[str, Kind],
+        kinds: Mapping[str, BehaviourKind],
         characters: Sequence[Character],
-        refuses: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
+        veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
         self.kinds = kinds
-        self._refuses = refuses
-        self.course = Course(kinds, characters)
-        self.cast = self.course.cast
-        self.reports = self.course.reports
-        self._expected = Expected()
+        self._veto = veto
+        self.timeline = BlockTimeline(kinds, characters)
+        self.blocks = self.timeline.blocks
+        self.reports = self.timeline.reports
+        self._announced = AnnouncedBlocks()
 
     # blocks in ----------------------------------------------------------------------------------
 
     def announce(self, block: Block, character: int, now: float) -> None:
         """Acknowledge a block, once."""
-        if block.id in self._expected or self._in_use(block, character):
+        if block.id in self._announced or self._in_use(block, character):
             return
-        self._expected.add(block)
-        start = max([now, *(w.until for w in self._waits(block, character))])
-        self.reports.tell(acknowledgement(block, now if start == FOREVER else start))
+        self._announced.add(block)
+        start = max([now, *(w.until for w in self._dependencies(block, character))])
+        self.reports.add(acknowledgement(block, now if start == FOREVER else start))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Give up a block that was announced."""
-        fate = self._expected.arrive(block)
+        fate = self._announced.pop(block)
         if not fate.revoked:
             self._revoke(fate, now)
 
-    def submit(self, block: Block, character: int, world: World, now: float) -> Schedule:
+    def submit(self, block: Block, character: int, context: PlanningContext, now: float) -> Schedule:
         """Plan a block and take it in, or refuse it."""
         self.advance(now)
         self.announce(block, character, now)
         try:
             if self._in_use(block, character):
                 text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
-                raise _Refused(Warning(block.id, "PARSING_FAILURE", text))
+                raise _Rejection(Warning(block.id, "PARSING_FAILURE", text))
             waits, behind = self._links(block, character)
-        except _Refused as refused:
-            self._expected.arrive(block)
+        except _Rejection as refused:
+            self._announced.pop(block)
             return self._refuse(block, refused.warning, now)
-        fate = self._expected.fate(block.id) or Fate(block)
+        fate = self._announced.get(block.id) or AnnouncedBlock(block)
         if fate.revoked:
-            self._expected.arrive(block)
+            self._announced.pop(block)
             return Schedule(block.id, {}, {}, start=now, failed=True)
-        ended = block_links.ended(block, character, self.cast.alive())
+        ended = block_links.blocks_to_end(block, character, self.blocks.active())
         pending = block.preplan and not fate.activated
         start = FOREVER if pending else max([now, *(w.until for w in waits)])
-        planned, others = self.course.plan(block, character, world, start, now, waits=waits, ended=ended)
+        planned, others = self.timeline.plan(block, character, context, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
-        self._expected.arrive(block)
+        self._announced.pop(block)
         if planned.schedule.failed:
             return self._refuse(block, planned.schedule.warnings[0], now)
-        if (words := self._refuses(block, planned.schedule)) is not None:
+        if (words := self._veto(block, planned.schedule)) is not None:
             return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
         for earlier in ended:
-            self.course.stop(earlier, now)
+            self.timeline.stop(earlier, now)
         for name in block.interrupt:
             self.revoke(name, now)
         state = next_state(fate.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
-        playing = Playing(planned, self.kinds, world, character, self.cast.next_number, now, waits, state)
-        playing.lay(planned, playing.earliest)  # what it waited for may just have been ended by itself
-        self.cast.add(playing)
-        self.course.set_out(playing)
-        for follower, subsiding in ((p, s) for p, s in behind if not p.done):
-            follower.await_too(Wait(playing, subsiding))
-            self.course.line_up(follower)
+        playing = ActiveBlock(
+            planned, self.kinds, context, character, self.blocks.next_number, now, waits, state
+        )
+        playing.apply_plan(planned, playing.earliest)  # what it waited for may just have been ended by itself
+        self.blocks.add(playing)
+        self.timeline.place(playing)
+        for follower, subsiding in ((p, s) for p, s in behind if not p.is_done):
+            follower.add_dependency(Dependency(playing, subsiding))
+            self.timeline.reorder(follower)
         for name, subsiding in block_links.followers(block):
-            if (coming := self._expected.fate(name)) is not None:
-                coming.waits.append(Wait(playing, subsiding))
-        self.course.predict(playing, now)
+            if (coming := self._announced.get(name)) is not None:
+                coming.dependencies.append(Dependency(playing, subsiding))
+        self.timeline.predict(playing, now)
         for warning in planned.schedule.warnings:
             self.reports.warn(warning, block.character_id)
-        self.course.retime(others, planned.moved, now)
-        self.course.follow(playing, now)
+        self.timeline.retime(others, planned.other_schedules, now)
+        self.timeline.update_followers(playing, now)
         return planned.schedule
 
     # time ---------------------------------------------------------------------------------------
 
     def advance(self, now: float) -> None:
         """Let everything happen that is due, in order, each thing at its own time."""
-        for event in self.course.calendar.due(now):
-            self._happens(event, self.cast[event.block])
+        for event in self.timeline.events.due(now):
+            self._handle_event(event, self.blocks[event.block])
 
     def due(self, now: float) -> list[Feedback]:
         self.advance(now)
-        return self.reports.take()
+        return self.reports.take_all()
 
     def next_deadline(self) -> float | None:
-        return float("-inf") if self.reports else self.course.calendar.next
+        return float("-inf") if self.reports else self.timeline.events.next
 
-    def resting(self, now: float = -FOREVER) -> bool:
+    def is_idle(self, now: float = -FOREVER) -> bool:
         """Nothing plays, waits, is expected or owed, and of what has ended nothing is to be seen.
 
         Args:
             now: what was gone by then counts as gone, though blinks and nods may still come of it.
         """
-        seen = any(not playing.done or playing.gone > now for playing in self.cast.all())
-        return not (seen or self._expected or self.reports)
+        seen = any(not playing.is_done or playing.invisible_after > now for playing in self.blocks.all())
+        return not (seen or self._announced or self.reports)
 
-    def stirs(self, now: float, before: float) -> bool:
+    def has_due(self, now: float, before: float) -> bool:
         """Whether `due(now)` or `forget(before)` would have something."""
-        due = self.course.calendar.next
-        return (due is not None and due <= now) or self.cast.first_gone < before or bool(self.reports)
+        due = self.timeline.events.next
+        return (due is not None and due <= now) or self.blocks.first_invisible < before or bool(self.reports)
 
     def forget(self, before: float) -> bool:
         """Drop blocks of which nothing is to be seen after a time; True where there were some."""
-        gone = self.cast.forget(before)
+        gone = self.blocks.forget(before)
         for playing in gone:
-            self.course.calendar.drop(playing)
+            self.timeline.events.drop(playing)
         return bool(gone)
 
-    def _happens(self, event: Event, playing: Playing) -> None:
+    def _handle_event(self, event: Event, playing: ActiveBlock) -> None:
         block, time = playing.block, event.time
         match event.phase:
             case Phase.SYNC:
-                self.reports.tell(sync_progress(block, event.name, event.sync, time, playing.start))
+                self.reports.add(sync_progress(block, event.name, event.sync, time, playing.start))
                 if event.point == 0:
                     node = block[event.name]
-                    if (act := self.kinds[node.tag].act) is not None:
+                    if (act := self.kinds[node.tag].command) is not None:
                         self._act(playing, event.name, act(node), time)
             case Phase.START:
                 playing.change_state(BlockEvent.START)
-                playing.waits.clear()
-                self.reports.tell(progress(block, "start", time, playing.state))
-                self.reports.tell(prediction(block, playing.schedule, playing.state))
+                playing.dependencies.clear()
+                self.reports.add(progress(block, "start", time, playing.state))
+                self.reports.add(prediction(block, playing.schedule, playing.state))
                 for id in block.on_start:
                     if not self.activate(id, time):
                         text = f"onStart: wanted a block that was preplanned and waits, got {id!r}"
                         self.reports.warn(Warning(block.id, "EXECUTION_FAILURE", text), block.character_id)
             case Phase.SUBSIDES:
                 playing.change_state(BlockEvent.SUBSIDE)
-                self.reports.tell(prediction(block, playing.schedule, playing.state))
+                self.reports.add(prediction(block, playing.schedule, playing.state))
             case Phase.END:
                 playing.change_state(BlockEvent.END)
-                self.cast.end(playing)
-                self.reports.tell(progress(block, "end", time, playing.state, playing.said(time)))
+                self.blocks.end(playing)
+                self.reports.add(progress(block, "end", time, playing.state, playing.words_spoken(time)))
 
-    def _act(self, playing: Playing, behaviour: str, act: Act, now: float) -> None:
+    def _act(self, playing: ActiveBlock, behaviour: str, act: BlockCommand, now: float) -> None:
         try:
-            perform(self, playing, behaviour, act, now)
-        except ActFault as fault:
+            execute(self, playing, behaviour, act, now)
+        except CommandError as fault:
             required = behaviour in playing.block.required
             name = playing.block.id if required else f"{playing.block.id}:{behaviour}"
             text = f"{behaviour}, which is required: {fault}" if required else str(fault)
             place = playing.block.places.get(behaviour)
             text = text if place is None else place.with_place(text)
             self.reports.warn(Warning(name, "EXECUTION_FAILURE", text), playing.block.character_id)
-            if required and not playing.done:
-                self.course.stop(playing, now)
+            if required and not playing.is_done:
+                self.timeline.stop(playing, now)
 
     # what is done to blocks ---------------------------------------------------------------------
 
-    def knew(self, id: str) -> bool:
+    def has_seen(self, id: str) -> bool:
         """Whether there is or was such a block, or will be."""
-        return id in self._expected or self.cast.knew(id)
+        return id in self._announced or self.blocks.has_seen(id)
 
     def revoke(self, id: str, now: float) -> bool:
         """End a block that was announced and is not here yet; False where there is none."""
-        fate = self._expected.fate(id)
+        fate = self._announced.get(id)
         if fate is None or fate.revoked:
             return False
         self._revoke(fate, now)
         return True
 
-    def _revoke(self, fate: Fate, now: float) -> None:
+    def _revoke(self, fate: AnnouncedBlock, now: float) -> None:
         fate.change_state(BlockEvent.STOP)
-        self.reports.tell(progress(fate.block, "end", now, fate.state))
+        self.reports.add(progress(fate.block, "end", now, fate.state))
 
     def stop_all(self, now: float, ids: Collection[str] | None) -> list[str]:
         """Stop these blocks, or all; returns the ids of those that played or waited."""
         self.advance(now)
-        stopped = [p for p in self.cast.alive() if ids is None or p.block.id in ids]
+        stopped = [p for p in self.blocks.active() if ids is None or p.block.id in ids]
         # The last first: a block that waits for another need not be planned anew before it is stopped too.
         for playing in reversed(stopped):
-            if not playing.done:
-                self.course.stop(playing, now)
+            if not playing.is_done:
+                self.timeline.stop(playing, now)
         return [p.block.id for p in stopped]
 
     def activate(self, id: str, now: float) -> bool:
         """Let a preplanned block start, when what it waits for is over; False where it is none."""
-        playing = self.cast.find(id)
+        playing = self.blocks.find(id)
         if playing is None:
-            fate = self._expected.fate(id)
+            fate = self._announced.get(id)
             if fate is None or not fate.block.preplan:
                 return False
             fate.activated = True
@@ -238,9 +240,9 @@ class Ensemble:
         if playing.state is not State.PENDING:
             return False
         playing.change_state(BlockEvent.ACTIVATE)
-        playing.floor = now
-        if self.course.move(playing, now):
-            self.course.follow(playing, now)
+        playing.not_before = now
+        if self.timeline.move(playing, now):
+            self.timeline.update_followers(playing, now)
         return True
 
     def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
@@ -251,73 +253,75 @@ class Ensemble:
             syncs: sync -> seconds on the session clock; as soon as can be, where that is too soon.
         """
         self.advance(now)
-        tied = [p for p in self.cast.alive() if p.start < FOREVER and id in anticipated(p.block)]
-        soonest = {sync: max([now, *(lead(p, id, sync, now) for p in tied)]) for sync in syncs}
-        self.cast.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
-        if (beyond := len(self.cast.anticipators) - ANTICIPATORS) > 0:
-            wanted = {id}.union(*(anticipated(p.block) for p in self.cast.alive()))
-            old = (name for name in self.cast.anticipators if name not in wanted)
-            self.cast.lapse(set(islice(old, beyond)))
+        tied = [p for p in self.blocks.active() if p.start < FOREVER and id in anticipators_of(p.block)]
+        soonest = {sync: max([now, *(lead_time(p, id, sync, now) for p in tied)]) for sync in syncs}
+        self.blocks.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
+        if (beyond := len(self.blocks.anticipators) - ANTICIPATORS) > 0:
+            wanted = {id}.union(*(anticipators_of(p.block) for p in self.blocks.active()))
+            old = (name for name in self.blocks.anticipators if name not in wanted)
+            self.blocks.drop_anticipators(set(islice(old, beyond)))
         for playing in tied:
-            self.course.solve_again([playing, *self.course.tied(playing, now)], playing.start, now)
+            self.timeline.reschedule(
+                [playing, *self.timeline.linked_blocks(playing, now)], playing.start, now
+            )
 
-    def respeak(self, id: str, behaviour: str, utterance: Utterance, now: float) -> bool:
+    def update_speech(self, id: str, behaviour: str, utterance: Utterance, now: float) -> bool:
         """A voice says how it really speaks: what has not passed follows; False where it is not (still) said.
 
         Args:
             id: of a block that plays or waits.
         """
         self.advance(now)
-        playing = self.cast.find(id)
+        playing = self.blocks.find(id)
         if playing is None or behaviour not in playing.plan.timings:
             return False
         if playing.start == FOREVER:  # it is planned when that is known
-            utterances = {**playing.world.utterances, behaviour: utterance}
-            playing.world = replace(playing.world, utterances=utterances)
+            utterances = {**playing.context.utterances, behaviour: utterance}
+            playing.context = replace(playing.context, utterances=utterances)
             return True
-        playing.respeak(behaviour, utterance, now)
-        self.course.changed()
-        self.course.solve_again([playing, *self.course.tied(playing, now)], playing.start, now)
+        playing.update_speech(behaviour, utterance, now)
+        self.timeline.mark_changed()
+        self.timeline.reschedule([playing, *self.timeline.linked_blocks(playing, now)], playing.start, now)
         return True
 
     # starts -------------------------------------------------------------------------------------
 
-    def _links(self, block: Block, character: int) -> tuple[list[Wait], list[tuple[Playing, bool]]]:
+    def _links(self, block: Block, character: int) -> tuple[list[Dependency], list[tuple[ActiveBlock, bool]]]:
         """What a block waits for, and the blocks that are to wait for it.
 
         Raises:
             _Refused: one of those has started, or is waited for itself.
         """
-        waits = self._waits(block, character)
-        behind: list[tuple[Playing, bool]] = []
+        waits = self._dependencies(block, character)
+        behind: list[tuple[ActiveBlock, bool]] = []
         for name, subsiding in block_links.followers(block):
-            playing = self.cast.find(name)
-            if playing is not None and playing.waiting:
+            playing = self.blocks.find(name)
+            if playing is not None and playing.is_waiting:
                 behind.append((playing, subsiding))
-            elif playing is not None or name not in self._expected:
+            elif playing is not None or name not in self._announced:
                 text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
-                raise _Refused(Warning(block.id, "TargetBlockAlreadyStartedException", text))
-        if behind and any(id(playing) in block_links.before(waits) for playing, _ in behind):
+                raise _Rejection(Warning(block.id, "TargetBlockAlreadyStartedException", text))
+        if behind and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in behind):
             text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
-            raise _Refused(Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
+            raise _Rejection(Warning(block.id, "IMPOSSIBLE_TO_SCHEDULE", text))
         return waits, behind
 
-    def _waits(self, block: Block, character: int) -> list[Wait]:
-        fate = self._expected.fate(block.id)
-        ahead = [w for w in fate.waits if not w.block.done] if fate is not None else []
-        return block_links.awaited(block, character, self.cast.alive()) + ahead
+    def _dependencies(self, block: Block, character: int) -> list[Dependency]:
+        fate = self._announced.get(block.id)
+        ahead = [w for w in fate.dependencies if not w.block.is_done] if fate is not None else []
+        return block_links.dependencies(block, character, self.blocks.active()) + ahead
 
     def _in_use(self, block: Block, character: int) -> bool:
         """Its id belongs to a block that plays or waits, and that it does not end."""
-        other = self.cast.find(block.id)
-        return other is not None and other not in block_links.ended(block, character, [other])
+        other = self.blocks.find(block.id)
+        return other is not None and other not in block_links.blocks_to_end(block, character, [other])
 
     def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
         self.reports.warn(warning, block.character_id)
         return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
 
 
-class _Refused(Exception):
+class _Rejection(Exception):
     """A block cannot be taken in, and why."""
 
     def __init__(self, warning: Warning) -> None:

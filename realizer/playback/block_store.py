@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from realizer.playback.active_block import Playing
+from realizer.playback.active_block import ActiveBlock
 from realizer.scheduling.timing import Schedule
 
 # Schedules of blocks that have ended, kept for references to their sync points.
@@ -18,73 +18,73 @@ FOREVER = float("inf")
 ANTICIPATORS = "anticipators"
 
 
-class Cast:
+class BlockStore:
     """Blocks from their acceptance until nothing of them is to be seen, and what is known of them later.
 
     Attributes:
         next_number: of the next block that is added.
-        first_gone: from when on nothing is to be seen of the first block that has ended; infinite where none
-            has.
+        first_invisible: from when on nothing is to be seen of the first block that has ended; infinite where
+            none has.
     """
 
     def __init__(self) -> None:
         self.next_number = 0
-        self.first_gone = FOREVER
-        self._playing: dict[int, Playing] = {}  # by number, in order of acceptance
-        self._alive: dict[str, Playing] = {}  # by id; those that are not done
-        self._ended: list[Playing] = []  # those of `_playing` that are done
+        self.first_invisible = FOREVER
+        self._blocks: dict[int, ActiveBlock] = {}  # by number, in order of acceptance
+        self._active: dict[str, ActiveBlock] = {}  # by id; those that are not done
+        self._ended: list[ActiveBlock] = []  # those of `_blocks` that are done
         self._past: dict[str, Schedule] = {}
         self._points = 0  # of `_past`
         self._anticipated = Schedule(ANTICIPATORS, {}, {})
 
-    def add(self, playing: Playing) -> None:
+    def add(self, playing: ActiveBlock) -> None:
         """Take in an accepted block."""
-        self._playing[playing.number] = self._alive[playing.block.id] = playing
+        self._blocks[playing.number] = self._active[playing.block.id] = playing
         self.next_number += 1
 
-    def end(self, playing: Playing) -> None:
+    def end(self, playing: ActiveBlock) -> None:
         """A block has ended: its id is free."""
-        del self._alive[playing.block.id]
+        del self._active[playing.block.id]
         self._ended.append(playing)
-        self.first_gone = min(self.first_gone, playing.gone)
+        self.first_invisible = min(self.first_invisible, playing.invisible_after)
 
-    def forget(self, before: float) -> list[Playing]:
+    def forget(self, before: float) -> list[ActiveBlock]:
         """Drop the blocks of which nothing is to be seen from a time on; returns them."""
-        if self.first_gone >= before:
+        if self.first_invisible >= before:
             return []
-        gone = [p for p in self._ended if p.gone < before]
-        self._ended = [p for p in self._ended if p.gone >= before]
-        self.first_gone = min((p.gone for p in self._ended), default=FOREVER)
+        gone = [p for p in self._ended if p.invisible_after < before]
+        self._ended = [p for p in self._ended if p.invisible_after >= before]
+        self.first_invisible = min((p.invisible_after for p in self._ended), default=FOREVER)
         for playing in gone:
             if (old := self._past.pop(playing.block.id, None)) is not None:
                 self._points -= _points(old)
             self._past[playing.block.id] = playing.schedule
             self._points += _points(playing.schedule)
-            del self._playing[playing.number]
+            del self._blocks[playing.number]
         while len(self._past) > PAST or (self._points > PAST_POINTS and len(self._past) > 1):
             self._points -= _points(self._past.pop(next(iter(self._past))))
         return gone
 
-    def __getitem__(self, number: int) -> Playing:
-        return self._playing[number]
+    def __getitem__(self, number: int) -> ActiveBlock:
+        return self._blocks[number]
 
-    def all(self) -> list[Playing]:
+    def all(self) -> list[ActiveBlock]:
         """Every block that can still be seen or heard, in order of acceptance."""
-        return list(self._playing.values())
+        return list(self._blocks.values())
 
-    def of(self, character: int) -> list[Playing]:
+    def of_character(self, character: int) -> list[ActiveBlock]:
         """Those of one character."""
-        return [p for p in self._playing.values() if p.character == character]
+        return [p for p in self._blocks.values() if p.character == character]
 
-    def alive(self) -> list[Playing]:
+    def active(self) -> list[ActiveBlock]:
         """The blocks that play or wait, in order of acceptance."""
-        return list(self._alive.values())
+        return list(self._active.values())
 
-    def find(self, id: str) -> Playing | None:
+    def find(self, id: str) -> ActiveBlock | None:
         """The block of this id that plays or waits."""
-        return self._alive.get(id)
+        return self._active.get(id)
 
-    def knew(self, id: str) -> bool:
+    def has_seen(self, id: str) -> bool:
         """Whether there is or was such a block."""
         return self.schedule_of(id) is not None
 
@@ -92,21 +92,21 @@ class Cast:
         """Of the newest block of an id, on the session clock; of what is anticipated too."""
         if id == ANTICIPATORS:
             return self._anticipated
-        newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
+        newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
         return self._past.get(id) if newest is None else newest.schedule
 
-    def first_of(self, id: str) -> Schedule | None:
+    def first_schedule_of(self, id: str) -> Schedule | None:
         """Of the newest block of an id, as it was when it was accepted, from where it starts now."""
-        newest = next((p for p in reversed(self._playing.values()) if p.block.id == id), None)
+        newest = next((p for p in reversed(self._blocks.values()) if p.block.id == id), None)
         if newest is None:
             return None
-        first = replace(newest.first, start=newest.start)
-        if newest.stopped is None:
+        first = replace(newest.first_schedule, start=newest.start)
+        if newest.stopped_at is None:
             return first
-        last = max(0.0, newest.stopped - newest.start)  # nothing of it comes any more
+        last = max(0.0, newest.stopped_at - newest.start)  # nothing of it comes any more
         return replace(first, times={b: np.minimum(t, last) for b, t in first.times.items()})
 
-    def known(self) -> tuple[list[Schedule], Schedule]:
+    def snapshot(self) -> tuple[list[Schedule], Schedule]:
         """When blocks were that have ended, the oldest first, and what is anticipated."""
         ended = {playing.block.id: playing.schedule for playing in self._ended}
         past = {id: schedule for id, schedule in self._past.items() if id not in ended} | ended
@@ -130,7 +130,7 @@ class Cast:
         """The ids of all, the one that was first named first."""
         return self._anticipated.points.keys()
 
-    def lapse(self, ids: Collection[str]) -> None:
+    def drop_anticipators(self, ids: Collection[str]) -> None:
         """Their points are anticipated no more."""
         points = {id: names for id, names in self._anticipated.points.items() if id not in ids}
         times = {id: self._anticipated.times[id] for id in points}
@@ -138,7 +138,7 @@ class Cast:
 
     def latest(self, schedule: Schedule) -> Schedule:
         """What has become of a schedule as a block had it when it was accepted."""
-        playing = next((p for p in self._playing.values() if p.first is schedule), None)
+        playing = next((p for p in self._blocks.values() if p.first_schedule is schedule), None)
         return schedule if playing is None else playing.latest
 
 

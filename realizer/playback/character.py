@@ -18,7 +18,7 @@ SETTLE = 0.12  # s
 
 
 @dataclass(frozen=True, eq=False)
-class Shift:
+class BaseShift:
     """A change of a base state: from `begin` to `end` it replaces what was the base of its regions."""
 
     begin: float
@@ -27,7 +27,7 @@ class Shift:
     channels: tuple[Channel, ...]
 
     @classmethod
-    def of(cls, begin: float, end: float, own_region: str, channels: tuple[Channel, ...]) -> Shift:
+    def of(cls, begin: float, end: float, own_region: str, channels: tuple[Channel, ...]) -> BaseShift:
         """A shift of one region, and of every other that its channels move."""
         return cls(begin, end, frozenset({own_region, *(region(c.target) for c in channels)}), channels)
 
@@ -37,21 +37,21 @@ class Character:
     """What a face holds beyond any block."""
 
     id: str | None
-    shifts: list[Shift] = field(default_factory=list)
+    shifts: list[BaseShift] = field(default_factory=list)
     direct: dict[str, Channel] = field(default_factory=dict)
-    feeling: dict[str, Channel] = field(default_factory=dict)
+    emotion: dict[str, Channel] = field(default_factory=dict)
 
-    def shift(self, shifts: Collection[Shift]) -> None:
+    def add_shifts(self, shifts: Collection[BaseShift]) -> None:
         """Take new base states, in order of their begin."""
         self.shifts = sorted([*self.shifts, *shifts], key=lambda s: (s.begin, s.end))
 
-    def exchange(self, old: Mapping[str, Shift], new: Mapping[str, Shift]) -> None:
+    def replace_shifts(self, old: Mapping[str, BaseShift], new: Mapping[str, BaseShift]) -> None:
         """Put other shifts in the place of those of the same behaviour."""
         heirs = {id(old[name]): shift for name, shift in new.items()}
         shifts = [heirs.get(id(s), s) for s in self.shifts]
         self.shifts = sorted(shifts, key=lambda s: (s.begin, s.end))
 
-    def cancel(self, shifts: Collection[Shift], now: float) -> None:
+    def cancel(self, shifts: Collection[BaseShift], now: float) -> None:
         """Drop those of `shifts` that have not begun; one that has begun is carried through."""
         gone = {id(s) for s in shifts if s.begin >= now}
         self.shifts = [s for s in self.shifts if id(s) not in gone]
@@ -64,7 +64,7 @@ class Character:
         """
         _hold(self.direct, values, now, Layer.DIRECT, SETTLE)
 
-    def set_feeling(self, values: Mapping[str, float], now: float) -> None:
+    def set_emotion(self, values: Mapping[str, float], now: float) -> None:
         """Hold an emotion from `now` on instead of the one before: AUs (0..1) and FAPs (FAPU) by name.
 
         It lies where expressions do, so that mood, speech, gaze and what is set directly find their places
@@ -73,8 +73,8 @@ class Character:
         Raises:
             KeyError: no such AU or FAP; nothing is changed then.
         """
-        asked = dict.fromkeys(self.feeling) | dict(values)
-        _hold(self.feeling, asked, now, Layer.EXPRESSION, RELAX)
+        asked = dict.fromkeys(self.emotion) | dict(values)
+        _hold(self.emotion, asked, now, Layer.EXPRESSION, RELAX)
 
     def channels(self) -> list[Channel]:
         """Base states, each until the next shift of its region takes over, and what was set."""
@@ -84,7 +84,7 @@ class Character:
                 own = region(channel.target)
                 heir = next((s for s in self.shifts[index + 1 :] if own in s.regions), None)
                 out.append(channel if heir is None else channel.faded(heir.begin, heir.end))
-        return [*out, *self.feeling.values(), *self.direct.values()]
+        return [*out, *self.emotion.values(), *self.direct.values()]
 
     def forget(self, before: float) -> None:
         """Drop what can no longer be seen after `before`, so that the cost does not grow with the past."""
@@ -94,7 +94,7 @@ class Character:
             if not any(s.end < before and shift.regions <= s.regions for s in self.shifts[index + 1 :])
         ]
         self.direct = {n: c for n, c in self.direct.items() if c.gone > before}
-        self.feeling = {n: c for n, c in self.feeling.items() if c.gone > before}
+        self.emotion = {n: c for n, c in self.emotion.items() if c.gone > before}
 
 
 def _hold(

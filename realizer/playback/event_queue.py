@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Collection, Iterator
 
-from realizer.playback.active_block import Playing
+from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_states import State
 from realizer.playback.feedback_events import Event, Phase, events
 
@@ -13,7 +13,7 @@ from realizer.playback.feedback_events import Event, Phase, events
 SPARE = 16
 
 
-class Calendar:
+class EventQueue:
     """Events that have not happened."""
 
     def __init__(self) -> None:
@@ -38,17 +38,17 @@ class Calendar:
             else:
                 heapq.heappop(self._firsts)
                 del self._events[first.block]
-            self._look()
+            self._find_next()
             yield first
 
-    def put(self, playing: Playing, only: Collection[tuple[str, str]] | None = None) -> None:
+    def add(self, playing: ActiveBlock, only: Collection[tuple[str, str]] | None = None) -> None:
         """Put in what is still to happen in a block; of its sync points all, or `only` (behaviour, sync)."""
         number, order = playing.number, playing.order
         due = events(playing.block, playing.schedule, order, number)
         if only is not None:
             due = [e for e in due if (e.name, e.sync) in only]
-        subsides, end = playing.subsides, playing.end
-        if playing.waiting:
+        subsides, end = playing.subsides_at, playing.end
+        if playing.is_waiting:
             due.append(Event(playing.start, order, Phase.START, block=number))
         if playing.state is not State.SUBSIDING and subsides < end:
             due.append(Event(subsides, order, Phase.SUBSIDES, block=number))
@@ -59,18 +59,18 @@ class Calendar:
         if len(self._firsts) > 2 * len(self._events) + SPARE:
             self._firsts = [events[-1] for events in self._events.values()]
             heapq.heapify(self._firsts)
-        self._look()
+        self._find_next()
 
-    def pending(self, playing: Playing) -> set[tuple[str, str]]:
+    def pending(self, playing: ActiveBlock) -> set[tuple[str, str]]:
         """The sync points of a block that have not passed, as (behaviour, sync)."""
         return {(e.name, e.sync) for e in self._events.get(playing.number, ()) if e.name}
 
-    def drop(self, playing: Playing) -> None:
+    def drop(self, playing: ActiveBlock) -> None:
         """Take out all that is still to happen in a block."""
         if self._events.pop(playing.number, None) is not None:
-            self._look()
+            self._find_next()
 
-    def _look(self) -> None:
+    def _find_next(self) -> None:
         """Find what comes first; what was dropped is taken off the top."""
         self._first = None
         while self._firsts:

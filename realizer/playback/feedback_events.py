@@ -55,7 +55,7 @@ class Event(NamedTuple):
 
 
 # A NamedTuple is made in a third of the time without its own `__new__`, which is Python.
-made = tuple.__new__
+_new_event = tuple.__new__
 
 
 def parse_warning(error: BMLError) -> Warning:
@@ -119,7 +119,7 @@ def events(block: Block, schedule: Schedule, order: int, number: int) -> list[Ev
             continue
         times = (schedule.start + schedule.times[id]).tolist()
         found += [
-            made(Event, (time, order, phase, place, index, number, id, sync))
+            _new_event(Event, (time, order, phase, place, index, number, id, sync))
             for index, (sync, time) in enumerate(zip(schedule.points[id], times, strict=True))
         ]
     return found
@@ -129,21 +129,21 @@ class Reports:
     """The feedback a session owes, in the order of report; each is handed out once."""
 
     def __init__(self) -> None:
-        self._owed: list[Feedback] = []
+        self._feedback: list[Feedback] = []
 
     def __len__(self) -> int:
-        return len(self._owed)
+        return len(self._feedback)
 
-    def tell(self, feedback: Feedback) -> None:
+    def add(self, feedback: Feedback) -> None:
         """One more."""
-        self._owed.append(feedback)
+        self._feedback.append(feedback)
 
     def warn(self, warning: Warning, character: str | None) -> None:
         """A BML warning."""
         told = WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character)
-        self._owed.append(told)
+        self._feedback.append(told)
 
-    def take(self) -> list[Feedback]:
+    def take_all(self) -> list[Feedback]:
         """What is owed."""
-        owed, self._owed = self._owed, []
+        owed, self._feedback = self._feedback, []
         return owed

@@ -19,15 +19,15 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle.motion import Idle, idle_face
 from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
-from realizer.behaviours.kind import Kind, Position, World
+from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64
 from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
-from realizer.playback.active_block import Speaking
-from realizer.playback.block_manager import Ensemble
+from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
-from realizer.playback.block_store import Cast
+from realizer.playback.block_store import BlockStore
 from realizer.playback.character import RELAX, Character
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Recording, Say, Utterance
@@ -47,26 +47,26 @@ class Player:
         kinds: tag -> Kind, what behaviours there are.
         clips: id -> sound that documents may name as `clip:ID`; it may change while the player plays.
         history: seconds before the last `due` for which frames can still be asked for.
-        takes: index of a character -> what moves its face (`Face.takes`); None: that is not known.
-        refuses: (block, what was planned) -> why it is not to be played; None where it is.
+        face_inputs: index of a character -> what moves its face (`Face.takes`); None: that is not known.
+        veto: (block, what was planned) -> why it is not to be played; None where it is.
 
     Attributes:
-        revision: rises whenever frames change that were already computed.
+        version: rises whenever frames change that were already computed.
     """
 
     def __init__(
         self,
         options: PlayOptions = DEFAULTS,
         *,
-        kinds: Mapping[str, Kind] = KINDS,
+        kinds: Mapping[str, BehaviourKind] = KINDS,
         clips: Mapping[str, Recording] | None = None,
         history: float = HISTORY,
-        takes: Callable[[int], Sequence[str]] | None = None,
-        refuses: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
+        face_inputs: Callable[[int], Sequence[str]] | None = None,
+        veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
         self.kinds = kinds
-        self._takes = takes
-        self.world = World(
+        self._face_inputs = face_inputs
+        self.context = PlanningContext(
             scene=options.scene,
             seed=options.seed,
             language=options.language,
@@ -79,26 +79,30 @@ class Player:
         self.history = history
         self.rules = chosen(options.cooccurrence)
         self._characters: list[Character] = [Character(None)]
-        self._blocks = Ensemble(kinds, self._characters, refuses)
+        self._manager = BlockManager(kinds, self._characters, veto)
 
     @property
-    def revision(self) -> int:
-        return self._blocks.course.revision
+    def version(self) -> int:
+        return self._manager.timeline.version
 
     # documents in -------------------------------------------------------------------------------
 
-    def wants(self, block: Block) -> dict[str, Say]:
+    def speech_requests(self, block: Block) -> dict[str, Say]:
         """{behaviour id: what a voice has to say} before the block can be submitted."""
         says: dict[str, Say] = {}
         for node in block.behaviours:
             kind = self.kinds.get(node.tag)
-            if kind is not None and kind.say is not None and (say := kind.say(node, self.world)) is not None:
+            if (
+                kind is not None
+                and kind.speech_request is not None
+                and (say := kind.speech_request(node, self.context)) is not None
+            ):
                 says[node.id] = say
         return says
 
     def announce(self, block: Block, now: float) -> None:
         """Acknowledge a block: planning has begun. `submit` does it where it was not done before."""
-        self._blocks.announce(block, self._character(block.character_id), now)
+        self._manager.announce(block, self._character(block.character_id), now)
 
     def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
         """Plan a block and let it play as its composition says.
@@ -106,7 +110,7 @@ class Player:
         Args:
             block: as parsed; its own problems are reported with it.
             now: seconds on the session clock.
-            utterances: what the voice made of `wants(block)`.
+            utterances: what the voice made of `speech_requests(block)`.
 
         Returns:
             The schedule; `schedule.failed` when the whole block was refused. Where it has `lengths`, more of
@@ -114,13 +118,15 @@ class Player:
             (`speech.fitting`), or with the same ones whose `stretch` is (1, 1).
         """
         character = self._character(block.character_id)
-        takes = self.world.takes if self._takes is None else partial(self._takes, character)
-        world = replace(self.world, utterances=dict(utterances or {}), takes=takes)
-        return self._blocks.submit(block, character, world, now)
+        takes = (
+            self.context.face_inputs if self._face_inputs is None else partial(self._face_inputs, character)
+        )
+        world = replace(self.context, utterances=dict(utterances or {}), face_inputs=takes)
+        return self._manager.submit(block, character, world, now)
 
     def refuse(self, warning: Warning, now: float, character: str | None = None) -> None:
         """Report a document, block or behaviour that cannot be played."""
-        self._blocks.reports.warn(warning, character)
+        self._manager.reports.warn(warning, character)
 
     def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
         """End blocks gracefully: sound fades, the face relaxes to its base without a jump.
@@ -131,25 +137,25 @@ class Player:
         Returns:
             The ids of the blocks that were stopped.
         """
-        return self._blocks.stop_all(now, None if block_ids is None else set(block_ids))
+        return self._manager.stop_all(now, None if block_ids is None else set(block_ids))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Give up a block that was announced and will not be submitted; its end is reported."""
-        self._blocks.withdraw(block, now)
+        self._manager.withdraw(block, now)
 
     @property
-    def cast(self) -> Cast:
+    def blocks(self) -> BlockStore:
         """The blocks themselves, to look at: only the player changes them."""
-        return self._blocks.cast
+        return self._manager.blocks
 
     @property
-    def alive(self) -> int:
+    def active_count(self) -> int:
         """How many blocks play or wait for their start."""
-        return len(self._blocks.cast.alive())
+        return len(self._manager.blocks.active())
 
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
         """Declare where targets are; documents planned from now on look there."""
-        self.world = replace(self.world, scene=scene)
+        self.context = replace(self.context, scene=scene)
 
     def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
         """Expect the points `anticipators:id:sync` at these times; what is tied to them follows.
@@ -157,13 +163,13 @@ class Player:
         Args:
             syncs: sync -> seconds on the session clock. A point that has passed stays where it was.
         """
-        self._blocks.anticipate(id, syncs, now)
+        self._manager.anticipate(id, syncs, now)
 
-    def lapse(self, id: str) -> None:
+    def forget_anticipator(self, id: str) -> None:
         """Expect no point of an anticipator any more: nothing alive is tied to it."""
-        self._blocks.cast.lapse([id])
+        self._manager.blocks.drop_anticipators([id])
 
-    def respeak(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
+    def update_speech_timing(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
         """Take what a voice says of its real timing while it speaks: the rest of the block follows.
 
         Args:
@@ -172,7 +178,7 @@ class Player:
         Returns:
             False where that speech does not play and does not wait.
         """
-        return self._blocks.respeak(block, behaviour, utterance, now)
+        return self._manager.update_speech(block, behaviour, utterance, now)
 
     def set_direct(self, values: Mapping[str, float | None], now: float, character: int = 0) -> None:
         """Hold AUs (0..1) and FAPs (FAPU) by name until told otherwise; None lets go of one.
@@ -181,13 +187,13 @@ class Player:
             KeyError: no such AU or FAP.
         """
         self._characters[character].set_direct(values, now)
-        self._blocks.course.changed()
+        self._manager.timeline.mark_changed()
 
-    def held(self, character: int = 0) -> tuple[str, ...]:
+    def direct_names(self, character: int = 0) -> tuple[str, ...]:
         """The names of the AUs and FAPs that are held directly, or have just been let go of."""
         return tuple(self._characters[character].direct)
 
-    def set_feeling(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
+    def set_emotion(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
         """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the one held before; {}: none.
 
         It lies among the expressions, below speech, gaze and what is set directly, whatever is set first.
@@ -195,18 +201,18 @@ class Player:
         Raises:
             KeyError: no such AU or FAP.
         """
-        self._characters[character].set_feeling(values, now)
-        self._blocks.course.changed()
+        self._characters[character].set_emotion(values, now)
+        self._manager.timeline.mark_changed()
 
     # feedback out -------------------------------------------------------------------------------
 
     def due(self, now: float) -> list[Feedback]:
         """Feedback whose time has come, in the order of report, each once."""
         forgettable = now - self.history - RELAX - AFTERMATH
-        if not self._blocks.stirs(now, forgettable):
+        if not self._manager.has_due(now, forgettable):
             return []
-        out = self._blocks.due(now)
-        forgotten = self._blocks.forget(forgettable)
+        out = self._manager.due(now)
+        forgotten = self._manager.forget(forgettable)
         if forgotten:
             for character in self._characters:
                 character.forget(now - self.history)
@@ -214,39 +220,39 @@ class Player:
 
     def next_deadline(self) -> float | None:
         """When `due` will next have something; None when nothing plays or waits. In the past: at once."""
-        return self._blocks.next_deadline()
+        return self._manager.next_deadline()
 
     def next_change(self) -> float:
         """When `due` will next do something: tell, or forget what is past; infinite where neither."""
-        first = self._blocks.next_deadline()
-        forgets = self._blocks.cast.first_gone + self.history + RELAX + AFTERMATH
+        first = self._manager.next_deadline()
+        forgets = self._manager.blocks.first_invisible + self.history + RELAX + AFTERMATH
         return forgets if first is None else min(first, forgets)
 
     # at rest ------------------------------------------------------------------------------------
 
-    def resting(self, now: float = float("-inf")) -> bool:
+    def is_idle(self, now: float = float("-inf")) -> bool:
         """Nothing plays, waits or is still to be seen: what is held, the scene and `cast.known` are all.
 
         Args:
             now: what has ended by then does not count, though what is idle goes by it for some seconds.
         """
-        return self._blocks.resting(now)
+        return self._manager.is_idle(now)
 
     @property
-    def held_by(self) -> tuple[Character, ...]:
+    def character_states(self) -> tuple[Character, ...]:
         """The characters themselves, to look at: only the player changes them."""
         return tuple(self._characters)
 
     def restore(self, characters: Iterable[Character], past: Iterable[Schedule], expected: Schedule) -> None:
-        """Let a new player be as another one was when it was `resting`.
+        """Let a new player be as another one was when it was `is_idle`.
 
         Args:
             characters: its own from now on.
             past, expected: as `cast.known`.
         """
         self._characters[:] = characters
-        self._blocks.cast.restore(past, expected)
-        self._blocks.course.changed()
+        self._manager.blocks.restore(past, expected)
+        self._manager.timeline.mark_changed()
 
     # faces out ----------------------------------------------------------------------------------
 
@@ -279,12 +285,12 @@ class Player:
             times: as `frames`, at least one.
         """
         first, last = float(times[0]), float(times[-1])
-        blocks = self._blocks.cast.of(character)
+        blocks = self._manager.blocks.of_character(character)
         own = self._characters[character].channels()
-        channels = [c for p in blocks for c in p.moving()] + own
+        channels = [c for p in blocks for c in p.moving_channels()] + own
         if not self.idle:
             return channels, None
-        seed = self.world.seed + 7919 * character
+        seed = self.context.seed + 7919 * character
         said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
         talks = [
             Talk(s.start + at, s.until, part)
@@ -293,7 +299,7 @@ class Player:
         ]
         near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
         if near:
-            asked = [Asked(p.floor, c) for p in blocks for c in p.moving()]
+            asked = [Asked(p.not_before, c) for p in blocks for c in p.moving_channels()]
             asked += [Asked(c.span[0], c) for c in own]
             channels += prosody_channels(near, first, last, seed, asked)
         return channels, idle_face(first, last, seed, phrase_ends(talks))
@@ -301,22 +307,24 @@ class Player:
     @property
     def end(self) -> float:
         """When the last block has ended, and relaxed where it was cut off; 0 where there was none."""
-        return max((p.gone for p in self._blocks.cast.all() if p.end < float("inf")), default=0.0)
+        return max(
+            (p.invisible_after for p in self._manager.blocks.all() if p.end < float("inf")), default=0.0
+        )
 
-    def speech(self) -> tuple[Speaking, ...]:
+    def speech(self) -> tuple[ScheduledSpeech, ...]:
         """What sounds or will sound, in order of its start."""
         return tuple(
-            sorted((s for p in self._blocks.cast.all() for s in p.speech.values()), key=lambda s: s.start)
+            sorted((s for p in self._manager.blocks.all() for s in p.speech.values()), key=lambda s: s.start)
         )
 
     def latest(self, schedule: Schedule) -> Schedule:
         """What became of a schedule that `submit` gave, where other blocks moved or interrupted its block."""
-        return self._blocks.cast.latest(schedule)
+        return self._manager.blocks.latest(schedule)
 
     def state(self, now: float) -> dict[str, Any]:
         """What is playing, which AUs are up and what each layer asks for, as plain data."""
         blocks: list[dict[str, Any]] = []
-        for p in self._blocks.cast.alive():
+        for p in self._manager.blocks.active():
             if p.end <= now:
                 continue
             starts = p.state is State.LURKING and p.start <= now

@@ -8,7 +8,7 @@ from dataclasses import replace
 from bml_schema import Behaviour, Block, Constraint, Required, Speech, Sync, Synchronize, SyncRef
 
 
-def abroad(block: Block) -> tuple[SyncRef, ...]:
+def external_refs(block: Block) -> tuple[SyncRef, ...]:
     """Those into other blocks."""
     return tuple(ref for ref in references(block) if ref.block is not None and ref.block != block.id)
 
@@ -28,7 +28,7 @@ def references(block: Block) -> Iterator[SyncRef]:
                 yield part.ref
 
 
-def redirected(block: Block, to: Callable[[SyncRef], SyncRef]) -> Block:
+def with_references(block: Block, to: Callable[[SyncRef], SyncRef]) -> Block:
     """The block with what `to` makes of each of its references."""
 
     def inside(node: Behaviour | Constraint) -> Behaviour | Constraint:

@@ -7,16 +7,18 @@ from collections.abc import Iterable
 import numpy as np
 
 from bml_schema import Block, SyncRef
-from realizer.playback.active_block import Playing, Wait
-from realizer.playback.block_links import before
+from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.block_links import all_dependencies
 from realizer.playback.block_store import ANTICIPATORS
-from realizer.playback.references import abroad, references
+from realizer.playback.references import external_refs, references
 from realizer.scheduling import Member
 
 FOREVER = float("inf")
 
 
-def touched(block: Block, alive: Iterable[Playing], now: float, waits: Iterable[Wait] = ()) -> list[Playing]:
+def affected_blocks(
+    block: Block, alive: Iterable[ActiveBlock], now: float, waits: Iterable[Dependency] = ()
+) -> list[ActiveBlock]:
     """The blocks that are solved together with one, by references to sync points that have not passed.
 
     Of two blocks of which one waits for the other only one can move at a time, or the second would flee from
@@ -31,12 +33,15 @@ def touched(block: Block, alive: Iterable[Playing], now: float, waits: Iterable[
         Those of `alive` that are connected to the block by any chain, in order.
     """
     by_id = {p.block.id: p for p in alive if p.start < FOREVER}
-    named = [(block.id, abroad(block)), *((id, p.abroad) for id, p in by_id.items() if p.abroad)]
+    named = [
+        (block.id, external_refs(block)),
+        *((id, p.external_refs) for id, p in by_id.items() if p.external_refs),
+    ]
     beside: dict[str, set[str]] = {}
     for own, refs in named:
         for ref in refs:
             other = by_id.get(ref.block or "")
-            if other is not None and not _passed(ref, other, now):
+            if other is not None and not _has_passed(ref, other, now):
                 beside.setdefault(own, set()).add(other.block.id)
                 beside.setdefault(other.block.id, set()).add(own)
     found: set[str] = set()
@@ -48,17 +53,19 @@ def touched(block: Block, alive: Iterable[Playing], now: float, waits: Iterable[
                 names.append(name)
     if not found:
         return []
-    apart = before(waits)
-    together: list[Playing] = []
+    apart = all_dependencies(waits)
+    together: list[ActiveBlock] = []
     for name, p in by_id.items():
         if name in found and name != block.id and id(p) not in apart:
-            behind = before(p.waits)
-            if not any(id(other) in behind or id(p) in before(other.waits) for other in together):
+            behind = all_dependencies(p.dependencies)
+            if not any(
+                id(other) in behind or id(p) in all_dependencies(other.dependencies) for other in together
+            ):
                 together.append(p)
     return together
 
 
-def _passed(ref: SyncRef, playing: Playing, now: float) -> bool:
+def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
     """Whether a point is past, or nobody's."""
     sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
@@ -68,7 +75,7 @@ def _passed(ref: SyncRef, playing: Playing, now: float) -> bool:
     return playing.start + time <= now
 
 
-def member(playing: Playing, origin: float, now: float) -> Member:
+def member(playing: ActiveBlock, origin: float, now: float) -> Member:
     """A block that plays, on the clock of a block that starts at `origin`; what has passed is held."""
     late = playing.start - origin
     passed: dict[str, dict[str, float]] = {}
@@ -86,17 +93,17 @@ def member(playing: Playing, origin: float, now: float) -> Member:
         playing.plan.timings,
         start=late,
         earliest=max(late, now - origin),
-        passed=passed,
-        firm=True,
+        passed_times=passed,
+        is_fixed=True,
     )
 
 
-def anticipated(block: Block) -> set[str]:
+def anticipators_of(block: Block) -> set[str]:
     """The anticipators that a block is tied to."""
     return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
 
 
-def lead(playing: Playing, id: str, sync: str, now: float) -> float:
+def lead_time(playing: ActiveBlock, id: str, sync: str, now: float) -> float:
     """The soonest that an anticipated point can be: what leads up to it in a behaviour takes its least time.
 
     Returns:

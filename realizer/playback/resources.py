@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from bml_schema import Block
-from realizer.behaviours.kind import Kind, World
+from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.scheduling.timing import Schedule
 
 # s; two claims that share less than this do not disturb each other.
@@ -17,32 +17,35 @@ PASSES = {"gaze": "own block", "base gaze": "any block", "base head": "any block
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class ResourceClaim:
     """A behaviour needs something for itself for a while.
 
     Attributes:
-        what: such as "voice" or "gaze"; of one character.
+        resource: such as "voice" or "gaze"; of one character.
         begin, end: seconds; of all claims that are compared on the same clock.
         block, behaviour: whose it is.
         rank: of two of one block the lower one keeps it.
     """
 
-    what: str
+    resource: str
     begin: float
     end: float
     block: str
     behaviour: str
     rank: tuple[float, bool, int] = (0.0, False, 0)
 
-    def shifted(self, seconds: float) -> Claim:
+    def shifted(self, seconds: float) -> ResourceClaim:
         """The same claim, later by `seconds`."""
         return replace(self, begin=self.begin + seconds, end=self.end + seconds)
 
-    def disturbs(self, other: Claim) -> bool:
+    def conflicts_with(self, other: ResourceClaim) -> bool:
         """Whether one of the two has to go."""
-        if self.what != other.what or min(self.end, other.end) - max(self.begin, other.begin) <= TOUCH:
+        if (
+            self.resource != other.resource
+            or min(self.end, other.end) - max(self.begin, other.begin) <= TOUCH
+        ):
             return False
-        passes = PASSES.get(self.what)
+        passes = PASSES.get(self.resource)
         if passes is None or (passes == "own block" and self.block != other.block):
             return True
         inner, outer = sorted((self, other), key=lambda c: c.end - c.begin)
@@ -50,11 +53,11 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class ResourceConflict:
     """A claim that cannot be had, and the one that stands in its way."""
 
-    claim: Claim
-    winner: Claim
+    claim: ResourceClaim
+    winner: ResourceClaim
     start: float = 0.0  # of the block that loses it
 
     def __str__(self) -> str:
@@ -62,13 +65,15 @@ class Loss:
         w, c = self.winner, self.claim
         own = w.behaviour if w.block == c.block else f"{w.block}:{w.behaviour}"
         begin, end, since, until = (f"{round(t - self.start, 3):g}" for t in (c.begin, c.end, w.begin, w.end))
-        return f"wanted the {c.what} from {begin} to {end} s, but {own} has it from {since} to {until} s"
+        return f"wanted the {c.resource} from {begin} to {end} s, but {own} has it from {since} to {until} s"
 
 
-def claims(block: Block, schedule: Schedule, kinds: Mapping[str, Kind], world: World) -> Iterator[Claim]:
+def claims(
+    block: Block, schedule: Schedule, kinds: Mapping[str, BehaviourKind], context: PlanningContext
+) -> Iterator[ResourceClaim]:
     """What the scheduled behaviours of a block claim, on the clock of `schedule.start`."""
     for order, node in enumerate(block.behaviours):
-        wanted = kinds[node.tag].claims(node, world) if node.id in schedule.times else ()
+        wanted = kinds[node.tag].claims(node, context) if node.id in schedule.times else ()
         if not wanted:
             continue
         points, times = schedule.points[node.id], schedule.times[node.id]
@@ -76,26 +81,28 @@ def claims(block: Block, schedule: Schedule, kinds: Mapping[str, Kind], world: W
         begin, end = schedule.start + float(times[0]), schedule.start + float(times[last])
         rank = (-node.priority, node.id not in block.required, order)
         for what in sorted(wanted):
-            yield Claim(what, begin, end, block.id, node.id, rank)
+            yield ResourceClaim(what, begin, end, block.id, node.id, rank)
 
 
-def losses(wanted: Iterable[Claim], held: Iterable[Claim], start: float = 0.0) -> list[Loss]:
-    """What of `wanted` cannot be had: what is held stays, and of two that are wanted the lower rank.
+def conflicts(
+    new_claims: Iterable[ResourceClaim], existing_claims: Iterable[ResourceClaim], start: float = 0.0
+) -> list[ResourceConflict]:
+    """What of `new_claims` cannot be had: what is held stays, and of two that are wanted the lower rank.
 
     One loss a behaviour, in order of rank. `start` is where their sentences count from.
     """
-    had: dict[str, list[Claim]] = {}
-    for claim in held:
-        had.setdefault(claim.what, []).append(claim)
-    by_behaviour: dict[str, list[Claim]] = {}
-    for claim in sorted(wanted, key=lambda c: c.rank):
+    had: dict[str, list[ResourceClaim]] = {}
+    for claim in existing_claims:
+        had.setdefault(claim.resource, []).append(claim)
+    by_behaviour: dict[str, list[ResourceClaim]] = {}
+    for claim in sorted(new_claims, key=lambda c: c.rank):
         by_behaviour.setdefault(claim.behaviour, []).append(claim)
-    lost: list[Loss] = []
+    lost: list[ResourceConflict] = []
     for own in by_behaviour.values():
-        clash = ((c, h) for c in own for h in had.get(c.what, ()) if h.disturbs(c))
+        clash = ((c, h) for c in own for h in had.get(c.resource, ()) if h.conflicts_with(c))
         if (found := next(clash, None)) is not None:
-            lost.append(Loss(*found, start))
+            lost.append(ResourceConflict(*found, start))
             continue
         for claim in own:
-            had.setdefault(claim.what, []).append(claim)
+            had.setdefault(claim.resource, []).append(claim)
     return lost

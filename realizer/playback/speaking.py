@@ -16,7 +16,7 @@ from realizer.speech.utterance import Say, Utterance, Voice
 
 def submit_with_speech(player: Player, block: Block, voice: Voice, now: float = 0.0) -> Schedule:
     """Submit a block with its speech, spoken at other rates where more of the block fits then."""
-    requests = player.wants(block)
+    requests = player.speech_requests(block)
     utterances = synthesize(requests, voice)
     planned = player.submit(block, now, utterances)
     if planned.lengths:

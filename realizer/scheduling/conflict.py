@@ -34,7 +34,7 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
-class Clash:
+class Conflict:
     """A conflict: a set of relations that cannot hold together; without any one of them, the rest can.
 
     Attributes:
@@ -60,7 +60,7 @@ class Clash:
         return len(self.relations) + len(self.gaps) + (self.earliest is not None)
 
 
-class Web:
+class ConstraintGraph:
     """The equalities of a problem, to look for the shortest chains in, less those that do not fit.
 
     Args:
@@ -76,25 +76,25 @@ class Web:
                 self._beside.setdefault(relation.u, []).append((relation.v, relation))
                 self._beside.setdefault(relation.v, []).append((relation.u, relation))
 
-    def loop(self, unfit: int) -> Clash:
+    def loop(self, unfit: int) -> Conflict:
         """The loop that an equality, by its number, cannot close."""
         last = self.problem.equalities[unfit]
-        return _clash(self.problem, [*self._chain(last.u, last.v), last], [])
+        return _conflict(self.problem, [*self._chain(last.u, last.v), last], [])
 
-    def cycle(self, links: Sequence[Link]) -> Clash:
+    def cycle(self, links: Sequence[Link]) -> Conflict:
         """A cycle of inequalities: each link's end is tied, by equalities, to the next one's beginning."""
         relations: list[Relation] = []
         for link, after in zip(links, (*links[1:], links[0]), strict=True):
             if link.order is not None:
                 relations.append(link.order)
             relations += self._chain(link.v, after.u)
-        return _clash(self.problem, relations, links)
+        return _conflict(self.problem, relations, links)
 
-    def clash(self, steps: Sequence[tuple[int, float, Relation | Link]]) -> Clash:
+    def conflict(self, steps: Sequence[tuple[int, float, Relation | Link]]) -> Conflict:
         """A cycle of steps, each to a point by some seconds, and what says so."""
         links = [why for *_, why in steps if isinstance(why, Link)]
         relations = [why if isinstance(why, Relation) else why.order for *_, why in steps]
-        return _clash(self.problem, [r for r in relations if r is not None], links)
+        return _conflict(self.problem, [r for r in relations if r is not None], links)
 
     def _chain(self, begin: int, end: int) -> list[Relation]:
         """The fewest equalities that tie one point to another."""
@@ -114,7 +114,7 @@ class Web:
         return found[::-1]
 
 
-def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Clash:
+def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[Link]) -> Conflict:
     gaps: list[Gap] = []
     earliest = None
     points = {p for r in relations for p in (r.u, r.v)}
@@ -136,7 +136,7 @@ def _clash(problem: Problem, relations: Sequence[Relation], links: Sequence[Link
         gaps.pop()
     owners = [problem.behaviours[problem.owner[p]] for p in sorted(points) if p != ORIGIN]
     unique = {id(r): r for r in relations}
-    return Clash(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
+    return Conflict(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
 
 
 def _joined(one: Gap, after: Gap) -> list[Gap]:

@@ -9,15 +9,15 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Link
-from realizer.scheduling.convex import Quadratic, kept, optimum, settled
+from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
 from realizer.scheduling.groups import Group
 from realizer.scheduling.model import LOOSE, TIGHT, Index, Model
 from realizer.scheduling.problem import ORIGIN, Relation
-from realizer.scheduling.rigid_clusters import Shapes
+from realizer.scheduling.rigid_clusters import RigidClusters
 
 
 @dataclass(slots=True, eq=False)
-class _Squeeze:
+class _GroupProblem:
     """Groups as a convex problem; node 0 is the block's start, and one class of every group that can slide.
 
     Attributes:
@@ -34,16 +34,16 @@ class _Squeeze:
     orders: list[Relation]
     starts: Index
 
-    def start(self, shapes: Shapes) -> Float64:
+    def start(self, clusters: RigidClusters) -> Float64:
         """(size,) where the shapes are now."""
         start = np.zeros(self.quadratic.size)
         nodes = np.flatnonzero(self.number)
-        start[self.number[nodes]] = shapes.at[nodes]
+        start[self.number[nodes]] = clusters.at[nodes]
         return start
 
-    def keep(self, shapes: Shapes) -> tuple[Float64, list[int] | None]:
+    def keep(self, clusters: RigidClusters) -> tuple[Float64, list[int] | None]:
         """From where the shapes are, times that keep every inequality, or the numbers of a cycle of them."""
-        return kept(self.quadratic, self.start(shapes))
+        return feasible_start(self.quadratic, self.start(clusters))
 
     def link(self, model: Model, k: int) -> Link:
         """Inequality k, in terms of the problem."""
@@ -62,51 +62,51 @@ class _Squeeze:
         return Link(ORIGIN, point, float(model.earliest[model.owner[point]]))
 
 
-def squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> list[list[Link]]:
+def solve_groups(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> list[list[Link]]:
     """Put the points of some groups, in place, at the least cost that keeps gaps and orders.
 
     Returns:
         For each group that cannot keep them a cycle of inequalities; nothing is changed then.
     """
     # A group that can slide is brought to where its class of node 0 is at 0, as that node is.
-    begin = np.zeros(len(shapes.label))
+    begin = np.zeros(len(clusters.label))
     for group in groups:
         if not group.held:
-            begin[group.shapes] = shapes.at[_anchor(model, group)]
-    shapes.at -= begin[shapes.label[model.owner]]
-    whole = _squeeze(model, shapes, groups)
-    x = settled(whole.quadratic, whole.start(shapes))
+            begin[group.clusters] = clusters.at[_anchor(model, group)]
+    clusters.at -= begin[clusters.label[model.owner]]
+    whole = _group_problem(model, clusters, groups)
+    x = active_set(whole.quadratic, whole.start(clusters))
     if x is None:
-        cycles = [cycle for group in groups if (cycle := _impossible(model, shapes, group))]
+        cycles = [cycle for group in groups if (cycle := _impossible(model, clusters, group))]
         if cycles:
             return cycles
         # Least gaps may have given way.
-        whole = _squeeze(model, shapes, groups)
-        x = settled(whole.quadratic, whole.start(shapes))
+        whole = _group_problem(model, clusters, groups)
+        x = active_set(whole.quadratic, whole.start(clusters))
     if x is None:
-        level, _ = whole.keep(shapes)
+        level, _ = whole.keep(clusters)
         x = optimum(whole.quadratic, level)
-    shapes.at[whole.points] = x[whole.number[model.root[whole.points]]] + model.shift[whole.points]
+    clusters.at[whole.points] = x[whole.number[model.root[whole.points]]] + model.shift[whole.points]
     return []
 
 
-def _impossible(model: Model, shapes: Shapes, group: Group) -> list[Link] | None:
+def _impossible(model: Model, clusters: RigidClusters, group: Group) -> list[Link] | None:
     """Return why a group violates its inequalities, or None if it can satisfy them with shorter gaps."""
-    one = _squeeze(model, shapes, [group])
-    _, cycle = one.keep(shapes)
+    one = _group_problem(model, clusters, [group])
+    _, cycle = one.keep(clusters)
     if cycle and _yield_to_stated(model, one.gaps):
-        one = _squeeze(model, shapes, [group])
-        _, cycle = one.keep(shapes)
+        one = _group_problem(model, clusters, [group])
+        _, cycle = one.keep(clusters)
     return [one.link(model, k) for k in cycle] if cycle else None
 
 
-def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
+def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:
     owner, root, shift = model.owner, model.root, model.shift
-    chosen, held = np.zeros(len(shapes.label), np.bool_), np.zeros(len(shapes.label), np.bool_)
+    chosen, held = np.zeros(len(clusters.label), np.bool_), np.zeros(len(clusters.label), np.bool_)
     for group in groups:
-        chosen[group.shapes] = True
-        held[group.shapes] = group.held
-    chosen, held = chosen[shapes.label], held[shapes.label]
+        chosen[group.clusters] = True
+        held[group.clusters] = group.held
+    chosen, held = chosen[clusters.label], held[clusters.label]
     points = model.points_of(chosen)
     at_start = [ORIGIN, *(_anchor(model, group) for group in groups if not group.held)]
     nodes = np.setdiff1d(root[points], at_start)
@@ -127,9 +127,9 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
     u, v, between = number[root[tail]], number[root[head]], shift[tail] - shift[head]
     # Nodes that springs connect form a cluster, or belong to node 0, which stands for everything fixed.
     piece = np.zeros(len(nodes) + 1, np.intp)
-    labels = shapes.label[owner[nodes]]
-    still = shapes.held.copy()
-    still[[shapes.label[owner[p]] for p in at_start[1:]]] = True
+    labels = clusters.label[owner[nodes]]
+    still = clusters.held.copy()
+    still[[clusters.label[owner[p]] for p in at_start[1:]]] = True
     free = ~still[labels]
     piece[1:][free] = np.unique(labels[free], return_inverse=True)[1] + 1
     quadratic = Quadratic(
@@ -143,12 +143,12 @@ def _squeeze(model: Model, shapes: Shapes, groups: Sequence[Group]) -> _Squeeze:
         seconds + between,
         piece,
     )
-    return _Squeeze(quadratic, points, number, gaps, ends, orders, starts)
+    return _GroupProblem(quadratic, points, number, gaps, ends, orders, starts)
 
 
 def _anchor(model: Model, group: Group) -> int:
     """Return the class that represents the block's start in a group that can slide."""
-    return int(model.root[model.first[group.shapes[0]]])
+    return int(model.root[model.first[group.clusters[0]]])
 
 
 def _yield_to_stated(model: Model, gaps: Index) -> bool:

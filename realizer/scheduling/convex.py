@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64
-from realizer.scheduling.longest_paths import components, raise_levels
+from realizer.scheduling.longest_paths import components, longest_path_levels
 from realizer.scheduling.model import LOOSE, TIGHT, Index
-from realizer.scheduling.rigid_clusters import settle
-from realizer.scheduling.union_find import Ties
+from realizer.scheduling.rigid_clusters import least_squares
+from realizer.scheduling.union_find import UnionFind
 
 # Active sets tried before the interior point method, which is hardly ever needed.
 GUESSES = 12
@@ -41,7 +41,9 @@ class Quadratic:
     piece: Index
 
 
-def kept(quadratic: Quadratic, start: Float64, slack: float = LOOSE) -> tuple[Float64, list[int] | None]:
+def feasible_start(
+    quadratic: Quadratic, start: Float64, slack: float = LOOSE
+) -> tuple[Float64, list[int] | None]:
     """The least x from a start on that keeps every inequality to within the slack.
 
     Returns:
@@ -51,13 +53,13 @@ def kept(quadratic: Quadratic, start: Float64, slack: float = LOOSE) -> tuple[Fl
     order = np.argsort(start[u], kind="stable")
     edges = list(zip(u[order].tolist(), v[order].tolist(), w[order].tolist(), strict=True))
     level = start.tolist()
-    if cycle := raise_levels(level, edges, slack):
+    if cycle := longest_path_levels(level, edges, slack):
         return start, order[cycle].tolist()
     found = np.array(level)
     return found - found[0], None
 
 
-def settled(quadratic: Quadratic, x: Float64) -> Float64 | None:
+def active_set(quadratic: Quadratic, x: Float64) -> Float64 | None:
     """Return the optimal x (size,) by an active-set method, or None if it does not converge.
 
     Violated inequalities become active, those with negative force inactive, until neither is left: then it is
@@ -98,7 +100,7 @@ def optimum(quadratic: Quadratic, level: Float64) -> Float64:
     if len(first) == quadratic.size:
         return _optimum(quadratic, level)
     shift = level - level[first][number]
-    ties = Ties(quadratic.size)
+    ties = UnionFind(quadratic.size)
     for a, b in zip(quadratic.piece.tolist(), quadratic.piece[first][number].tolist(), strict=True):
         ties.tie(a, b, 0.0)
     smaller = Quadratic(
@@ -142,7 +144,7 @@ def _optimum(quadratic: Quadratic, level: Float64) -> Float64:
         if not pulling.any():
             return exact
         binding &= ~pulling
-    raised, cycle = kept(quadratic, x, TIGHT)
+    raised, cycle = feasible_start(quadratic, x, TIGHT)
     if not cycle and _cost(quadratic, raised) < least:
         return raised
     return level if best is None else best
@@ -166,7 +168,7 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
     # The most violated comes first: of several that tie the same nodes, the first counts.
     held = held[np.argsort((x[quadratic.v] - x[quadratic.u] - quadratic.w)[held], kind="stable")]
     if len(held):
-        ties, pieces = Ties(m), Ties(m)
+        ties, pieces = UnionFind(m), UnionFind(m)
         ends = [end[held].tolist() for end in (quadratic.u, quadratic.v, quadratic.w)]
         for k, u, v, w in zip(held.tolist(), *ends, strict=True):
             if ties.find(u) != ties.find(v):
@@ -188,7 +190,9 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
     # The smallest node of each connected piece is fixed, and so is every node that is no class root.
     fixed = root != np.arange(m)
     fixed[np.unique(whole, return_index=True)[1]] = True
-    exact = settle(i[loose], j[loose], wanted[loose], quadratic.stiffness[loose], fixed, x)[root] + shift
+    exact = (
+        least_squares(i[loose], j[loose], wanted[loose], quadratic.stiffness[loose], fixed, x)[root] + shift
+    )
     strain = 2.0 * quadratic.stiffness * (exact[quadratic.j] - exact[quadratic.i] - quadratic.wanted)
     pull = np.bincount(quadratic.j, strain, m) - np.bincount(quadratic.i, strain, m)
     return exact, _forces(pull.tolist(), beside, quadratic)

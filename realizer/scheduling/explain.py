@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from realizer.scheduling.conflict import Clash, Gap
+from realizer.scheduling.conflict import Conflict, Gap
 from realizer.scheduling.problem import Part, Relation
 from realizer.scheduling.timing import Clause, Warning
 
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
 # Enough for people; `Warning.clash` has all.
-MOST_CLAUSES = 30
+MAX_CLAUSES = 30
 
 
-def choose(clash: Clash) -> Part | None:
+def choose(clash: Conflict) -> Part | None:
     """Select what gives way: an optional constraint before any behaviour, then the lowest priority.
 
     Of equals the later one in the document. A behaviour that is merely referred to is spared while one that
@@ -22,7 +22,7 @@ def choose(clash: Clash) -> Part | None:
     return max(_candidates(clash), key=lambda part: (-part.priority, part.order), default=None)
 
 
-def warning_of(clash: Clash, dropped: Part) -> Warning:
+def warning_of(clash: Conflict, dropped: Part) -> Warning:
     """The one warning of something that was dropped."""
     name = dropped.name or "a constraint"
     if dropped.is_constraint:
@@ -34,7 +34,7 @@ def warning_of(clash: Clash, dropped: Part) -> Warning:
     return Warning(dropped.id, IMPOSSIBLE, text, clauses(clash))
 
 
-def refusal(block: str, clash: Clash) -> Warning:
+def refusal(block: str, clash: Conflict) -> Warning:
     """The warning of a block that fails, because everything in the clash is required."""
     text = f"{in_words(clash)}, and all of this is required"
     return Warning(block, IMPOSSIBLE, text, clauses(clash))
@@ -46,22 +46,22 @@ def fault_warning(part: Part, text: str) -> Warning:
     return Warning(part.id, IMPOSSIBLE, f"{name} was dropped{_placed(part, part.line)}: {text}")
 
 
-def in_words(clash: Clash) -> str:
+def in_words(clash: Conflict) -> str:
     """The clash as the clauses of one sentence, in the order in which they chain."""
     said = [f"{clause.text}{_placed(part, clause.line)}" for part, clause in _clauses(clash)]
     unique = list(dict.fromkeys(said))
     how = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
-    if len(unique) > MOST_CLAUSES:
-        unique[MOST_CLAUSES - 1 :] = [f"{len(unique) - MOST_CLAUSES + 1} more such things"]
+    if len(unique) > MAX_CLAUSES:
+        unique[MAX_CLAUSES - 1 :] = [f"{len(unique) - MAX_CLAUSES + 1} more such things"]
     return f"{_join(unique)} cannot {how}hold"
 
 
-def clauses(clash: Clash) -> tuple[Clause, ...]:
+def clauses(clash: Conflict) -> tuple[Clause, ...]:
     """The clash as things to read or to process one by one."""
     return tuple(dict.fromkeys(clause for _, clause in _clauses(clash)))
 
 
-def _clauses(clash: Clash) -> list[tuple[Part, Clause]]:
+def _clauses(clash: Conflict) -> list[tuple[Part, Clause]]:
     said = [(r.part, _relation(r)) for r in clash.relations] + [(g.part, _gap(g)) for g in clash.gaps]
     found = [(part, Clause(part.id, part.line, text)) for part, text in said]
     if clash.earliest is not None:
@@ -70,13 +70,13 @@ def _clauses(clash: Clash) -> list[tuple[Part, Clause]]:
     return found
 
 
-def _candidates(clash: Clash) -> Collection[Part]:
+def _candidates(clash: Conflict) -> Collection[Part]:
     optional = [part for part in clash.parts if not part.required]
     constraints = [part for part in optional if part.is_constraint]
     return constraints or optional or [part for part in clash.named if not part.required]
 
 
-def _reason(clash: Clash, dropped: Part) -> str:
+def _reason(clash: Conflict, dropped: Part) -> str:
     others = [part for part in _candidates(clash) if part is not dropped]
     if not others:
         required = any(part.required for part in (*clash.parts, *clash.named))
@@ -87,7 +87,7 @@ def _reason(clash: Clash, dropped: Part) -> str:
 
 
 def _relation(relation: Relation) -> str:
-    left, sign, right = relation.says
+    left, sign, right = relation.words
     if sign == "rigid":
         return f"{left} takes exactly {_seconds(relation.seconds)} from its start to {right}"
     return f"{left} {'is ' if sign != '=' else ''}{sign} {right}"

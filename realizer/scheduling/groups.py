@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from realizer.scheduling.longest_paths import components
 from realizer.scheduling.model import Model
 from realizer.scheduling.problem import Relation
-from realizer.scheduling.rigid_clusters import Shapes
+from realizer.scheduling.rigid_clusters import RigidClusters
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,12 +18,12 @@ class Group:
     `held`: they cannot slide without limit, because some of them are tied to fixed times.
     """
 
-    shapes: list[int]
+    clusters: list[int]
     orders: list[Relation]
     held: bool
 
 
-def groups_of(model: Model, shapes: Shapes) -> list[Group]:
+def groups_of(model: Model, clusters: RigidClusters) -> list[Group]:
     """The groups among the shapes that orders name.
 
     A cluster from which orders lead, directly or not, to a fixed one cannot slide without limit: those
@@ -34,13 +34,13 @@ def groups_of(model: Model, shapes: Shapes) -> list[Group]:
     if not orders:
         return []
     ground = len(model.first)
-    pairs = [(s, t) for s, t, _ in slides(model, shapes, orders)]
+    pairs = [(s, t) for s, t, _ in slides(model, clusters, orders)]
     before: dict[int, list[int]] = {}
     for s, t in pairs:
         before.setdefault(t, []).append(s)
     named = sorted({s for pair in pairs for s in pair} - {ground})
     number = {shape: k for k, shape in enumerate(named)}
-    bound = {ground, *(s for s in named if shapes.held[s])}
+    bound = {ground, *(s for s in named if clusters.held[s])}
     work = list(bound)
     while work:
         for s in before.get(work.pop(), ()):
@@ -58,7 +58,7 @@ def groups_of(model: Model, shapes: Shapes) -> list[Group]:
     groups: dict[int, Group] = {}
     component = components(len(named), joined)
     for shape, c in zip(named, component, strict=True):
-        groups.setdefault(c, Group([], [], shape in bound)).shapes.append(shape)
+        groups.setdefault(c, Group([], [], shape in bound)).clusters.append(shape)
     for (s, t), order in zip(pairs, orders, strict=True):
         ends = {component[number[shape]] for shape in (s, t) if shape != ground}
         if len(ends) == 1 and (ground not in (s, t) or (t if s == ground else s) in bound):
@@ -66,11 +66,13 @@ def groups_of(model: Model, shapes: Shapes) -> list[Group]:
     return list(groups.values())
 
 
-def slides(model: Model, shapes: Shapes, orders: Sequence[Relation]) -> Iterator[tuple[int, int, float]]:
+def slides(
+    model: Model, clusters: RigidClusters, orders: Sequence[Relation]
+) -> Iterator[tuple[int, int, float]]:
     """Each order as (shape, shape, by how much more than the first the second has to slide)."""
     if not orders:
         return iter(())
     u, v = [r.u for r in orders], [r.v for r in orders]
-    gain = shapes.at[u] + [r.seconds for r in orders] - shapes.at[v]
-    owner, label = model.owner, shapes.label
+    gain = clusters.at[u] + [r.seconds for r in orders] - clusters.at[v]
+    owner, label = model.owner, clusters.label
     return zip(label[owner[u]].tolist(), label[owner[v]].tolist(), gain.tolist(), strict=True)

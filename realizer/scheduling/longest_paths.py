@@ -7,7 +7,7 @@ from collections.abc import Sequence
 Edge = tuple[int, int, float]
 
 
-def raise_levels(level: list[float], edges: Sequence[Edge], slack: float) -> list[int] | None:
+def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float) -> list[int] | None:
     """Raise levels in place, as little as possible, until each edge is satisfied.
 
     An edge (u, v, w) is satisfied if level[v] + slack >= level[u] + w.

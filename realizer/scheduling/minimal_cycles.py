@@ -7,27 +7,27 @@ from typing import TypeAlias
 
 import numpy as np
 
-from realizer.scheduling.conflict import Clash, Link, Web
+from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
 from realizer.scheduling.model import LOOSE, Model
 from realizer.scheduling.problem import ORIGIN, Relation
 
 # Steps tried for one clash, some tens of milliseconds; enough for any that a person would read to the end.
-MOST_STEPS = 50_000
+MAX_STEPS = 50_000
 
 # To which point, by how many seconds, and what says so.
 Step: TypeAlias = tuple[int, float, Relation | Link]
 
 
-def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[Clash]:
+def minimal_cycles(model: Model, web: ConstraintGraph, cycles: Sequence[Sequence[Link]]) -> list[Conflict]:
     """A clash for each cycle of inequalities, each of the fewest statements that some cycle there has.
 
     Such a cycle visits no point twice; so without any one statement, the others are a path and can
     hold. No shorter one passes through any of its points; what clashes elsewhere is another clash.
     """
-    ways = _Ways(model)
+    ways = _StepGraph(model)
     found = []
     for cycle in cycles:
-        clash, left = web.cycle(cycle), MOST_STEPS
+        clash, left = web.cycle(cycle), MAX_STEPS
         points = {end for r in clash.relations for end in (r.u, r.v)}
         # Statements meet at points that relations name, or at the first point of what starts too soon.
         points |= {end for link in cycle if link.u == ORIGIN or not points for end in (link.u, link.v)}
@@ -38,13 +38,13 @@ def shortest(model: Model, web: Web, cycles: Sequence[Sequence[Link]]) -> list[C
             left -= tried
             if steps:
                 steps = _simple(start, steps)
-                clash = web.clash(steps)
+                clash = web.conflict(steps)
                 todo = sorted(point for point, _, _ in steps)
         found.append(clash)
     return found
 
 
-class _Ways:
+class _StepGraph:
     """The steps from point to point that constraints, gaps and bounds are, as a graph of statements."""
 
     def __init__(self, model: Model) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float64
-from realizer.scheduling.conflict import Clash, Web
+from realizer.scheduling.conflict import Conflict, ConstraintGraph
 from realizer.scheduling.problem import ORIGIN, Problem
-from realizer.scheduling.union_find import Ties
+from realizer.scheduling.union_find import UnionFind
 
 Index: TypeAlias = npt.NDArray[np.intp]
 
@@ -58,17 +58,17 @@ class Model:
         return np.flatnonzero(chosen[self.owner])
 
 
-def model_of(problem: Problem) -> Model | list[Clash]:
+def model_of(problem: Problem) -> Model | list[Conflict]:
     """The problem as arrays, or the loops of equalities that do not close."""
     n = len(problem.owner)
-    ties = Ties(n)
+    ties = UnionFind(n)
     unfit = [
         k
         for k, (u, v, seconds, _, _) in enumerate(problem.equalities)
         if abs(ties.tie(u, v, seconds)) > LOOSE
     ]
     if unfit:
-        web = Web(problem, unfit)
+        web = ConstraintGraph(problem, unfit)
         return [web.loop(k) for k in unfit]
     named = {p for relation in problem.equalities for p in relation[:2]}
     named.discard(ORIGIN)

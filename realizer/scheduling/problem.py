@@ -43,14 +43,15 @@ class Part:
 class Relation(NamedTuple):
     """As an equality: time[u] = time[v] + seconds. As an order: time[v] >= time[u] + seconds.
 
-    `part` stated it; `says` is the sentence's left side, sign and right side, put into words only on a clash.
+    `part` stated it; `words` is the sentence's left side, sign and right side, put into words only on a
+    clash.
     """
 
     u: int
     v: int
     seconds: float
     part: Part
-    says: tuple[object, str, object]
+    words: tuple[object, str, object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +63,9 @@ class Member:
             refers to it vanishes.
         start: of the block.
         earliest: no behaviour starts sooner.
-        passed: behaviour id -> sync point -> when it was; what has passed stays. The points after these are
-            not before `earliest`.
-        firm: nothing of it is ever dropped, as it plays already.
+        passed_times: behaviour id -> sync point -> when it was; what has passed stays. The points after these
+            are not before `earliest`.
+        is_fixed: nothing of it is ever dropped, as it plays already.
         priorities: behaviour id -> priority; 0 where absent, the lower goes first in a clash.
     """
 
@@ -72,8 +73,8 @@ class Member:
     timings: Mapping[str, Timing]
     start: float = 0.0
     earliest: float = 0.0
-    passed: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    firm: bool = False
+    passed_times: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    is_fixed: bool = False
     priorities: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -166,20 +167,22 @@ def problem_of(
             part = Part(
                 f"{block.id}:{id}",
                 id if block.id == own else f"{block.id}:{id}",
-                member.firm or id in required,
+                member.is_fixed or id in required,
                 member.priorities.get(id, 0.0),
                 order,
                 place.line if place is not None else None,
             )
             # The points to come of a block that has begun are fixed by `_pass`.
-            earliest = -np.inf if id in member.passed else member.earliest
+            earliest = -np.inf if id in member.passed_times else member.earliest
             first[block.id, id] = problem.add(part, member.timings[id], earliest)
             present.append((member, node, part))
-    fillers = {m.block.id: _Filler(m, {o.block.id: o for o in members}, first, outside) for m in members}
+    fillers = {
+        m.block.id: _ReferenceResolver(m, {o.block.id: o for o in members}, first, outside) for m in members
+    }
     for member, node, part in present:
         start, points = first[member.block.id, node.id], member.timings[node.id].points
-        if node.id in member.passed:
-            _pass(problem, member, part, start, points, member.passed[node.id])
+        if node.id in member.passed_times:
+            _pass(problem, member, part, start, points, member.passed_times[node.id])
         filler = fillers[member.block.id]
         for sync, ref in _references(node):
             try:
@@ -190,7 +193,7 @@ def problem_of(
             except LookupError as fault:
                 problem.faults.append((part, str(fault)))
                 break
-            if target[0] == ORIGIN and sync in member.passed.get(node.id, ()):
+            if target[0] == ORIGIN and sync in member.passed_times.get(node.id, ()):
                 continue  # its other end may have moved since
             says = (f"{part.name}:{sync}", "=", ref)
             problem.equalities.append(Relation(start + points.index(sync), *target, part, says))
@@ -229,7 +232,7 @@ def _references(node: Behaviour) -> Iterator[tuple[str, SyncRef]]:
             yield mark.id, mark.ref
 
 
-def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, order: int) -> None:
+def _add_constraint(problem: Problem, filler: _ReferenceResolver, constraint: Constraint, order: int) -> None:
     member = filler.member
     block = member.block
     refs = [ref for piece in constraint.parts for ref in piece.refs]
@@ -241,7 +244,7 @@ def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, o
     part = Part(
         constraint.id or block.id,
         constraint.id or "",
-        constraint.required or member.firm,
+        constraint.required or member.is_fixed,
         order=order,
         line=place.line if place is not None else None,
         is_constraint=True,
@@ -249,9 +252,9 @@ def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, o
     )
     try:
         for piece in constraint.parts:
-            members = [(*filler.must(ref), ref) for ref in piece.refs]
+            members = [(*filler.required_point(ref), ref) for ref in piece.refs]
             target = piece.refs[0] if isinstance(piece, Synchronize) else piece.ref
-            r, there = filler.must(target)
+            r, there = filler.required_point(target)
             for x, here, ref in members:
                 if isinstance(piece, Before):
                     says = (ref, "not after", target)
@@ -265,7 +268,7 @@ def _add_constraint(problem: Problem, filler: _Filler, constraint: Constraint, o
         problem.faults.append((part, str(fault)))
 
 
-class _Filler:
+class _ReferenceResolver:
     """Sync references of one member -> (point, seconds after it)."""
 
     def __init__(
@@ -280,14 +283,14 @@ class _Filler:
     def is_own(self, ref: SyncRef) -> bool:
         return ref.block is None or ref.block == self.member.block.id
 
-    def must(self, ref: SyncRef) -> tuple[int, float]:
+    def required_point(self, ref: SyncRef) -> tuple[int, float]:
         """As `point`, of a behaviour that is present."""
         found = self.point(ref)
         if found is None:
             raise LookupError(f"{ref} is not known")
         return found
 
-    def elsewhere(self, ref: SyncRef) -> float:
+    def external_time(self, ref: SyncRef) -> float:
         """Return the seconds, on the members' clock, of a point outside this problem."""
         time = self.outside(ref)
         if time is None:
@@ -303,7 +306,7 @@ class _Filler:
         there = self.member if ref.block is None else self.members.get(ref.block)
         name = ref.behaviour
         if there is None or (name == "bml" and not self.is_own(ref)):
-            return ORIGIN, self.elsewhere(ref)
+            return ORIGIN, self.external_time(ref)
         if name is None:
             return ORIGIN, there.start + ref.offset
         if name == "bml":
@@ -312,7 +315,7 @@ class _Filler:
             return ORIGIN, there.start + ref.offset
         first = self.first.get((there.block.id, name))
         if first is None:
-            return None if self.is_own(ref) else (ORIGIN, self.elsewhere(ref))
+            return None if self.is_own(ref) else (ORIGIN, self.external_time(ref))
         sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
         points = there.timings[name].points
         if sync not in points:

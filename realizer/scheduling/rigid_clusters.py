@@ -13,7 +13,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
-from realizer.scheduling.union_find import Ties
+from realizer.scheduling.union_find import UnionFind
 
 # Lengths that meet as closely as this count as fitting exactly.
 FITS = 1e-9  # s
@@ -23,7 +23,7 @@ SPARSE_FROM = 64
 
 
 @dataclass(slots=True, eq=False)
-class Shapes:
+class RigidClusters:
     """Which behaviours hold each other, and where their points are.
 
     Attributes:
@@ -37,14 +37,14 @@ class Shapes:
     at: Float64
 
 
-def shapes_of(model: Model) -> Shapes:
+def clusters_of(model: Model) -> RigidClusters:
     """The shapes of all behaviours, each at its least squares, inequalities aside."""
     size = len(model.first)
     tied = model.tied
     # The first point of a behaviour is so long after the root of the class of one of its points.
     ahead = (model.shift[tied] - model.chain[tied]).tolist()
     knots = zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True)
-    ties, strained, held_at = hang(size, knots)
+    ties, strained, held_at = attach(size, knots)
     label, base = np.arange(size + 1), np.zeros(size + 1)
     touched = _each(model.owner[model.tied], size)
     label[touched] = [ties.find(b) for b in touched.tolist()]
@@ -64,17 +64,17 @@ def shapes_of(model: Model) -> Shapes:
         moved[names] = list(fixed.values())
         base += moved[label]
     at = base[model.owner] + model.chain
-    shapes = Shapes(label, held, at)
+    clusters = RigidClusters(label, held, at)
     if strained:
         bent = np.zeros(size + 1, np.bool_)
         bent[[ties.find(b) for b in strained]] = True
-        _relax(model, shapes, bent[label])
-    return shapes
+        _relax(model, clusters, bent[label])
+    return clusters
 
 
-def hang(
+def attach(
     size: int, knots: Iterable[tuple[int, int, float]]
-) -> tuple[Ties, list[int], list[tuple[int, float]]]:
+) -> tuple[UnionFind, list[int], list[tuple[int, float]]]:
     """Hang behaviours on each other at their preferred lengths.
 
     Args:
@@ -86,7 +86,7 @@ def hang(
         ties between behaviours (of their first points), the behaviours that do not fit, and for each point at
         a fixed time (behaviour, seconds of its first point).
     """
-    ties = Ties(size)
+    ties = UnionFind(size)
     strained: list[int] = []
     held: list[tuple[int, float]] = []
     hook: dict[int, tuple[int, float]] = {}
@@ -103,7 +103,7 @@ def hang(
     return ties, strained, held
 
 
-def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
+def _relax(model: Model, clusters: RigidClusters, chosen: Bool) -> None:
     """Put the points of whole shapes, in place, where the sum of a (gap - preferred)^2 is least.
 
     A stretch between two tied points is one spring, whatever is between; so only tied points are unknowns.
@@ -122,12 +122,12 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     loose = i != j
     # The block's start is at 0. A free cluster can have any point at 0: it slides to its place later.
     fixed = nodes == ORIGIN
-    labels = shapes.label[owner[knots]]
-    first = np.empty(len(shapes.label), np.intp)
+    labels = clusters.label[owner[knots]]
+    first = np.empty(len(clusters.label), np.intp)
     first[labels[::-1]] = number[::-1]
-    fixed[first[labels[~shapes.held[labels]]]] = True
+    fixed[first[labels[~clusters.held[labels]]]] = True
     wanted = length - model.shift[q] + model.shift[p]
-    x = settle(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
+    x = least_squares(i[loose], j[loose], wanted[loose], 1.0 / give[loose], fixed, np.zeros(len(nodes)))
     time = x[number] + model.shift[knots]
     # Lengthening per unit of slack after each knot; 0 after a behaviour's last one.
     strain = np.zeros(len(knots))
@@ -138,7 +138,7 @@ def _relax(model: Model, shapes: Shapes, chosen: Bool) -> None:
     place = np.where(before, place, np.minimum(place + 1, len(knots) - 1))
     knot = knots[place]
     pull = np.where(before, strain[place], 0.0)
-    shapes.at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
+    clusters.at[points] = time[place] + (chain[points] - chain[knot]) + pull * (slack[points] - slack[knot])
 
 
 def warm_up() -> None:
@@ -146,7 +146,7 @@ def warm_up() -> None:
     chain = np.arange(SPARSE_FROM)
     ones, fixed = np.ones(SPARSE_FROM), np.zeros(SPARSE_FROM + 1, np.bool_)
     fixed[0] = True
-    settle(chain, chain + 1, ones, ones, fixed, np.zeros(SPARSE_FROM + 1))
+    least_squares(chain, chain + 1, ones, ones, fixed, np.zeros(SPARSE_FROM + 1))
 
 
 def _each(numbers: Index, size: int) -> Index:
@@ -156,7 +156,9 @@ def _each(numbers: Index, size: int) -> Index:
     return np.flatnonzero(there)
 
 
-def settle(i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64) -> Float64:
+def least_squares(
+    i: Index, j: Index, wanted: Float64, stiffness: Float64, fixed: Bool, x: Float64
+) -> Float64:
     """Return x that minimises the sum of stiffness * (x[j] - x[i] - wanted)^2.
 
     Args:

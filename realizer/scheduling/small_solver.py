@@ -15,9 +15,9 @@ import numpy as np
 
 from realizer.scheduling.model import LOOSE, TIGHT
 from realizer.scheduling.problem import ORIGIN, Problem
-from realizer.scheduling.rigid_clusters import FITS, SPARSE_FROM, hang
-from realizer.scheduling.timing import Lists
-from realizer.scheduling.union_find import Ties
+from realizer.scheduling.rigid_clusters import FITS, SPARSE_FROM, attach
+from realizer.scheduling.timing import TimingArrays
+from realizer.scheduling.union_find import UnionFind
 
 NEVER = float("-inf")
 # A NamedTuple is made in a third of the time without its own `__new__`, which is Python.
@@ -32,14 +32,14 @@ class _Knot(NamedTuple):
     shift: float
 
 
-def direct(problem: Problem) -> tuple[list[float], float] | None:
+def solve_small(problem: Problem) -> tuple[list[float], float] | None:
     """(points,) seconds from the block's start, and the cost, as of a Solution.
 
     None if an order, a conflict, the length of a gap or an early start must be handled.
     """
     if problem.orders:
         return None
-    ties = Ties(len(problem.owner))
+    ties = UnionFind(len(problem.owner))
     named: set[int] = set()
     for u, v, seconds, _, _ in problem.equalities:
         if abs(ties.tie(u, v, seconds)) > LOOSE:
@@ -47,7 +47,7 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
         named.add(u)
         named.add(v)
     named.discard(ORIGIN)
-    lists = [timing.lists for timing in problem.timings]
+    lists = [timing.arrays for timing in problem.timings]
     knots: list[list[_Knot]] = [[] for _ in lists]
     hooks: list[tuple[int, int, float]] = []
     for p in sorted(named):
@@ -57,7 +57,7 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
         hooks.append((b, root, shift - lists[b].chain[place]))
 
     # Tied behaviours at their preferred lengths; then the clusters that must stretch.
-    shapes, strained, held_at = hang(len(lists), hooks)
+    shapes, strained, held_at = attach(len(lists), hooks)
     labels = [shapes.find(b) for b in range(len(lists))]
     begins: dict[int, float] = {}
     for b, start in held_at:
@@ -100,7 +100,7 @@ def direct(problem: Problem) -> tuple[list[float], float] | None:
     return time, cost
 
 
-def _fits(at: list[float], own: Lists) -> bool:
+def _fits(at: list[float], own: TimingArrays) -> bool:
     """Return whether a behaviour's gaps are within their bounds."""
     for begin, end, least in zip(at, at[1:], own.least, strict=False):
         if end - begin < least - TIGHT or end < begin:
@@ -112,7 +112,7 @@ def _fits(at: list[float], own: Lists) -> bool:
 
 
 def _relax(
-    lists: list[Lists], knots: list[list[_Knot]], members: Sequence[int], at: list[list[float]]
+    lists: list[TimingArrays], knots: list[list[_Knot]], members: Sequence[int], at: list[list[float]]
 ) -> float | None:
     """Put the points of one shape, in place, where the sum of a (gap - preferred)^2 is least; returns that.
 

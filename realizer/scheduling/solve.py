@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.scheduling.conflict import Clash, Link, Web
-from realizer.scheduling.constrained_groups import squeeze
+from realizer.scheduling.conflict import Conflict, ConstraintGraph, Link
+from realizer.scheduling.constrained_groups import solve_groups
 from realizer.scheduling.groups import Group, groups_of, slides
-from realizer.scheduling.longest_paths import components, raise_levels
-from realizer.scheduling.minimal_cycles import shortest
+from realizer.scheduling.longest_paths import components, longest_path_levels
+from realizer.scheduling.minimal_cycles import minimal_cycles
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.problem import ORIGIN, Problem
-from realizer.scheduling.rigid_clusters import Shapes, shapes_of
-from realizer.scheduling.small_solver import direct
+from realizer.scheduling.rigid_clusters import RigidClusters, clusters_of
+from realizer.scheduling.small_solver import solve_small
 
 # Points up to which plain floats are quicker than arrays.
 FEW = 128
@@ -34,21 +34,21 @@ class Solution:
     cost: float
 
 
-def solve(problem: Problem) -> Solution | list[Clash]:
+def solve(problem: Problem) -> Solution | list[Conflict]:
     """The least-cost times of a problem, everything as early as it can be; or its clashes, at least one.
 
     The clashes that are returned have to be resolved; there may be more behind them.
     """
-    if len(problem.owner) <= FEW and (found := direct(problem)) is not None:
+    if len(problem.owner) <= FEW and (found := solve_small(problem)) is not None:
         return Solution(np.array(found[0]), found[1])
     model = model_of(problem)
     if isinstance(model, list):
         return model
-    shapes = shapes_of(model)
-    clashes = _keep_inequalities(model, shapes)
+    clusters = clusters_of(model)
+    clashes = _keep_inequalities(model, clusters)
     if clashes:
         return clashes
-    time = _slide(model, shapes)
+    time = _slide(model, clusters)
     # Exactly equal where the document says so, exactly in order, exactly not too early, despite rounding.
     time = time[model.root] + model.shift
     time[model.first] = np.maximum(time[model.first], model.earliest)
@@ -62,59 +62,61 @@ def solve(problem: Problem) -> Solution | list[Clash]:
     return Solution(time, float(np.sum(model.stiffness * strain * strain)))
 
 
-def _keep_inequalities(model: Model, shapes: Shapes) -> list[Clash]:
+def _keep_inequalities(model: Model, clusters: RigidClusters) -> list[Conflict]:
     """Squeeze, in place, the groups of shapes that break a gap or an order which sliding cannot mend."""
-    at, label = shapes.at, shapes.label
+    at, label = clusters.at, clusters.label
     length = at[model.gap + 1] - at[model.gap]
     misfit = (length < model.least - TIGHT) | (length > model.most + TIGHT)
-    soon = shapes.held[label[:-1]] & (at[model.first] < model.earliest - TIGHT)
+    soon = clusters.held[label[:-1]] & (at[model.first] < model.earliest - TIGHT)
     bad = {*label[model.owner[model.gap[misfit]]].tolist(), *label[:-1][soon].tolist()}
-    groups = groups_of(model, shapes)
-    alone = bad.difference(*(group.shapes for group in groups))
-    begin = _earliest(model, shapes)
-    groups = [g for g in groups if not bad.isdisjoint(g.shapes) or not _fits(model, shapes, g, begin)]
-    groups += [Group([shape], [], bool(shapes.held[shape])) for shape in sorted(alone)]
-    cycles = squeeze(model, shapes, groups) if groups else []
+    groups = groups_of(model, clusters)
+    alone = bad.difference(*(group.clusters for group in groups))
+    begin = _earliest(model, clusters)
+    groups = [g for g in groups if not bad.isdisjoint(g.clusters) or not _fits(model, clusters, g, begin)]
+    groups += [Group([shape], [], bool(clusters.held[shape])) for shape in sorted(alone)]
+    cycles = solve_groups(model, clusters, groups) if groups else []
     for order in model.problem.orders:
         if order.u == order.v == ORIGIN and order.seconds > LOOSE:
             cycles.append([Link(ORIGIN, ORIGIN, order.seconds, order)])
     if not cycles:
         return []
-    web = Web(model.problem)
-    return shortest(model, web, cycles)
+    web = ConstraintGraph(model.problem)
+    return minimal_cycles(model, web, cycles)
 
 
-def _fits(model: Model, shapes: Shapes, group: Group, begin: Float64) -> bool:
+def _fits(model: Model, clusters: RigidClusters, group: Group, begin: Float64) -> bool:
     """Return whether the group's clusters, unchanged, can slide so that the orders among them hold."""
     if not group.orders:
         return True
-    number = {shape: k for k, shape in enumerate(group.shapes, 1) if not shapes.held[shape]}
-    levels = [0.0] * (len(group.shapes) + 1)
+    number = {shape: k for k, shape in enumerate(group.clusters, 1) if not clusters.held[shape]}
+    levels = [0.0] * (len(group.clusters) + 1)
     if group.held:
         for shape, k in number.items():
             levels[k] = float(begin[shape])
-    edges = [(number.get(s, 0), number.get(t, 0), gain) for s, t, gain in slides(model, shapes, group.orders)]
-    return raise_levels(levels, edges, TIGHT) is None and levels[0] == 0.0
+    edges = [
+        (number.get(s, 0), number.get(t, 0), gain) for s, t, gain in slides(model, clusters, group.orders)
+    ]
+    return longest_path_levels(levels, edges, TIGHT) is None and levels[0] == 0.0
 
 
-def _earliest(model: Model, shapes: Shapes) -> Float64:
+def _earliest(model: Model, clusters: RigidClusters) -> Float64:
     """(B + 1,) by label: how far a shape has to slide so that nothing of it is too soon."""
-    level = np.full(len(shapes.label), -np.inf)
-    np.maximum.at(level, shapes.label[:-1], model.earliest - shapes.at[model.first])
+    level = np.full(len(clusters.label), -np.inf)
+    np.maximum.at(level, clusters.label[:-1], model.earliest - clusters.at[model.first])
     return level
 
 
-def _slide(model: Model, shapes: Shapes) -> Float64:
+def _slide(model: Model, clusters: RigidClusters) -> Float64:
     """Place every free cluster as early as possible; returns (n,)."""
     ground = len(model.first)
-    free = ~shapes.held
-    level = np.where(free, _earliest(model, shapes), 0.0)
+    free = ~clusters.held
+    level = np.where(free, _earliest(model, clusters), 0.0)
     level[np.isneginf(level)] = 0.0
     orders = model.problem.orders
     if orders:
         edges = [
             (s if free[s] else ground, t if free[t] else ground, gain)
-            for s, t, gain in slides(model, shapes, orders)
+            for s, t, gain in slides(model, clusters, orders)
         ]
         # Clusters before a fixed one have been solved or fit; only rounding could move them.
         edges = [edge for edge in edges if edge[1] != ground]
@@ -122,8 +124,8 @@ def _slide(model: Model, shapes: Shapes) -> Float64:
         component = components(len(number), [(number[s], number[t], gain) for s, t, gain in edges])
         edges.sort(key=lambda edge: component[number[edge[0]]])
         levels = level.tolist()
-        if raise_levels(levels, edges, TIGHT):
+        if longest_path_levels(levels, edges, TIGHT):
             levels = level.tolist()
-            raise_levels(levels, edges, LOOSE)
+            longest_path_levels(levels, edges, LOOSE)
         level = np.array(levels)
-    return shapes.at + level[shapes.label[model.owner]]
+    return clusters.at + level[clusters.label[model.owner]]

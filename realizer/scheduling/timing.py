@@ -12,7 +12,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 
 
-class Lists(NamedTuple):
+class TimingArrays(NamedTuple):
     """The numbers of a Timing of k points as plain floats.
 
     Attributes:
@@ -68,13 +68,13 @@ class Timing:
             raise ValueError(f"most: wanted at least {self.least.tolist()}, got {self.most.tolist()}")
 
     @cached_property
-    def lists(self) -> Lists:
+    def arrays(self) -> TimingArrays:
         """The same values as plain floats."""
         slack = np.ones(len(self.points) - 1) if self.rigid else 1.0 / self.stiffness
         fits = bool((self.preferred >= np.maximum(self.least, 0.0)).all())
         if self.most is not None:
             fits = fits and bool((self.preferred <= self.most).all())
-        return Lists(
+        return TimingArrays(
             (0.0, *np.cumsum(self.preferred).tolist()),
             (0.0, *np.cumsum(slack).tolist()),
             tuple(self.least.tolist()),

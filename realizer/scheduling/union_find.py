@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class Ties:
+class UnionFind:
     """n points; those tied together move as one. The smallest number of a class is its root.
 
     Attributes:

@@ -40,20 +40,20 @@ def faces(count: int) -> str:
 def stream(count: int) -> None:
     player = Player(PlayOptions(idle=False))
     plan([f'<bml id="b{i}"><head id="n" lexeme="NOD" start="1"/></bml>' for i in range(count)], player)
-    known = Plans(player.cast)
+    known = Plans(player.blocks)
     known.changes()
     quiet = median(known.have_changed, 30)
-    whole = median(lambda: Plans(player.cast).changes(), 5)
+    whole = median(lambda: Plans(player.blocks).changes(), 5)
     print(f"{count:6} blocks alive   quiet tick {quiet:8.3f}   whole state {whole:8.1f}")
 
 
 def picture(count: int) -> None:
     player = Player(PlayOptions(idle=False))
     schedules, _ = plan([faces(count)], player)
-    blocks = lines_of(player.cast, schedules)
+    blocks = lines_of(player.blocks, schedules)
     drawn = timeline(blocks)
     few = 20 if count < 100 else 3
-    data = median(lambda: json.dumps(lines_of(player.cast, schedules)[0].to_json()), few)
+    data = median(lambda: json.dumps(lines_of(player.blocks, schedules)[0].to_json()), few)
     layout = median(lambda: timeline(blocks), few)
     text = median(lambda: svg(drawn), few)
     pixels = median(lambda: png(drawn), 1)

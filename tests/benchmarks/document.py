@@ -95,13 +95,13 @@ def play(count: int) -> tuple[Costs, int]:
             (block,) = read(text, VOCABULARY)
         assert isinstance(block, Block)
         with costs.of("planning"):
-            planned = plan(block, KINDS, player.world, start=now)
+            planned = plan(block, KINDS, player.context, start=now)
         times = planned.schedule.times
         if len(times) != count:
             raise SystemExit(f"the benchmark's own document is wrong: {planned.schedule.warnings}")
         with costs.of("expand"):
             for node in block.behaviours:
-                KINDS[node.tag].expand(node, times[node.id], player.world)
+                KINDS[node.tag].expand(node, times[node.id], player.context)
         with costs.of("submit"):
             player.submit(block, now)
         before = log.newest

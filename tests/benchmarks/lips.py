@@ -160,7 +160,7 @@ def measure(voice: Voice, mouth: Mouth, shown: str, language: str, text: str, sc
     """One sentence, in every phase."""
     document = BML.format(shown=SHOWN[shown], language=language, text=escape(text))
     played = realize(document, voice=voice, fps=1 / STEP, idle=False, face=mouth.face.name)
-    said = played.speaking[0]
+    said = played.speeches[0]
     times = played.aus.times
     keep = times < said.start + said.utterance.duration + 0.2
     times, rows = times[keep], poses(played.aus, mouth.face.takes)[keep]

@@ -48,7 +48,7 @@ def test_two_characters_stand_side_by_side() -> None:
 
 def test_a_broken_document_is_refused_and_the_next_one_plays() -> None:
     played = realize(['<bml id="x"><head', '<bml id="b"><head id="n" lexeme="NOD"/></bml>'])
-    assert len(played.refused) == 1
+    assert len(played.refusals) == 1
     assert played.duration > 0
 
 
@@ -117,7 +117,7 @@ def test_steps_pass_on_the_golden_values(
         (block,) = result
         return write(block)
 
-    builder = block_planner._Work
+    builder = block_planner._PlanBuilder
     run_read = pipeline.read
     monkeypatch.setattr(pipeline, "read", lambda *args: list(run_read(*args)))
     note("parse", pipeline, "read", read)

@@ -10,8 +10,8 @@ import pytest
 from realizer import realize
 from realizer.core.errors import RealizerError
 from realizer.examples import examples
-from realizer.playback.active_block import Speaking
-from realizer.realization import MOST_FRAMES, counted
+from realizer.playback.active_block import ScheduledSpeech
+from realizer.realization import MAX_FRAMES, frames_until
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance
 
@@ -42,7 +42,7 @@ def test_sound_is_mixed_where_it_belongs() -> None:
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False)
     tone = Utterance(0.5, (), (), {}, 8000, np.full(4000, 1000, np.int16))
     object.__setattr__(
-        played, "speaking", (Speaking(1.0, float("inf"), tone, 0), Speaking(1.2, 1.3, tone, 0))
+        played, "speaking", (ScheduledSpeech(1.0, float("inf"), tone, 0), ScheduledSpeech(1.2, 1.3, tone, 0))
     )
     sound = played.sound(16000)
     assert len(sound) == 32000
@@ -56,7 +56,9 @@ def test_visemes_are_those_of_their_character_and_end_where_the_speech_is_cut_of
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False, fps=50)
     vowel = Utterance(1.0, (), (Phoneme(0.0, 1.0, "ɑ"),), {})
     object.__setattr__(
-        played, "speaking", (Speaking(0.5, float("inf"), vowel, 1), Speaking(1.0, 1.4, vowel, 0))
+        played,
+        "speaking",
+        (ScheduledSpeech(0.5, float("inf"), vowel, 1), ScheduledSpeech(1.0, 1.4, vowel, 0)),
     )
     said = played.visemes()
     assert (said[:51, 0] == 1).all()
@@ -66,6 +68,6 @@ def test_visemes_are_those_of_their_character_and_end_where_the_speech_is_cut_of
 
 
 def test_frames_are_counted_up_to_a_most() -> None:
-    assert counted(2.0, 25) == 51
-    with pytest.raises(RealizerError, match=rf"wanted at most {MOST_FRAMES} frames, got 900001 of 36000 s"):
-        counted(36000, 25)
+    assert frames_until(2.0, 25) == 51
+    with pytest.raises(RealizerError, match=rf"wanted at most {MAX_FRAMES} frames, got 900001 of 36000 s"):
+        frames_until(36000, 25)

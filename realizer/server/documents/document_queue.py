@@ -169,7 +169,7 @@ class Intake:
             return
         try:
             block = self.speeches.placed(block)
-            wants = self._player.wants(block)
+            wants = self._player.speech_requests(block)
             character = self._player.character_index(block.character_id)
             waiting = self.preparation.add(block, character, {}, t)
             waiting.lacks, waiting.flows = self.speeches.lacks, self.speeches.flows(block)
@@ -212,7 +212,7 @@ class Intake:
 
     def _speak_again(self, waiting: Waiting, lengths: Mapping[str, Mapping[str, float]], t: float) -> None:
         """More of the block fits if its speech lasts so long; what comes back is taken as it is."""
-        wants = self._player.wants(waiting.block)
+        wants = self._player.speech_requests(waiting.block)
         again = {b: wants[b] for b in self.orders.unfinished(waiting)}
         again |= {b: replace(wants[b], seconds=times["end"]) for b, times in lengths.items()}
         waiting.utterances = {b: without_stretch(u) for b, u in waiting.utterances.items()}
@@ -238,7 +238,7 @@ class Intake:
         self._player.stop(t, blocks)
 
     def _beyond_limits(self, block: Block) -> str | None:
-        busy = len(self.preparation) + self._player.alive
+        busy = len(self.preparation) + self._player.active_count
         return beyond(block, self._settings, busy, self._player.characters)
 
     def _internal(self, block: Block, t: float) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bml_schema import Block, Speech
 from realizer.core.settings import Settings, raises
-from realizer.playback.references import abroad
+from realizer.playback.references import external_refs
 from realizer.scheduling.timing import Schedule
 
 MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
@@ -57,7 +57,7 @@ def too_long(block: Block, schedule: Schedule, settings: Settings) -> str | None
     A block that is tied to points of others, or to what a client anticipates, lasts as these say: an open
     speech for example has no end yet.
     """
-    if schedule.duration <= settings.max_duration or abroad(block):
+    if schedule.duration <= settings.max_duration or external_refs(block):
         return None
     words = f"wanted a block of at most {settings.max_duration:g} s, got {schedule.duration:.1f}"
     return f"{words} {raises('max_duration')}"

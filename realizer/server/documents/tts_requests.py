@@ -139,15 +139,15 @@ class Orders:
                 return False
             waiting.utterances[behaviour] = text.given = text.growing.take(part)
             return True
-        playing = self._player.cast.find(block)
-        if playing is None or playing.world.utterances.get(behaviour) is not before:
+        playing = self._player.blocks.find(block)
+        if playing is None or playing.context.utterances.get(behaviour) is not before:
             return False
         times = playing.schedule.times.get(behaviour)
         if times is None:
             return False
         heard = t - playing.start - float(times[0])
         text.given = text.growing.take(part, heard + SOON if heard > text.growing.made - SOON else 0.0)
-        if not self._player.respeak(block, behaviour, text.given, t):
+        if not self._player.update_speech_timing(block, behaviour, text.given, t):
             return False
         # Planning has told what was said of the parts before.
         for fault in text.given.warnings[len(before.warnings) :]:

@@ -77,13 +77,13 @@ def feeling(asked: str) -> str:
     """
     from bml_schema import Emotion
     from realizer.behaviours import emotion
-    from realizer.behaviours.kind import World
+    from realizer.behaviours.kind import PlanningContext
     from realizer.emotions.wheel import shares
 
     fields = {k: v for k, v in _object(asked).items() if k in ("name", "angle", "activation", "profile")}
     node = Emotion(id="asked", **fields)
     try:
-        wrong = node.fault() or next((fault.text for fault in emotion.check(node, World())), "")
+        wrong = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
         if wrong:
             raise DeskError(wrong)
         values = emotion.values_of(node)

@@ -8,8 +8,8 @@ from typing import Any
 
 from bml_schema import Feedback
 from realizer.core.settings import Settings, SettingsError
-from realizer.playback.active_block import Speaking
-from realizer.realization import Realization, counted, warned
+from realizer.playback.active_block import ScheduledSpeech
+from realizer.realization import Realization, frames_until, merge_warnings
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.recordings import Record
 from realizer.server.journal.replay import replay
@@ -48,10 +48,10 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
     session, settings = again.session, again.session.settings
     viewer = Viewer(session, settings.fps, again.begin)
     begin = viewer.first / settings.fps
-    counted(again.last - begin, settings.fps)
+    frames_until(again.last - begin, settings.fps)
     again.play(viewer.look)
     end = max(again.last, viewer.still) - begin
-    characters = viewer.performances(counted(end, settings.fps))
+    characters = viewer.performances(frames_until(end, settings.fps))
     feedback = [feedback for feedback, _ in again.log.told]
     schedules = [playing.latest for playing in viewer.blocks]
     speaking = [said for playing in viewer.blocks for said in playing.speech.values()]
@@ -59,12 +59,12 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         fps=settings.fps,
         duration=end,
         face_name=session.faces.name(0),
-        worn=viewer.worn,
+        face_changes=viewer.worn,
         characters=characters,
         schedules=tuple(replace(one, start=one.start - begin) for one in schedules),
-        told=tuple(feedback),
-        warnings=warned(feedback, schedules),
-        speaking=tuple(sorted((_earlier(one, begin) for one in speaking), key=lambda one: one.start)),
+        feedback_events=tuple(feedback),
+        warnings=merge_warnings(feedback, schedules),
+        speeches=tuple(sorted((_earlier(one, begin) for one in speaking), key=lambda one: one.start)),
         deformer=settings.deformer,
         mapping=session.faces.mapping(0),
     )
@@ -101,7 +101,7 @@ class _Again:
         finally:
             studio.close()
         # What was being said when the record broke off has no end of its own: it ends with what is planned.
-        ends = [playing.end for playing in session.player.cast.alive()]
+        ends = [playing.end for playing in session.player.blocks.active()]
         end = max((end for end in ends if end < self.last + OPEN / 2), default=self.last)
         session.pass_time(end, look, since=self.last)
         look(end)
@@ -122,7 +122,7 @@ class _Whole(FeedbackLog):
         return text
 
 
-def _earlier(speaking: Speaking, seconds: float) -> Speaking:
+def _earlier(speaking: ScheduledSpeech, seconds: float) -> ScheduledSpeech:
     gains = tuple(gain.shifted(-seconds) for gain in speaking.gains)
     return replace(speaking, start=speaking.start - seconds, until=speaking.until - seconds, gains=gains)
 

@@ -9,8 +9,8 @@ import numpy as np
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.face.fap_mapping import mapping_of
-from realizer.playback.active_block import Playing
-from realizer.realization import Performance, Worn
+from realizer.playback.active_block import ActiveBlock
+from realizer.realization import FaceChange, Performance
 from realizer.server.session.session import Session
 from realizer.server.streams.frame_windows import EPSILON, Window, first_at
 
@@ -33,7 +33,7 @@ class Viewer:
         self._fps = fps
         self.first = math.floor((begin + EPSILON) * fps)
         self._seats: list[_Seat] = []
-        self._blocks: dict[int, Playing] = {}
+        self._blocks: dict[int, ActiveBlock] = {}
 
     def look(self, t: float) -> None:
         """Take in every frame before `t`, as it is planned now: something is about to change."""
@@ -41,22 +41,22 @@ class Viewer:
             self._take(first_at(t, self._fps))
 
     @property
-    def blocks(self) -> list[Playing]:
+    def blocks(self) -> list[ActiveBlock]:
         """All that were accepted, in that order."""
         return list(self._blocks.values())
 
     @property
     def still(self) -> float:
         """When nothing moves any more, but what the face does by itself: seconds on the session clock."""
-        ends = [playing.gone for playing in self.blocks if playing.end < math.inf]
-        for character in self._session.player.held_by:
-            held = (*character.direct.values(), *character.feeling.values())
+        ends = [playing.invisible_after for playing in self.blocks if playing.end < math.inf]
+        for character in self._session.player.character_states:
+            held = (*character.direct.values(), *character.emotion.values())
             ends += [float(one.times[-1]) if one.gone == math.inf else one.gone for one in held]
             ends += [shift.end for shift in character.shifts]
         return max(ends, default=0.0)
 
     @property
-    def worn(self) -> tuple[Worn, ...]:
+    def worn(self) -> tuple[FaceChange, ...]:
         """The faces of the first character."""
         return self._worn(self._seats[0])
 
@@ -68,7 +68,7 @@ class Viewer:
 
     def _take(self, end: int) -> None:
         player = self._session.player
-        self._blocks.update((playing.number, playing) for playing in player.cast.all())
+        self._blocks.update((playing.number, playing) for playing in player.blocks.all())
         for index in range(len(player.characters)):
             if index == len(self._seats):
                 self._seats.append(_Seat(self._session, index, self._fps, self.first))
@@ -83,9 +83,11 @@ class Viewer:
         mask = np.any([part.mask for part in faps], axis=0)
         return Performance(aus, FAPFrames(aus.times, values, mask))
 
-    def _worn(self, seat: _Seat) -> tuple[Worn, ...]:
+    def _worn(self, seat: _Seat) -> tuple[FaceChange, ...]:
         mapping = self._session.settings.mapping
-        return tuple(Worn(frame - self.first, name, mapping_of(name, mapping)) for frame, name in seat.faces)
+        return tuple(
+            FaceChange(frame - self.first, name, mapping_of(name, mapping)) for frame, name in seat.faces
+        )
 
 
 class _Seat:

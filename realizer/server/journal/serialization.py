@@ -10,7 +10,7 @@ import numpy as np
 from realizer.animation.axis import axis
 from realizer.animation.channel import Channel, Gain, Joint, Layer
 from realizer.animation.idle.blinks import Fewer
-from realizer.playback.character import Character, Shift
+from realizer.playback.character import BaseShift, Character
 from realizer.scheduling.timing import Schedule
 
 # Python writes a float so that it is read again to the last bit.
@@ -31,7 +31,7 @@ def plain_character(character: Character) -> dict[str, Any]:
             for shift in character.shifts
         ],
         "direct": {name: _plain_channel(channel) for name, channel in character.direct.items()},
-        "feeling": {name: _plain_channel(channel) for name, channel in character.feeling.items()},
+        "feeling": {name: _plain_channel(channel) for name, channel in character.emotion.items()},
     }
 
 
@@ -42,7 +42,7 @@ def character_of(told: Mapping[str, Any]) -> Character:
         KeyError, TypeError, ValueError: it is none.
     """
     shifts = [
-        Shift(
+        BaseShift(
             float(shift["begin"]),
             float(shift["end"]),
             frozenset(shift["regions"]),

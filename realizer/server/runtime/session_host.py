@@ -113,7 +113,7 @@ class Shell:
                 "sessions": len(sessions),
                 "connections": len(self._clients),
                 "blocks_waiting": sum(len(session.intake.preparation) for session in sessions),
-                "blocks_playing": sum(session.player.alive for session in sessions),
+                "blocks_playing": sum(session.player.active_count for session in sessions),
                 "unsent_bytes": sum(client.waiting for client in self._clients.values()),
                 "memory_bytes": memory(),
             },
@@ -268,9 +268,9 @@ class Shell:
         del self._reading[session]
         if self._reading:
             self._loop.call_soon(self._read)
-        began, plans = self._loop.time(), session.player.revision
+        began, plans = self._loop.time(), session.player.version
         self._work(session, began, reads=True)
-        if session.player.revision != plans:
+        if session.player.version != plans:
             self.metrics.planning.observe(self._loop.time() - began)
 
     def _work(self, session: Session, now: float, *, reads: bool) -> None:

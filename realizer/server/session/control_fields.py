@@ -7,7 +7,7 @@ from collections.abc import Collection
 from bml_schema import Emotion
 from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import emotion
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.playback.player import Player
 from realizer.protocol.messages.requests import Feeling, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
@@ -73,7 +73,7 @@ def feeling_of(asked: Feeling | None) -> dict[str, float]:
     if asked is None:
         return {}
     node = Emotion(id="set", **asked.model_dump())
-    said = node.fault() or next((fault.text for fault in emotion.check(node, World())), "")
+    said = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
     if not said:
         try:
             return {target.name: value for target, value in emotion.values_of(node).items()}

@@ -106,7 +106,7 @@ class ControlHandlers:
         strange = [
             repr(id[:80])
             for id in message.blocks or ()
-            if not (unread or id in known or id in intake.speeches or self._player.cast.knew(id))
+            if not (unread or id in known or id in intake.speeches or self._player.blocks.has_seen(id))
         ]
         if strange:
             raise Wrong("blocks", f"wanted blocks that play or wait, got {', '.join(strange[:10])}")
@@ -137,9 +137,9 @@ class ControlHandlers:
 
     def _set(self, message: SetMessage, t: float) -> None:
         index = index_of(self._player, message.character)
-        values = held(message, self._player.held(index))
+        values = held(message, self._player.direct_names(index))
         if "emotion" in message.model_fields_set:
-            self._player.set_feeling(feeling_of(message.emotion), t, index)
+            self._player.set_emotion(feeling_of(message.emotion), t, index)
         self._player.set_direct(values, t, index)
 
 

@@ -110,8 +110,8 @@ class Session:
             settings.play_options(scene),
             kinds=KINDS,
             clips=self.clips.recordings,
-            takes=lambda index: self.faces.of(index).takes,
-            refuses=lambda block, schedule: too_long(block, schedule, settings),
+            face_inputs=lambda index: self.faces.of(index).takes,
+            veto=lambda block, schedule: too_long(block, schedule, settings),
         )
         self.capabilities = dict(capabilities or {})
         self.broadcast = Broadcast(self.player, self.faces)
@@ -328,7 +328,7 @@ class Session:
         Args:
             t: seconds on the session clock; what was due until then was told.
         """
-        if not (self.intake.resting and self.player.resting(t if self.notes.overgrown else float("-inf"))):
+        if not (self.intake.resting and self.player.is_idle(t if self.notes.overgrown else float("-inf"))):
             return True
         try:
             if self.notes.compact(checkpoint.write(self._saved(t), self.clips.changes())):
@@ -339,14 +339,14 @@ class Session:
         return True
 
     def _saved(self, t: float) -> SessionState:
-        past, expected = self.player.cast.known()
+        past, expected = self.player.blocks.snapshot()
         return SessionState(
             at=t,
             connections=self.connections,
             seq=self.log.newest,
             told=self.log.last(),
-            scene=self.player.world.scene,
-            characters=self.player.held_by,
+            scene=self.player.context.scene,
+            characters=self.player.character_states,
             faces=self.faces.given,
             voices=self.intake.voices,
             past=past,
@@ -437,7 +437,7 @@ class Session:
         if not rhythm.calm(t):
             return None
         if rhythm.tells(t):
-            plans = self.player.revision
+            plans = self.player.version
             self._publish(t)
             rhythm.told(plans)
         sends, following = self.broadcast.frames_due(t)

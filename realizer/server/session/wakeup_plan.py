@@ -52,7 +52,7 @@ class Rhythm:
     def told(self, plans: int) -> None:
         """Feedback has been told; `plans`: the player's revision before."""
         self._tells = self._player.next_change()
-        if self._player.revision != plans:
+        if self._player.version != plans:
             self.stir()
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
-from realizer.playback.references import redirected, references
+from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
 from realizer.server.speech.speech_chunks import Piece
 from realizer.server.speech.speech_stream import Turn
@@ -118,11 +118,11 @@ class Speeches:
         """A piece behind those before it; any other block with what it says of `ID:ID:m` of the piece."""
         speech = self._of(block.id)
         if speech is None or block.id == speech.id:
-            return redirected(block, self._found) if any(map(self._names, references(block))) else block
-        holder = self._player.cast.find(speech.id)
+            return with_references(block, self._found) if any(map(self._names, references(block))) else block
+        holder = self._player.blocks.find(speech.id)
         before = [id for id in speech.left if id != block.id]
-        if holder is not None and holder.waiting:
-            before += [wait.block.block.id for wait in holder.waits]
+        if holder is not None and holder.is_waiting:
+            before += [wait.block.block.id for wait in holder.dependencies]
         return replace(block, append_after=tuple(before))
 
     def flows(self, block: Block) -> bool:
@@ -190,11 +190,11 @@ class Speeches:
             if speech.over:
                 continue
             # Before its own block starts nobody knows when that is: it must not end before.
-            placed = self._player.cast.find(speech.id) is not None
+            placed = self._player.blocks.find(speech.id) is not None
             if not (speech.closed and placed) or speech.owed or speech.unsaid:
                 end = t + OPEN if speech.end < t + OPEN / 2 else speech.end
             else:
-                last = (self._player.cast.find(id) for id in speech.ahead)
+                last = (self._player.blocks.find(id) for id in speech.ahead)
                 end = max([speech.spoken, *(piece.end for piece in last if piece is not None)]) + BEHIND
                 end = max(t, end)
             if abs(end - speech.end) > SAME:
@@ -214,7 +214,7 @@ class Speeches:
         if not speech.asked:
             return True
         ready = bool(speech.unsaid) and len(speech.left) < AHEAD
-        return ready and self._player.cast.find(speech.id) is not None
+        return ready and self._player.blocks.find(speech.id) is not None
 
     def _names(self, ref: SyncRef) -> bool:
         """Whether it is a sync in the text of a speech: `ID:ID:m`."""
@@ -229,7 +229,7 @@ class Speeches:
         return ref if piece is None else replace(ref, block=piece)
 
     def _forget(self, id: str) -> None:
-        self._player.lapse(self._speeches.pop(id).anticipator)
+        self._player.forget_anticipator(self._speeches.pop(id).anticipator)
 
     def _anticipate(self, speech: Turn, end: float, t: float) -> None:
         speech.end = end
@@ -237,10 +237,10 @@ class Speeches:
 
     def _words(self, piece: str, t: float) -> list[str]:
         """The words of a piece that have sounded."""
-        playing = next((p for p in reversed(self._player.cast.all()) if p.block.id == piece), None)
+        playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == piece), None)
         if playing is None:
             return []
-        heard = playing.said(t)
+        heard = playing.words_spoken(t)
         if heard is not None:
             return heard.split()
         order = sorted(playing.speech.values(), key=lambda s: s.start)

@@ -14,8 +14,8 @@ from realizer.server.streams.frame_windows import EPSILON
 def send_packets(connection: Connection, s: SoundSubscription, now: float, effects: list[Effect]) -> None:
     """Every packet whose time has come; those that a change of plans has made untrue are taken back."""
     sound, current = s.sound, math.floor((now + EPSILON) / PACKET)
-    if s.revision != sound.player.revision:
-        s.revision = sound.player.revision
+    if s.revision != sound.player.version:
+        s.revision = sound.player.version
         if (changed := _changed(s, current)) is not None:
             effects.append(Send(connection.id, _packet(s, changed, b"", forget=True)))
             s.next = changed
@@ -37,7 +37,7 @@ def send_packets(connection: Connection, s: SoundSubscription, now: float, effec
 
 def packets_due(s: SoundSubscription) -> float:
     """When `send_packets` will next have something; infinite where nothing sounds."""
-    if s.revision != s.sound.player.revision:
+    if s.revision != s.sound.player.version:
         return -math.inf
     span = s.sound.span()
     if span is None or span[1] <= s.next * PACKET:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from realizer.core.array_types import Float32
-from realizer.playback.active_block import Speaking
-from realizer.playback.audio_mix import CUT, heard
+from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.audio_mix import CUT, render_utterance
 from realizer.playback.player import Player
 
 # A sound packet, and how far ahead of its time it is sent.
@@ -26,9 +26,9 @@ class Sound:
         self.rate = rate
         self.character = character
         self._samples = round(PACKET * rate)
-        self._cache: dict[tuple[int, int], tuple[Speaking, Float32]] = {}  # the latest at the end
+        self._cache: dict[tuple[int, int], tuple[ScheduledSpeech, Float32]] = {}  # the latest at the end
 
-    def speaking(self) -> list[Speaking]:
+    def speaking(self) -> list[ScheduledSpeech]:
         """What sounds or will sound, in order of its start."""
         return [
             s
@@ -62,7 +62,7 @@ class Sound:
             return None
         return np.clip(np.rint(mix), -32768, 32767).astype("<i2").tobytes()
 
-    def _pcm(self, speaking: Speaking, first: int, last: int) -> Float32:
+    def _pcm(self, speaking: ScheduledSpeech, first: int, last: int) -> Float32:
         """Samples first .. last of a speech at the stream's rate, as a film has it; fewer at its end."""
         size = BLOCK * self.rate
         blocks = [self._block(speaking, n) for n in range(first // size, -(-last // size))]
@@ -70,7 +70,7 @@ class Sound:
         begin = first // size * size
         return whole[first - begin : last - begin]
 
-    def _block(self, speaking: Speaking, number: int) -> Float32:
+    def _block(self, speaking: ScheduledSpeech, number: int) -> Float32:
         """`BLOCK` seconds of a speech: of one that lasts for minutes no more is made than is heard."""
         key = (id(speaking), number)
         known = self._cache.pop(key, None)
@@ -81,16 +81,16 @@ class Sound:
             del self._cache[next(iter(self._cache))]
         return known[1]
 
-    def _made(self, speaking: Speaking, second: int) -> Float32:
+    def _made(self, speaking: ScheduledSpeech, second: int) -> Float32:
         utterance = speaking.utterance
         assert utterance.pcm is not None
         # A second more on either side, so that filters and fades are those of the whole.
         first, rate = max(0, second - 1), utterance.sample_rate
         pcm = utterance.pcm[first * rate : (second + BLOCK + 1) * rate]
         part = replace(utterance, pcm=pcm, duration=len(pcm) / rate)
-        sound = heard(replace(speaking, start=speaking.start + first, utterance=part), self.rate)
+        sound = render_utterance(replace(speaking, start=speaking.start + first, utterance=part), self.rate)
         return sound[(second - first) * self.rate : (second - first + BLOCK) * self.rate]
 
 
-def _end(speaking: Speaking) -> float:
+def _end(speaking: ScheduledSpeech) -> float:
     return min(speaking.start + speaking.utterance.duration, speaking.until + CUT)

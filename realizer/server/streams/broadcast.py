@@ -127,7 +127,7 @@ class Broadcast:
         # Subscriptions hold them: what nobody gets any more is gone, however many rates were asked for.
         self._timelines = WeakValueDictionary[tuple[int, float], Timeline]()
         self._sounds = WeakValueDictionary[tuple[int | None, int], Sound]()
-        self._plans = Plans(player.cast)
+        self._plans = Plans(player.blocks)
         self._lanes: list[Lane] = []
         self._sound_takers: list[tuple[Connection, SoundSubscription]] = []
         self._plan_takers: list[tuple[Connection, PlanSubscription]] = []
@@ -153,7 +153,7 @@ class Broadcast:
     def sound(self, index: int | None, rate: int, now: float) -> SoundSubscription:
         """A subscription to sound, from `now` on; of one character or of all."""
         sound = self._sounds.setdefault((index, rate), Sound(self.player, rate, index))
-        return SoundSubscription(sound, index or 0, math.ceil((now - EPSILON) / PACKET), self.player.revision)
+        return SoundSubscription(sound, index or 0, math.ceil((now - EPSILON) / PACKET), self.player.version)
 
     def look(self, index: int, fps: float, look: Look, now: float) -> PictureSubscription:
         """A subscription to pictures, from `now` on."""

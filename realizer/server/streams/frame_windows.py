@@ -241,13 +241,13 @@ class Timeline:
             if self._mapping is None:
                 self._mapping = self._find_mapping()
             window = self._window = Window(first, count, self.fps, aus, self._face, self._mapping)
-            self._revision = self.player.revision
+            self._revision = self.player.version
         return window
 
     @property
     def current(self) -> bool:
         """What was computed last is still what is planned."""
-        return self._revision == self.player.revision
+        return self._revision == self.player.version
 
     def forget(self) -> None:
         """Compute anew what comes next: the face has changed."""

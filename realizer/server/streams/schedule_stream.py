@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 from realizer.charts.chart_data import line_of
 from realizer.charts.timeline import BlockLine
-from realizer.playback.active_block import Playing
+from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_states import State
-from realizer.playback.block_store import Cast
+from realizer.playback.block_store import BlockStore
 from realizer.playback.references import references
 from realizer.scheduling.timing import Schedule
 
@@ -26,7 +26,7 @@ class Seen:
         text: all of it as JSON, made when it is first wanted.
     """
 
-    playing: Playing
+    playing: ActiveBlock
     others: tuple[str, ...]
     schedules: list[Schedule | None] = field(default_factory=list)
     state: State | None = None
@@ -36,7 +36,7 @@ class Seen:
 class Plans:
     """What became of blocks since they were looked at last, written once for all who get it."""
 
-    def __init__(self, cast: Cast) -> None:
+    def __init__(self, cast: BlockStore) -> None:
         self._cast = cast
         self._seen: dict[int, Seen] = {}
 
@@ -47,7 +47,7 @@ class Plans:
     def have_changed(self) -> bool:
         """Whether `changes` would give something."""
         schedules = self._schedules()
-        return any(p.number not in self._seen for p in self._cast.alive()) or any(
+        return any(p.number not in self._seen for p in self._cast.active()) or any(
             seen.state is not seen.playing.state or self._moved(seen, schedules)
             for seen in self._seen.values()
         )
@@ -58,7 +58,7 @@ class Plans:
         Of one whose times are as they were only its state, start and end are told. One that has ended is
         told once more, and never again.
         """
-        for playing in self._cast.alive():
+        for playing in self._cast.active():
             if playing.number not in self._seen:
                 named = {ref.block for ref in references(playing.block) if ref.block is not None}
                 self._seen[playing.number] = Seen(playing, tuple(named - {playing.block.id}))
@@ -71,7 +71,7 @@ class Plans:
                 seen.schedules = [seen.playing.schedule, *map(schedules, seen.others)]
                 text = self._text(seen) if moved else _json(self._line(seen).head())
                 found.append((seen.playing.character, text))
-            if seen.playing.done:
+            if seen.playing.is_done:
                 del self._seen[number]
         return found
 

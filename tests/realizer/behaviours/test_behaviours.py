@@ -15,7 +15,7 @@ from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample
-from realizer.behaviours.kind import Fault, World
+from realizer.behaviours.kind import Fault, PlanningContext
 from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
@@ -23,19 +23,19 @@ from realizer.speech.utterance import Phoneme, Say, Utterance
 from realizer.tables.lexemes import face_lexemes, head_lexemes
 
 EXT = 'xmlns:ext="http://www.bml-initiative.org/bml/coreextensions-1.0"'
-NOWHERE = World()
+NOWHERE = PlanningContext()
 
 
 def node(element: str) -> Behaviour:
     return parse(f'<bml id="b" {EXT}>{element}</bml>', VOCABULARY).behaviours[0]
 
 
-def timing(element: str, world: World = NOWHERE) -> Timing:
+def timing(element: str, world: PlanningContext = NOWHERE) -> Timing:
     one = node(element)
     return KINDS[one.tag].timing(one, world)
 
 
-def check(element: str, world: World = NOWHERE) -> tuple[Fault, ...]:
+def check(element: str, world: PlanningContext = NOWHERE) -> tuple[Fault, ...]:
     one = node(element)
     return KINDS[one.tag].check(one, world)
 
@@ -44,7 +44,9 @@ def keys(wanted: Timing) -> Float64:
     return np.concatenate([[0.0], np.cumsum(wanted.preferred)])
 
 
-def expand(element: str, times: Sequence[float] | None = None, world: World = NOWHERE) -> tuple[Channel, ...]:
+def expand(
+    element: str, times: Sequence[float] | None = None, world: PlanningContext = NOWHERE
+) -> tuple[Channel, ...]:
     one = node(element)
     kind = KINDS[one.tag]
     at = keys(kind.timing(one, world)) if times is None else np.array(times, np.float64)
@@ -280,10 +282,10 @@ def test_a_head_turns_to_its_target_and_stays() -> None:
 # --- gaze
 
 LOOK = (0.0, 0.5, 1.5, 2.0)
-SCENE = World(scene={"cup": (0.5, 0.0, 1.0), "Door": (-2.0, 0.0, 1.0)})
+SCENE = PlanningContext(scene={"cup": (0.5, 0.0, 1.0), "Door": (-2.0, 0.0, 1.0)})
 
 
-def gaze(target: str, attributes: str = "", world: World = NOWHERE) -> tuple[Channel, ...]:
+def gaze(target: str, attributes: str = "", world: PlanningContext = NOWHERE) -> tuple[Channel, ...]:
     return expand(f'<gaze id="x" target="{target}" {attributes}/>', LOOK, world)
 
 
@@ -359,7 +361,7 @@ def test_an_unknown_name_in_a_scene_is_said_and_it_still_plays(element: str) -> 
 
 
 def test_an_empty_scene_knows_nobody() -> None:
-    (fault,) = check('<gaze id="x" target="cup"/>', World(scene={}))
+    (fault,) = check('<gaze id="x" target="cup"/>', PlanningContext(scene={}))
     assert "0,0,1" in fault.text
 
 
@@ -384,16 +386,16 @@ def test_a_gaze_of_the_eyes_is_quick() -> None:
 # --- speech
 
 
-def spoken(duration: float, **marks: float) -> World:
+def spoken(duration: float, **marks: float) -> PlanningContext:
     phonemes = (Phoneme(0.1, 0.4, "m"), Phoneme(0.4, duration, "ɑː"))
-    return World(utterances={"x": Utterance(duration, (), phonemes, marks)})
+    return PlanningContext(utterances={"x": Utterance(duration, (), phonemes, marks)})
 
 
-def say(element: str, world: World = NOWHERE) -> Say:
+def say(element: str, world: PlanningContext = NOWHERE) -> Say:
     one = node(element)
     kind = KINDS[one.tag]
-    assert kind.say is not None
-    said = kind.say(one, world)
+    assert kind.speech_request is not None
+    said = kind.speech_request(one, world)
     assert said is not None
     return said
 
@@ -408,7 +410,7 @@ def test_text_becomes_ssml_with_its_syncs_as_marks() -> None:
     assert say(SPEECH.format("")) == Say(
         'A &lt;b&gt; &amp; <mark name="m"/>c<mark name="n"/>', ("m", "n"), "en-US"
     )
-    assert say(SPEECH.format(""), World(language="fr-FR")).language == "fr-FR"
+    assert say(SPEECH.format(""), PlanningContext(language="fr-FR")).language == "fr-FR"
 
 
 def test_the_ssml_description_of_highest_priority_replaces_the_text() -> None:

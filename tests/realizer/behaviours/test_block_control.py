@@ -13,7 +13,7 @@ BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
 
 def act(element: str) -> Interrupt | Activate | Change:
     (node,) = parse(f'<bml id="b" {BMLA}>{element}</bml>', VOCABULARY).behaviours
-    does = KINDS[node.tag].act
+    does = KINDS[node.tag].command
     assert does is not None
     return does(node)
 

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.lips.mouth_faps import mouth_faps
 from realizer.animation.lips.visemes import shape_table
-from realizer.behaviours.fap_visemes import FapExpression, fap_expressions, shown
+from realizer.behaviours.fap_visemes import FapExpression, expand_compound, fap_expressions
 from realizer.emotions.archetypes import archetypes
 from realizer.tables import faps
 
@@ -45,19 +45,19 @@ def mouth(viseme: int) -> np.ndarray:
 
 def test_a_clip_without_them_is_as_it_was() -> None:
     plain = clip(fap3=[1, 2])
-    assert shown(plain) is plain
+    assert expand_compound(plain) is plain
 
 
 @pytest.mark.parametrize("viseme", range(15))
 def test_a_viseme_alone_is_its_mouth(viseme: int) -> None:
-    got = shown(clip([[viseme, 0, 63, 0]]))
+    got = expand_compound(clip([[viseme, 0, 63, 0]]))
     np.testing.assert_allclose(got.values[0], mouth(viseme), atol=0.5)
     assert not got.mask[:2].any()
     assert got.mask[JAW] == (viseme > 0)
 
 
 def test_two_visemes_are_mixed_by_the_blend() -> None:
-    got = shown(clip([[10, 1, 42, 0], [0, 10, 0, 0], [10, 14, 0, 0]]))
+    got = expand_compound(clip([[10, 1, 42, 0], [0, 10, 0, 0], [10, 14, 0, 0]]))
     np.testing.assert_allclose(got.values[0], mouth(10) * 2 / 3 + mouth(1) / 3, atol=0.5)
     np.testing.assert_allclose(got.values[1], mouth(10), atol=0.5)
     np.testing.assert_allclose(got.values[2], mouth(14), atol=0.5)
@@ -65,7 +65,7 @@ def test_two_visemes_are_mixed_by_the_blend() -> None:
 
 @pytest.mark.parametrize("row", fap_expressions())
 def test_an_expression_is_the_profile_of_its_emotion_as_far_as_its_intensity(row: FapExpression) -> None:
-    got = shown(clip(None, [[row.number, 63, 0, 0, 0, 0], [0, 0, row.number, 21, 0, 0]]))
+    got = expand_compound(clip(None, [[row.number, 63, 0, 0, 0, 0], [0, 0, row.number, 21, 0, 0]]))
     profile = archetypes("own")[row.emotion][0].frame()
     np.testing.assert_allclose(got.values[0], profile, atol=0.5)
     np.testing.assert_allclose(got.values[1], profile / 3, atol=0.5)
@@ -77,7 +77,7 @@ def test_the_six_expressions_are_numbered_as_in_the_standard() -> None:
 
 
 def test_a_fap_that_the_clip_gives_stands_also_where_it_is_0() -> None:
-    got = shown(clip([[10, 0, 63, 0]] * 2, [[6, 63, 0, 0, 0, 0]] * 2, fap3=[0, 77], fap31=[0, -5]))
+    got = expand_compound(clip([[10, 0, 63, 0]] * 2, [[6, 63, 0, 0, 0, 0]] * 2, fap3=[0, 77], fap31=[0, -5]))
     assert got.values[:, JAW].tolist() == [0, 77]
     assert got.values[:, BROW].tolist() == [0, -5]
     assert got.values[0, LIP] < 0, "the lips open all the same"
@@ -85,14 +85,14 @@ def test_a_fap_that_the_clip_gives_stands_also_where_it_is_0() -> None:
 
 
 def test_with_init_face_a_fap_is_relative_to_the_expression() -> None:
-    alone = shown(clip(None, [[6, 63, 0, 0, 0, 0]])).values[0, BROW]
-    got = shown(clip(None, [[6, 63, 0, 0, 1, 0]], fap31=[-5]))
+    alone = expand_compound(clip(None, [[6, 63, 0, 0, 0, 0]])).values[0, BROW]
+    got = expand_compound(clip(None, [[6, 63, 0, 0, 1, 0]], fap31=[-5]))
     assert got.values[0, BROW] == alone - 5
 
 
 def test_a_viseme_has_the_lips_of_a_face_that_smiles() -> None:
     smile = [[1, 63, 0, 0, 0, 0]]
-    got, alone = shown(clip([[1, 0, 63, 0]], smile)), shown(clip(None, smile))
+    got, alone = expand_compound(clip([[1, 0, 63, 0]], smile)), expand_compound(clip(None, smile))
     assert alone.values[0, LIP] < -20
     np.testing.assert_allclose(got.values[0, LIP], mouth(1)[LIP], atol=0.5)
     assert 0 < got.values[0, CORNER] < alone.values[0, CORNER], "the corners keep some of it"
@@ -115,12 +115,12 @@ ODD = {
 
 @pytest.mark.parametrize(("odd", "says"), ODD.values(), ids=ODD)
 def test_what_cannot_be_shown_is_said(odd: FAPClip, says: str) -> None:
-    (note,) = shown(odd).notes
+    (note,) = expand_compound(odd).notes
     assert note.startswith(says)
 
 
 def test_a_clip_that_says_nothing_of_a_mouth_leaves_it_to_others() -> None:
-    assert not shown(clip([[500, 0, 0, 0]] * 2)).mask.any()
+    assert not expand_compound(clip([[500, 0, 0, 0]] * 2)).mask.any()
 
 
 NUMBERS = st.integers(-(2**31) + 1, 2**31 - 1)
@@ -130,6 +130,8 @@ NUMBERS = st.integers(-(2**31) + 1, 2**31 - 1)
 def test_whatever_is_given_the_face_stays_within_what_two_expressions_ask(
     visemes: np.ndarray, expressions: np.ndarray
 ) -> None:
-    got = shown(replace(clip([[0] * 4] * 3, [[0] * 6] * 3), visemes=visemes, expressions=expressions))
+    got = expand_compound(
+        replace(clip([[0] * 4] * 3, [[0] * 6] * 3), visemes=visemes, expressions=expressions)
+    )
     for row, values in zip(faps(), got.values.T, strict=True):
         assert (np.abs(values) <= 2 * max(abs(row.least), row.most)).all()

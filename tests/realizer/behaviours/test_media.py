@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.behaviours import media as files
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.media import MediaError, faults, load, media_file
 
 
@@ -29,7 +29,7 @@ from realizer.behaviours.media import MediaError, faults, load, media_file
     ],
 )
 def test_a_name_is_found_in_the_folder(media: Path, name: str, found: str) -> None:
-    assert media_file(name, World(media=media)) == (media / found).resolve()
+    assert media_file(name, PlanningContext(media=media)) == (media / found).resolve()
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_name_that_leads_elsewhere_is_refused_in_words(media: Path, name: str,
     (media / "away").symlink_to(media.parent)
     (media / "circle").symlink_to(media / "circle")
     with pytest.raises(MediaError) as error:
-        media_file(name, World(media=media))
+        media_file(name, PlanningContext(media=media))
     assert says in str(error.value)
     assert len(str(error.value)) < 400
 
@@ -73,7 +73,7 @@ def test_no_name_at_all_leads_out(tmp_path_factory: pytest.TempPathFactory, name
     (folder / "a").write_bytes(b"inside")
     (folder.parent / "b").write_bytes(b"outside")
     try:
-        path = media_file(name, World(media=folder))
+        path = media_file(name, PlanningContext(media=folder))
     except MediaError:
         return
     assert path.is_relative_to(folder.resolve())
@@ -81,7 +81,7 @@ def test_no_name_at_all_leads_out(tmp_path_factory: pytest.TempPathFactory, name
 
 def test_a_link_inside_the_folder_is_followed(media: Path) -> None:
     (media / "same.wav").symlink_to("sounds/bell.wav")
-    assert media_file("same.wav", World(media=media)) == (media / "sounds/bell.wav").resolve()
+    assert media_file("same.wav", PlanningContext(media=media)) == (media / "sounds/bell.wav").resolve()
 
 
 def test_without_a_folder_the_fault_says_how_to_name_one(play) -> None:
@@ -92,18 +92,18 @@ def test_without_a_folder_the_fault_says_how_to_name_one(play) -> None:
 
 def test_a_file_that_is_too_large_is_not_read(media: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (media / "large.wav").open("wb") as file:
-        file.truncate(files.MOST_BYTES + 1)  # sparse: it takes no place
+        file.truncate(files.MAX_BYTES + 1)  # sparse: it takes no place
 
     def read(content: bytes) -> bytes:
         raise AssertionError("it was read")
 
-    (fault,) = faults("large.wav", World(media=media), read)
+    (fault,) = faults("large.wav", PlanningContext(media=media), read)
     assert fault.fatal
     assert "wanted at most 64 MiB" in fault.text
 
 
 def test_a_file_is_read_once_and_again_when_it_has_changed(media: Path) -> None:
-    world, reads = World(media=media), []
+    world, reads = PlanningContext(media=media), []
 
     def read(content: bytes) -> int:
         reads.append(len(content))

@@ -18,6 +18,6 @@ def lines() -> Callable[..., list[BlockLine]]:
     def of(*documents: str) -> list[BlockLine]:
         player = Player(PlayOptions(idle=False))
         schedules, _ = plan(documents, player, "silent")
-        return lines_of(player.cast, schedules)
+        return lines_of(player.blocks, schedules)
 
     return of

@@ -50,7 +50,7 @@ def test_the_costs_of_gaps_add_up_to_what_the_scheduler_paid() -> None:
     block = parse('<bml id="b"><head id="n" lexeme="NOD" start="0" end="4"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
     assert schedule.cost > 0
-    assert lines_of(player.cast, [schedule])[0].cost == pytest.approx(schedule.cost)
+    assert lines_of(player.blocks, [schedule])[0].cost == pytest.approx(schedule.cost)
 
 
 def test_speech_is_rigid_and_has_its_words(lines) -> None:
@@ -123,7 +123,7 @@ def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is
     block = parse(f'<bml id="a" {preplan}><head id="n" lexeme="NOD"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
     player.stop(0.5)
-    (line,) = lines_of(player.cast, [schedule])
+    (line,) = lines_of(player.blocks, [schedule])
     assert line.state == "REVOKED"
     assert [(d.id, d.element, d.type) for d in line.dropped] == [("n", "head", "REVOKED")]
 
@@ -134,7 +134,7 @@ def test_a_behaviour_that_is_cut_off_keeps_what_has_passed() -> None:
     schedule = player.submit(block, 0.0)
     player.due(2.0)
     player.stop(2.0)
-    (line,) = lines_of(player.cast, [schedule])
+    (line,) = lines_of(player.blocks, [schedule])
     assert (line.state, line.end) == ("INTERRUPTED", 2.0)
     gaze = line.lines[0]
     assert (gaze.points[-1].name, gaze.points[-1].time) == ("end", 2.0)

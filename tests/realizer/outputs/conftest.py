@@ -15,7 +15,7 @@ import pytest
 from bml_schema import BlockProgress
 from realizer.animation.axis import AU_NAMES, axis
 from realizer.animation.frames import AUFrames, FAPFrames
-from realizer.playback.active_block import Speaking
+from realizer.playback.active_block import ScheduledSpeech
 from realizer.realization import Performance, Realization
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Phoneme, Utterance, Word
@@ -54,9 +54,9 @@ def realization() -> Realization:
         face_name="default",
         characters={None: Performance(AUFrames(times, targets), FAPFrames(times, values, mask))},
         schedules=(nod,),
-        told=(BlockProgress(id="greeting:start", global_time=0.2),),
+        feedback_events=(BlockProgress(id="greeting:start", global_time=0.2),),
         warnings=(Warning("greeting:wave", "IMPOSSIBLE_TO_SCHEDULE", "too short"),),
-        speaking=(Speaking(0.25, 1.25, hello, 0),),
+        speeches=(ScheduledSpeech(0.25, 1.25, hello, 0),),
     )
 
 

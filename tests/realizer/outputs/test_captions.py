@@ -14,13 +14,13 @@ from realizer.speech.utterance import Word
 
 def spoken(realization, *told, until=99.0, also=()):
     """The realization, with these words said from 1 s on; `also` by somebody else."""
-    (speaking,) = realization.speaking
+    (speaking,) = realization.speeches
 
     def says(words, character):
         utterance = replace(speaking.utterance, words=tuple(Word(*word) for word in words))
         return replace(speaking, start=1.0, until=until, utterance=utterance, character=character)
 
-    return replace(realization, speaking=(says(told, 0), *([says(also, 1)] if also else ())))
+    return replace(realization, speeches=(says(told, 0), *([says(also, 1)] if also else ())))
 
 
 def test_a_line_ends_where_the_voice_rests_or_it_is_full(realization):

@@ -75,9 +75,9 @@ def test_fap_has_the_integers_of_the_frames(realization, tmp_path):
 
 def test_fap_1_is_written_where_it_is_asked_for(realization, tmp_path):
     sounds = (Phoneme(0.0, 0.3, ""), Phoneme(0.3, 0.5, "p"), Phoneme(0.5, 0.8, "a"), Phoneme(0.8, 1.0, ""))
-    (speaking,) = realization.speaking
+    (speaking,) = realization.speeches
     said = replace(speaking, utterance=replace(speaking.utterance, phonemes=sounds))
-    spoken = replace(realization, speaking=(said,))
+    spoken = replace(realization, speeches=(said,))
     path = tmp_path / "clip.fap"
     OUTPUTS[".fap"].write(spoken, path, Drawing(visemes=True))
     clip = read_fap(path.read_text())

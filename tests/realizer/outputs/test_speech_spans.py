@@ -8,18 +8,18 @@ from realizer.outputs.speech_spans import Span, phonemes, points, words
 
 
 def test_words_are_on_the_clock_of_the_realization(realization) -> None:
-    (speaking,) = realization.speaking
+    (speaking,) = realization.speeches
     assert list(words(speaking)) == [Span(0.25, 0.65, "Hello"), Span(0.65, 1.15, "R&D <team>")]
 
 
 def test_words_end_where_the_speech_is_cut_off(realization) -> None:
-    (speaking,) = realization.speaking
+    (speaking,) = realization.speeches
     assert list(words(replace(speaking, until=0.5))) == [Span(0.25, 0.5, "Hello")]
     assert list(words(replace(speaking, until=0.2505))) == []
 
 
 def test_phonemes_are_given_without_the_pauses(realization) -> None:
-    (speaking,) = realization.speaking
+    (speaking,) = realization.speeches
     assert [span.text for span in phonemes(speaking)] == ["h", "o\u028a", "i\u02d0"]
 
 

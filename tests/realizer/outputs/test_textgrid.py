@@ -69,13 +69,13 @@ def test_characters_have_tiers_of_their_own(tmp_path):
 
 
 def test_quotes_and_line_ends_come_through(realization, tmp_path):
-    (speaking,) = realization.speaking
+    (speaking,) = realization.speeches
     odd = replace(speaking.utterance, words=(Word(0.0, 0.5, 'the "big\n one"'),))
-    grid = opened(replace(realization, speaking=(replace(speaking, utterance=odd),)), tmp_path)
+    grid = opened(replace(realization, speeches=(replace(speaking, utterance=odd),)), tmp_path)
     assert entries(grid, "words")[1] == (0.25, 0.75, 'the "big one"')
 
 
 def test_a_face_that_is_silent_has_empty_tiers(realization, tmp_path):
-    grid = opened(replace(realization, speaking=(), schedules=(), duration=0.0), tmp_path)
+    grid = opened(replace(realization, speeches=(), schedules=(), duration=0.0), tmp_path)
     assert entries(grid, "words") == [(0, 0.04, "")]
     assert entries(grid, "syncs") == []

@@ -34,7 +34,7 @@ def one(realization, **shown: float):
         values[0, axis()[name.removeprefix("AU")].column] = value
     (name, performance) = next(iter(realization.characters.items()))
     frames = AUFrames(np.zeros(1), values)
-    return replace(realization, characters={name: replace(performance, aus=frames)}, speaking=())
+    return replace(realization, characters={name: replace(performance, aus=frames)}, speeches=())
 
 
 def seen(realization):

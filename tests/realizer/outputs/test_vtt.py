@@ -43,8 +43,8 @@ def test_words_phonemes_and_sync_points_are_cues_in_their_order(realization, tmp
 
 
 def test_what_was_cut_off_is_not_said(realization, tmp_path):
-    (speaking,) = realization.speaking
-    short = replace(realization, speaking=(replace(speaking, until=0.6),))
+    (speaking,) = realization.speeches
+    short = replace(realization, speeches=(replace(speaking, until=0.6),))
     told = [cue for cue in cues(short, tmp_path) if cue[2] != "sync"]
     assert [cue[3] for cue in told] == ["Hello", "h", "oʊ"]
     assert max(cue[1] for cue in told) == 0.6

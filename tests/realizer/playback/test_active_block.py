@@ -6,19 +6,21 @@ import pytest
 
 from bml_schema import parse
 from realizer.animation.channel import Gain
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import Playing, Wait
+from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import State
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 
 
-def playing(inside: str = FACE, start: float = 10.0) -> Playing:
-    planned = plan(parse(f'<bml id="a">{inside}</bml>'), KINDS, World(), start=start)
-    made = Playing(planned, KINDS, World(), character=0, number=0, floor=start, state=State.IN_EXEC)
-    made.lay(planned, start)
+def playing(inside: str = FACE, start: float = 10.0) -> ActiveBlock:
+    planned = plan(parse(f'<bml id="a">{inside}</bml>'), KINDS, PlanningContext(), start=start)
+    made = ActiveBlock(
+        planned, KINDS, PlanningContext(), character=0, number=0, not_before=start, state=State.IN_EXEC
+    )
+    made.apply_plan(planned, start)
     return made
 
 
@@ -26,16 +28,16 @@ def test_a_block_laid_at_another_start_takes_channels_claims_and_ends_along() ->
     made = playing('<gaze id="g" target="x" start="0" ready="0.5" relax="1" end="2"/>')
     (claim,) = made.plan.claims
     assert (claim.begin, claim.end, made.end) == (10.0, 11.0, 12.0)
-    made.lay(made.plan, 20.0)
+    made.apply_plan(made.plan, 20.0)
     (claim,) = made.plan.claims
     assert (claim.begin, claim.end, made.end) == (20.0, 21.0, 22.0)
-    assert {c.span[0] for c in made.moving()} == {20.0}
+    assert {c.span[0] for c in made.moving_channels()} == {20.0}
 
 
 def test_nothing_is_shown_while_the_start_is_not_known() -> None:
     made = playing()
-    made.lay(made.plan, float("inf"))
-    assert not list(made.moving())
+    made.apply_plan(made.plan, float("inf"))
+    assert not list(made.moving_channels())
     assert made.end == float("inf")
 
 
@@ -62,7 +64,7 @@ def test_of_a_behaviour_that_is_cut_what_passed_stays_then_it_relaxes_and_ends(
 def test_what_has_not_begun_never_comes() -> None:
     made = playing()
     made.cut(["s"], 10.0)
-    assert not list(made.moving())
+    assert not list(made.moving_channels())
     assert made.end == 10.0
 
 
@@ -76,15 +78,15 @@ def test_only_what_is_named_is_cut() -> None:
 def test_gains_go_to_what_is_shown_and_volume_to_what_sounds() -> None:
     made = playing()
     made.scale("s", [Gain(10.0, 11.0, 0.5)], sound=False)
-    assert all(c.gains for c in made.moving())
+    assert all(c.gains for c in made.moving_channels())
     made.scale("s", [Gain(10.0, 11.0, 0.5)], sound=True)  # a smile has no sound
     assert not made.speech
 
 
 def test_a_block_starts_when_all_that_it_waits_for_is_over() -> None:
     first, second = playing(), playing()
-    second.await_too(Wait(first, subsiding=True))
+    second.add_dependency(Dependency(first, subsiding=True))
     assert second.earliest == 12.0
-    second.await_too(Wait(first))
+    second.add_dependency(Dependency(first))
     assert second.earliest == 13.0
     assert first.followers == [second, second]

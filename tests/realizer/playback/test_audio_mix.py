@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.playback.active_block import Speaking
-from realizer.playback.audio_mix import CUT, heard, resample
+from realizer.playback.active_block import ScheduledSpeech
+from realizer.playback.audio_mix import CUT, render_utterance, resample
 from realizer.speech.utterance import Utterance
 
 TONE = Utterance(1.0, (), (), {}, 8000, np.full(8000, 1000, np.int16))
@@ -15,14 +15,14 @@ FOREVER = float("inf")
 
 @pytest.mark.parametrize("rate", [4000, 8000, 16000])
 def test_sound_is_heard_whole_at_any_rate(rate: int) -> None:
-    sound = heard(Speaking(2.0, FOREVER, TONE, 0), rate)
+    sound = render_utterance(ScheduledSpeech(2.0, FOREVER, TONE, 0), rate)
     assert sound.dtype == np.float32
     assert len(sound) == rate
     assert sound[10:-10] == pytest.approx(1000)
 
 
 def test_sound_that_is_cut_off_fades_to_silence() -> None:
-    sound = heard(Speaking(2.0, 2.5, TONE, 0), 8000)
+    sound = render_utterance(ScheduledSpeech(2.0, 2.5, TONE, 0), 8000)
     assert len(sound) == round((0.5 + CUT) * 8000)
     assert sound[3999] == 1000
     assert (np.diff(sound[4000:]) < 0).all()
@@ -30,7 +30,7 @@ def test_sound_that_is_cut_off_fades_to_silence() -> None:
 
 
 def test_sound_that_is_cut_off_before_it_starts_is_not_heard() -> None:
-    assert len(heard(Speaking(2.0, 1.5, TONE, 0), 8000)) == 0
+    assert len(render_utterance(ScheduledSpeech(2.0, 1.5, TONE, 0), 8000)) == 0
 
 
 def test_a_lower_rate_does_not_fold_high_tones_down() -> None:

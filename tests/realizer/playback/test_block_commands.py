@@ -8,7 +8,7 @@ import pytest
 from bml_schema import parse
 from realizer.core.options import PlayOptions
 from realizer.offline import realize
-from realizer.playback.audio_mix import heard
+from realizer.playback.audio_mix import render_utterance
 from realizer.playback.player import Player
 from realizer.realization import Realization
 from realizer.speech.silent import SilentVoice
@@ -151,10 +151,10 @@ def test_the_volume_of_a_speech_falls() -> None:
         for text in ('<speech id="s"><text>one two three four five six</text></speech>', quiet):
             name = "a" if "speech" in text else "b"
             block = parse(f'<bml id="{name}" {BMLA}>{text}</bml>')
-            player.submit(block, 0.0, {b: voice.say(s) for b, s in player.wants(block).items()})
+            player.submit(block, 0.0, {b: voice.say(s) for b, s in player.speech_requests(block).items()})
         player.due(float("inf"))
         (speaking,) = player.speech()
-        sound = np.abs(heard(speaking, 22050))
+        sound = np.abs(render_utterance(speaking, 22050))
         assert sound[: 22050 // 2].max() > 1000
         assert sound[22050 + 1 :].max() == 0
     finally:

@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 
 from bml_schema import Block, SyncRef, parse
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import Playing, Wait
-from realizer.playback.block_links import awaited, before, ended, followers, held, instants
+from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.block_links import (
+    all_dependencies,
+    blocks_to_end,
+    dependencies,
+    existing_claims,
+    external_times,
+    followers,
+)
 from realizer.playback.block_planner import plan
 from realizer.scheduling.timing import Schedule
 
@@ -18,42 +25,46 @@ def block(id: str, said: str = "", inside: str = '<gaze id="g" target="x"/>') ->
     return parse(f'<bml id="{id}" xmlns:bmla="http://www.asap-project.org/bmla" {said}>{inside}</bml>')
 
 
-def alive(id: str, character: int = 0, start: float = 0.0, waits: list[Wait] | None = None) -> Playing:
-    made = Playing(plan(block(id), KINDS, World()), KINDS, World(), character, 0, start, waits or [])
-    made.lay(made.plan, start)
+def alive(
+    id: str, character: int = 0, start: float = 0.0, waits: list[Dependency] | None = None
+) -> ActiveBlock:
+    made = ActiveBlock(
+        plan(block(id), KINDS, PlanningContext()), KINDS, PlanningContext(), character, 0, start, waits or []
+    )
+    made.apply_plan(made.plan, start)
     return made
 
 
-def ids(waits: list[Wait]) -> list[tuple[str, bool]]:
+def ids(waits: list[Dependency]) -> list[tuple[str, bool]]:
     return [(w.block.block.id, w.subsiding) for w in waits]
 
 
 def test_append_names_only_the_last_of_those_that_wait_for_each_other() -> None:
     first = alive("a")
-    second = alive("b", waits=[Wait(first)])
+    second = alive("b", waits=[Dependency(first)])
     apart = alive("c")
     other = alive("d", character=1)
     never = alive("e", start=float("inf"))
     everyone = [first, second, apart, other, never]
-    assert ids(awaited(block("x", 'composition="APPEND"'), 0, everyone)) == [("b", False), ("c", False)]
+    assert ids(dependencies(block("x", 'composition="APPEND"'), 0, everyone)) == [("b", False), ("c", False)]
 
 
 def test_one_that_waits_for_the_subsiding_only_may_end_sooner_and_both_are_named() -> None:
     first = alive("a")
-    second = alive("b", waits=[Wait(first, subsiding=True)])
-    assert len(awaited(block("x", 'composition="APPEND"'), 0, [first, second])) == 2
+    second = alive("b", waits=[Dependency(first, subsiding=True)])
+    assert len(dependencies(block("x", 'composition="APPEND"'), 0, [first, second])) == 2
 
 
 def test_what_is_before_a_block_is_found_by_any_chain() -> None:
     first = alive("a")
-    second = alive("b", waits=[Wait(first)])
-    assert before([Wait(second, subsiding=True)]) == {id(first), id(second)}
+    second = alive("b", waits=[Dependency(first)])
+    assert all_dependencies([Dependency(second, subsiding=True)]) == {id(first), id(second)}
 
 
 def test_lists_name_blocks_of_any_character_and_forget_the_unknown() -> None:
     everyone = [alive("a"), alive("b", character=1), alive("c")]
     said = 'bmla:appendAfter="b,nobody" bmla:chunkAfter="c"'
-    assert ids(awaited(block("x", said), 0, everyone)) == [("b", False), ("c", True)]
+    assert ids(dependencies(block("x", said), 0, everyone)) == [("b", False), ("c", True)]
 
 
 def test_followers_are_named_with_what_they_wait_for() -> None:
@@ -63,14 +74,14 @@ def test_followers_are_named_with_what_they_wait_for() -> None:
 
 def test_replace_ends_its_character_and_interrupt_whom_it_names() -> None:
     everyone = [alive("a"), alive("b", character=1), alive("c", character=1)]
-    assert [p.block.id for p in ended(block("x", 'composition="REPLACE"'), 0, everyone)] == ["a"]
-    assert [p.block.id for p in ended(block("x", 'bmla:interrupt="c"'), 0, everyone)] == ["c"]
+    assert [p.block.id for p in blocks_to_end(block("x", 'composition="REPLACE"'), 0, everyone)] == ["a"]
+    assert [p.block.id for p in blocks_to_end(block("x", 'bmla:interrupt="c"'), 0, everyone)] == ["c"]
 
 
 def test_what_is_held_is_what_the_others_of_a_character_claim() -> None:
     everyone = [alive("a"), alive("b", start=5.0), alive("c", character=1)]
-    assert [(c.block, c.begin) for c in held(0, everyone)] == [("a", 0.0), ("b", 5.0)]
-    assert [c.block for c in held(0, everyone, without=everyone[:1])] == ["b"]
+    assert [(c.block, c.begin) for c in existing_claims(0, everyone)] == [("a", 0.0), ("b", 5.0)]
+    assert [c.block for c in existing_claims(0, everyone, without=everyone[:1])] == ["b"]
 
 
 SCHEDULES = {
@@ -96,4 +107,4 @@ SCHEDULES = {
 def test_a_point_of_another_block_has_an_instant_where_that_is_known(
     ref: SyncRef, time: float | None
 ) -> None:
-    assert instants(SCHEDULES.get, 10.0)(ref) == time
+    assert external_times(SCHEDULES.get, 10.0)(ref) == time

@@ -37,7 +37,7 @@ class Stage:
         }
         said = "".join(f' {"bmla:" if k in names else ""}{k}="{v}"' for k, v in attributes.items())
         block = parse(f'<bml id="{id}" {BMLA}{said}>{inside}</bml>')
-        says = {b: SilentVoice().say(say) for b, say in self.player.wants(block).items()}
+        says = {b: SilentVoice().say(say) for b, say in self.player.speech_requests(block).items()}
         schedule = self.player.submit(block, at, says)
         self.until(at)
         return schedule

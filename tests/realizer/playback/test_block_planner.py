@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.offline import realize
 from realizer.playback.block_planner import Plan, plan
 from realizer.speech.silent import SilentVoice
 
 
-def planned(content: str, world: World = World()) -> Plan:  # noqa: B008 - a frozen value
+def planned(content: str, world: PlanningContext = PlanningContext()) -> Plan:  # noqa: B008 - a frozen value
     return plan(parse(f'<bml id="b">{content}</bml>', VOCABULARY), KINDS, world)
 
 
@@ -38,7 +38,7 @@ def test_a_fault_of_a_kind_drops_the_behaviour_with_one_warning() -> None:
 
 
 def test_a_target_that_is_not_in_the_scene_warns_and_plays() -> None:
-    made = planned('<gaze id="g" target="cupp"/>', World(scene={"cup": (0.1, 0.0, 0.5)}))
+    made = planned('<gaze id="g" target="cupp"/>', PlanningContext(scene={"cup": (0.1, 0.0, 0.5)}))
     assert [w.type for w in made.schedule.warnings] == ["NO_SUCH_TARGET"]
     assert made.channels["g"]
 

@@ -5,24 +5,24 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import parse
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import Playing
+from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import BlockEvent
-from realizer.playback.block_store import PAST, Cast
+from realizer.playback.block_store import PAST, BlockStore
 
 
-def added(cast: Cast, id: str, start: float = 0.0, character: int = 0) -> Playing:
+def added(cast: BlockStore, id: str, start: float = 0.0, character: int = 0) -> ActiveBlock:
     block = parse(f'<bml id="{id}"><wait id="w" duration="1"/></bml>')
-    planned = plan(block, KINDS, World(), start=start)
-    made = Playing(planned, KINDS, World(), character, cast.next_number, start)
-    made.lay(made.plan, start)
+    planned = plan(block, KINDS, PlanningContext(), start=start)
+    made = ActiveBlock(planned, KINDS, PlanningContext(), character, cast.next_number, start)
+    made.apply_plan(made.plan, start)
     cast.add(made)
     return made
 
 
-def ended(cast: Cast, id: str, start: float = 0.0) -> Playing:
+def ended(cast: BlockStore, id: str, start: float = 0.0) -> ActiveBlock:
     made = added(cast, id, start)
     made.change_state(BlockEvent.START)
     made.change_state(BlockEvent.END)
@@ -31,10 +31,10 @@ def ended(cast: Cast, id: str, start: float = 0.0) -> Playing:
 
 
 def test_a_block_is_found_by_its_id_while_it_is_alive() -> None:
-    cast = Cast()
+    cast = BlockStore()
     made = added(cast, "a")
     assert cast.find("a") is made
-    assert cast.alive() == cast.all() == [made]
+    assert cast.active() == cast.all() == [made]
     made.change_state(BlockEvent.START)
     made.change_state(BlockEvent.END)
     cast.end(made)
@@ -43,13 +43,13 @@ def test_a_block_is_found_by_its_id_while_it_is_alive() -> None:
 
 
 def test_those_of_a_character_are_told_apart() -> None:
-    cast = Cast()
+    cast = BlockStore()
     first, second = added(cast, "a"), added(cast, "b", character=1)
-    assert (cast.of(0), cast.of(1)) == ([first], [second])
+    assert (cast.of_character(0), cast.of_character(1)) == ([first], [second])
 
 
 def test_what_is_forgotten_keeps_its_schedule_for_a_while() -> None:
-    cast = Cast()
+    cast = BlockStore()
     ended(cast, "a")
     assert cast.forget(1.0) == []
     assert [p.block.id for p in cast.forget(1.1)] == ["a"]
@@ -60,8 +60,8 @@ def test_what_is_forgotten_keeps_its_schedule_for_a_while() -> None:
     for n in range(PAST):
         ended(cast, f"b{n}")
     cast.forget(9.0)
-    assert not cast.knew("a")
-    assert cast.knew("b0")
+    assert not cast.has_seen("a")
+    assert cast.has_seen("b0")
 
 
 @pytest.mark.parametrize("anew", [False, True])
@@ -70,23 +70,23 @@ def test_of_very_long_blocks_fewer_schedules_are_kept_but_always_the_last(
 ) -> None:
     points = 2  # of a <wait>
     monkeypatch.setattr("realizer.playback.block_store.PAST_POINTS", 3 * points)
-    cast = Cast()
+    cast = BlockStore()
     for n, name in enumerate("abacd"):
         ended(cast, name, 2.0 * n)
         cast.forget(2.0 * n + 1.5)
         if anew:  # as it is after a checkpoint
-            again = Cast()
-            again.restore(*cast.known())
+            again = BlockStore()
+            again.restore(*cast.snapshot())
             cast = again
-    assert [cast.knew(name) for name in "abcd"] == [True, False, True, True]
+    assert [cast.has_seen(name) for name in "abcd"] == [True, False, True, True]
     monkeypatch.setattr("realizer.playback.block_store.PAST_POINTS", 1)
     ended(cast, "e", 20.0)
     cast.forget(30.0)
-    assert [cast.knew(name) for name in "abcde"] == [False, False, False, False, True]
+    assert [cast.has_seen(name) for name in "abcde"] == [False, False, False, False, True]
 
 
 def test_the_newest_of_an_id_counts() -> None:
-    cast = Cast()
+    cast = BlockStore()
     ended(cast, "a")
     added(cast, "a", start=5.0)
     schedule = cast.schedule_of("a")
@@ -95,10 +95,10 @@ def test_the_newest_of_an_id_counts() -> None:
 
 
 def test_points_that_lapse_are_known_no_more_and_the_others_are() -> None:
-    cast = Cast()
+    cast = BlockStore()
     for id in ("clock", "music"):
         cast.anticipate(id, {"beat": 3.0})
-    cast.lapse(["clock", "never"])
+    cast.drop_anticipators(["clock", "never"])
     assert list(cast.anticipators) == ["music"]
     schedule = cast.schedule_of("anticipators")
     assert schedule is not None
@@ -107,7 +107,7 @@ def test_points_that_lapse_are_known_no_more_and_the_others_are() -> None:
 
 
 def test_anticipated_points_are_those_of_a_block_of_their_own() -> None:
-    cast = Cast()
+    cast = BlockStore()
     cast.anticipate("clock", {"beat": 3.0})
     cast.anticipate("clock", {"bar": 4.0, "beat": 2.0})
     schedule = cast.schedule_of("anticipators")

@@ -12,15 +12,15 @@ from realizer.animation.axis import au, axis
 from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
-from realizer.playback.character import Character, Shift
+from realizer.playback.character import BaseShift, Character
 
 SMILE = au(12, "LEFT")[0]
 HEAD = au(51)[0]
 
 
-def shift(begin: float, end: float, value: float, target=SMILE, region: str = "face") -> Shift:
+def shift(begin: float, end: float, value: float, target=SMILE, region: str = "face") -> BaseShift:
     channel = Channel(target, np.array([begin, end]), np.array([0.0, value]), layer=Layer.BASE, holds=True)
-    return Shift.of(begin, end, region, (channel,))
+    return BaseShift.of(begin, end, region, (channel,))
 
 
 def shown(character: Character, time: float, target=SMILE) -> float:
@@ -29,8 +29,8 @@ def shown(character: Character, time: float, target=SMILE) -> float:
 
 def test_a_shift_holds_until_the_next_of_its_region() -> None:
     ann = Character("Ann")
-    ann.shift([shift(0, 1, 0.6)])
-    ann.shift([shift(5, 6, 0.2)])
+    ann.add_shifts([shift(0, 1, 0.6)])
+    ann.add_shifts([shift(5, 6, 0.2)])
     assert [shown(ann, t) for t in (0, 1, 4, 5, 6, 50)] == pytest.approx(
         [0, 0.6, 0.6, 0.6, 0.2, 0.2], abs=1e-6
     )
@@ -38,7 +38,7 @@ def test_a_shift_holds_until_the_next_of_its_region() -> None:
 
 def test_a_shift_of_another_region_leaves_it_alone() -> None:
     ann = Character("Ann")
-    ann.shift([shift(0, 1, 0.6), shift(2, 3, 0.5, HEAD, "head")])
+    ann.add_shifts([shift(0, 1, 0.6), shift(2, 3, 0.5, HEAD, "head")])
     assert shown(ann, 10) == pytest.approx(0.6)
     assert shown(ann, 10, HEAD) == pytest.approx(0.5)
 
@@ -46,14 +46,14 @@ def test_a_shift_of_another_region_leaves_it_alone() -> None:
 def test_a_shift_that_has_not_begun_can_be_cancelled() -> None:
     ann = Character("Ann")
     begun, waiting = shift(0, 1, 0.6), shift(5, 6, 0.2)
-    ann.shift([begun, waiting])
+    ann.add_shifts([begun, waiting])
     ann.cancel([begun, waiting], now=0.5)
     assert shown(ann, 50) == pytest.approx(0.6)
 
 
 def test_forgetting_changes_nothing_that_can_still_be_seen() -> None:
     ann = Character("Ann")
-    ann.shift([shift(i, i + 0.5, 0.1 + 0.01 * i) for i in range(20)])
+    ann.add_shifts([shift(i, i + 0.5, 0.1 + 0.01 * i) for i in range(20)])
     before = [shown(ann, t) for t in (18.7, 19.2, 30)]
     ann.forget(18.6)
     assert len(ann.shifts) == 2
@@ -102,7 +102,7 @@ def test_nothing_jumps_however_often_a_fap_is_set_and_let_go(
 ) -> None:
     """Each message changes nothing of the frame in which it comes."""
     ann = Character(None)
-    ann.set_feeling({"12L": 0.8}, 0.0)
+    ann.set_emotion({"12L": 0.8}, 0.0)
     now = 1.0
     for wait, value in steps:
         now += wait
@@ -115,7 +115,7 @@ def test_nothing_jumps_however_often_a_fap_is_set_and_let_go(
 
 def test_a_unit_that_is_held_at_0_does_not_let_the_mood_through_when_it_changes() -> None:
     ann = Character(None)
-    ann.set_feeling({"12L": 0.8}, 0.0)
+    ann.set_emotion({"12L": 0.8}, 0.0)
     ann.set_direct({"12L": 0.0}, 1.0)
     ann.set_direct({"12L": 0.3}, 2.0)
     course = blend(ann.channels(), np.linspace(2.0, 3.0, 101)).values[:, axis()["12L"].column]

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from bml_schema import parse
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import Playing
+from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import BlockEvent
-from realizer.playback.event_queue import Calendar
+from realizer.playback.event_queue import EventQueue
 from realizer.playback.feedback_events import Phase
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 
 
-def playing(number: int, start: float) -> Playing:
-    planned = plan(parse(f'<bml id="a">{FACE}</bml>'), KINDS, World(), start=start)
-    made = Playing(planned, KINDS, World(), character=0, number=number, floor=start)
-    made.lay(planned, start)
+def playing(number: int, start: float) -> ActiveBlock:
+    planned = plan(parse(f'<bml id="a">{FACE}</bml>'), KINDS, PlanningContext(), start=start)
+    made = ActiveBlock(planned, KINDS, PlanningContext(), character=0, number=number, not_before=start)
+    made.apply_plan(planned, start)
     made.order = number
     return made
 
 
 def test_events_come_in_order_and_not_before_their_time() -> None:
-    calendar = Calendar()
-    calendar.put(playing(1, 2.0))
-    calendar.put(playing(0, 0.0))
+    calendar = EventQueue()
+    calendar.add(playing(1, 2.0))
+    calendar.add(playing(0, 0.0))
     assert calendar.next == 0.0
     due = list(calendar.due(2.0))
     assert [(e.time, e.block) for e in due] == [(0, 0), (0, 0), (0.5, 0), (2, 0), (2, 0), (2, 1), (2, 1)]
@@ -34,22 +34,22 @@ def test_events_come_in_order_and_not_before_their_time() -> None:
 
 
 def test_what_is_put_in_while_events_happen_comes_in_its_turn() -> None:
-    calendar = Calendar()
-    calendar.put(playing(0, 0.0))
+    calendar = EventQueue()
+    calendar.add(playing(0, 0.0))
     seen = []
     for event in calendar.due(10.0):
         seen.append((event.time, event.block))
         if len(seen) == 1:
-            calendar.put(playing(1, 0.25))
+            calendar.add(playing(1, 0.25))
     assert seen == sorted(seen)
     assert (0.25, 1) in seen
 
 
 def test_of_a_block_that_is_dropped_nothing_more_comes_and_the_others_go_on() -> None:
-    calendar = Calendar()
+    calendar = EventQueue()
     first, second = playing(0, 0.0), playing(1, 0.0)
-    calendar.put(first)
-    calendar.put(second)
+    calendar.add(first)
+    calendar.add(second)
     list(calendar.due(1.0))
     assert calendar.pending(first) == {("s", "relax"), ("s", "end")}
     calendar.drop(first)
@@ -59,22 +59,22 @@ def test_of_a_block_that_is_dropped_nothing_more_comes_and_the_others_go_on() ->
 
 
 def test_a_block_that_is_put_in_again_comes_once() -> None:
-    calendar = Calendar()
+    calendar = EventQueue()
     block = playing(0, 0.0)
-    calendar.put(block)
+    calendar.add(block)
     calendar.drop(block)
-    calendar.put(block)
+    calendar.add(block)
     assert [e.phase for e in calendar.due(10.0)].count(Phase.END) == 1
 
 
 def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> None:
-    calendar = Calendar()
+    calendar = EventQueue()
     beside = playing(1, 5.0)
-    calendar.put(beside)
+    calendar.add(beside)
     for later in range(200):
         block = playing(0, 100.0 - later / 10)
         calendar.drop(block)
-        calendar.put(block)
+        calendar.add(block)
         assert calendar.next == 5.0
     assert len(calendar._firsts) < 50
     assert [e.block for e in calendar.due(1000.0)] == [1] * 7 + [0] * 7
@@ -82,9 +82,9 @@ def test_a_block_that_is_moved_often_comes_once_and_leaves_nothing_behind() -> N
 
 
 def test_a_block_that_plays_does_not_start_or_subside_again() -> None:
-    calendar = Calendar()
+    calendar = EventQueue()
     block = playing(0, 0.0)
     block.change_state(BlockEvent.START)
     block.change_state(BlockEvent.SUBSIDE)
-    calendar.put(block, only={("s", "end")})
+    calendar.add(block, only={("s", "end")})
     assert [(e.phase, e.sync) for e in calendar.due(10.0)] == [(Phase.SYNC, "end"), (Phase.END, "")]

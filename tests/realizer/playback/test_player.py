@@ -29,7 +29,7 @@ def block(content: str, id: str = "b", attributes: str = "") -> Block:
 def submit(player: Player, *args: str, now: float = 0.0) -> None:
     made = block(*args)
     voice = SilentVoice()
-    player.submit(made, now, {b: voice.say(say) for b, say in player.wants(made).items()})
+    player.submit(made, now, {b: voice.say(say) for b, say in player.speech_requests(made).items()})
 
 
 def progress(feedback: list[Feedback]) -> list[tuple[str, float]]:
@@ -163,7 +163,7 @@ def test_a_nod_lands_on_its_word() -> None:
         '<head id="nod" lexeme="NOD" stroke="say:really"/>'
     )
     voice = SilentVoice()
-    plan = player.submit(made, 0.0, {b: voice.say(s) for b, s in player.wants(made).items()})
+    plan = player.submit(made, 0.0, {b: voice.say(s) for b, s in player.speech_requests(made).items()})
     assert plan.at("nod", "stroke") == pytest.approx(plan.at("say", "really"))
     assert au(player, "54", plan.at("nod", "stroke"))[0] > 0.05
 
@@ -232,7 +232,7 @@ def test_a_long_session_forgets_what_is_past() -> None:
     for i in range(50):
         submit(player, SMILE, f"b{i}", now=10.0 * i)
         player.due(10.0 * i + 5)
-    assert len(player._blocks.cast.all()) <= 2
+    assert len(player._manager.blocks.all()) <= 2
     assert player.state(500.0)["blocks"] == []
 
 

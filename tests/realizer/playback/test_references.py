@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bml_schema import parse
-from realizer.playback.references import abroad, redirected, references
+from realizer.playback.references import external_refs, references, with_references
 
 
 def test_references_of_attributes_texts_and_constraints_are_found() -> None:
@@ -20,7 +20,7 @@ def test_references_of_attributes_texts_and_constraints_are_found() -> None:
 
 def test_references_abroad_are_those_into_other_blocks() -> None:
     block = parse('<bml id="b"><head id="h" lexeme="NOD" start="x:y:end" relax="b:h:stroke + 1"/></bml>')
-    assert [str(ref) for ref in abroad(block)] == ["x:y:end"]
+    assert [str(ref) for ref in external_refs(block)] == ["x:y:end"]
 
 
 def test_every_reference_can_be_made_to_another() -> None:
@@ -30,6 +30,6 @@ def test_every_reference_can_be_made_to_another() -> None:
         <required><constraint><before ref="h:end"><sync ref="3"/></before>
         <synchronize><sync ref="4"/><sync ref="s:start"/></synchronize></constraint></required></bml>"""
     )
-    assert redirected(block, lambda ref: ref) == block
-    later = redirected(block, lambda ref: replace(ref, offset=ref.offset + 1))
+    assert with_references(block, lambda ref: ref) == block
+    later = with_references(block, lambda ref: replace(ref, offset=ref.offset + 1))
     assert sorted(ref.offset for ref in references(later)) == [1, 1, 1, 2, 3, 4, 5]

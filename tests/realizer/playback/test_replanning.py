@@ -9,7 +9,7 @@ from bml_schema import Block, PredictionFeedback, SyncPointProgress, parse
 from realizer.core.options import PlayOptions
 from realizer.playback.block_manager import ANTICIPATORS
 from realizer.playback.player import Player
-from realizer.playback.replanning import touched
+from realizer.playback.replanning import affected_blocks
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Phoneme, Utterance
 
@@ -138,10 +138,10 @@ def test_blocks_are_touched_by_any_chain_of_points_to_come() -> None:
     stage.send("b", '<head id="n" lexeme="NOD" start="a:f:end"/>')
     stage.send("c", FACE.format(""))
     new = stage.block("x", '<wait id="w" start="b:n:end"/>')
-    alive = stage.player._blocks.cast.alive()
-    assert [p.block.id for p in touched(new, alive, 0.0)] == ["a", "b"]
-    assert touched(new, alive, 60.0) == []
-    assert touched(stage.block("y", FACE.format("")), alive, 0.0) == []
+    alive = stage.player._manager.blocks.active()
+    assert [p.block.id for p in affected_blocks(new, alive, 0.0)] == ["a", "b"]
+    assert affected_blocks(new, alive, 60.0) == []
+    assert affected_blocks(stage.block("y", FACE.format("")), alive, 0.0) == []
 
 
 BEAT = '<head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/>'
@@ -163,7 +163,7 @@ def test_of_many_anticipators_the_oldest_are_forgotten_but_not_what_a_block_is_t
     stage.send("a", BEAT)
     for number in range(ANTICIPATORS + 5):
         stage.player.anticipate(f"other-{number}", {"beat": 9.0}, 0.0)
-    known = stage.player.cast.anticipators
+    known = stage.player.blocks.anticipators
     assert len(known) == ANTICIPATORS
     assert {"clock", f"other-{ANTICIPATORS + 4}"} <= set(known)
     assert "other-0" not in known
@@ -214,7 +214,7 @@ def test_a_voice_that_turns_out_slower_takes_the_rest_with_it() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(0.5)
-    assert stage.player.respeak("a", "s", spoken(1.6, 3.0), 0.5)
+    assert stage.player.update_speech_timing("a", "s", spoken(1.6, 3.0), 0.5)
     times = stage.times()
     assert times["a:s:m"] == times["a:n:stroke"] == pytest.approx(1.6)
     assert times["a:s:end"] == pytest.approx(3.0)
@@ -224,7 +224,7 @@ def test_a_mark_that_was_told_stays_where_it_was() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(1.2)
-    assert stage.player.respeak("a", "s", spoken(1.6, 3.0), 1.2)
+    assert stage.player.update_speech_timing("a", "s", spoken(1.6, 3.0), 1.2)
     times = stage.times()
     assert times["a:s:m"] == pytest.approx(1.0)
     assert times["a:s:end"] == pytest.approx(3.0)
@@ -234,8 +234,8 @@ def test_a_speech_that_is_over_is_not_spoken_again() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(9.0)
-    assert not stage.player.respeak("a", "s", spoken(1.6, 3.0), 9.0)
-    assert not stage.player.respeak("nobody", "s", spoken(1.6, 3.0), 9.0)
+    assert not stage.player.update_speech_timing("a", "s", spoken(1.6, 3.0), 9.0)
+    assert not stage.player.update_speech_timing("nobody", "s", spoken(1.6, 3.0), 9.0)
 
 
 def test_a_block_that_fails_moves_nobody(stage: Stage) -> None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.playback.resources import PASSES, Claim, losses
+from realizer.playback.resources import PASSES, ResourceClaim, conflicts
 
 
 def claim(
     name: str, begin: float, end: float, *, what: str = "voice", block: str = "b", rank: int = 0
-) -> Claim:
-    return Claim(what, begin, end, block, name, (0.0, False, rank))
+) -> ResourceClaim:
+    return ResourceClaim(what, begin, end, block, name, (0.0, False, rank))
 
 
-def lost(wanted: list[Claim], held: list[Claim] | None = None) -> list[str]:
-    return [loss.claim.behaviour for loss in losses(wanted, held or [])]
+def lost(wanted: list[ResourceClaim], held: list[ResourceClaim] | None = None) -> list[str]:
+    return [loss.claim.behaviour for loss in conflicts(wanted, held or [])]
 
 
 def test_of_two_that_want_the_voice_the_later_one_goes() -> None:
@@ -53,7 +53,7 @@ def test_one_that_goes_does_not_stand_in_the_way_of_a_third() -> None:
 
 
 def test_the_sentence_counts_from_the_start_of_the_block() -> None:
-    (loss,) = losses([claim("n", 11, 13)], [claim("s", 10, 12, block="x")], 10.0)
+    (loss,) = conflicts([claim("n", 11, 13)], [claim("s", 10, 12, block="x")], 10.0)
     assert str(loss) == "wanted the voice from 1 to 3 s, but x:s has it from 0 to 2 s"
 
 
@@ -73,11 +73,11 @@ def test_what_is_left_does_not_disturb_and_everything_lost_has_a_winner(
     rows: list[tuple[str, int, int, int]],
 ) -> None:
     wanted = [
-        Claim(what, begin, end, "b", f"c{n}", (0.0, False, rank))
+        ResourceClaim(what, begin, end, "b", f"c{n}", (0.0, False, rank))
         for n, (what, begin, end, rank) in enumerate(rows)
     ]
-    found = losses(wanted, [])
+    found = conflicts(wanted, [])
     gone = {loss.claim.behaviour for loss in found}
     left = [c for c in wanted if c.behaviour not in gone]
-    assert not any(a.disturbs(b) for a in left for b in left if a is not b)
-    assert all(loss.winner in left and loss.claim.disturbs(loss.winner) for loss in found)
+    assert not any(a.conflicts_with(b) for a in left for b in left if a is not b)
+    assert all(loss.winner in left and loss.claim.conflicts_with(loss.winner) for loss in found)

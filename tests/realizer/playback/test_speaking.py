@@ -56,7 +56,7 @@ def test_submit_with_speech_speaks_again_at_the_length_that_fits() -> None:
 
 
 def test_synthesize_takes_silence_and_a_warning_where_the_voice_fails() -> None:
-    requests = Player().wants(block())
+    requests = Player().speech_requests(block())
     (spoken,) = synthesize(requests, CountingVoice(broken=True)).values()
     assert spoken.pcm is None
     assert spoken.duration > 0
@@ -64,7 +64,7 @@ def test_synthesize_takes_silence_and_a_warning_where_the_voice_fails() -> None:
 
 
 def test_without_stretch_is_not_spoken_again() -> None:
-    (spoken,) = synthesize(Player().wants(block()), SilentVoice()).values()
+    (spoken,) = synthesize(Player().speech_requests(block()), SilentVoice()).values()
     assert without_stretch(spoken).stretch == (1.0, 1.0)
 
 

@@ -7,27 +7,29 @@ from graphlib import CycleError
 import pytest
 
 from bml_schema import BlockProgress, parse
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
-from realizer.playback.active_block import Playing, Wait
+from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.character import Character
-from realizer.playback.timeline import Course
+from realizer.playback.timeline import BlockTimeline
 
 
-def taken_in(course: Course, id: str, after: Playing | None = None, state: State = State.LURKING) -> Playing:
+def taken_in(
+    course: BlockTimeline, id: str, after: ActiveBlock | None = None, state: State = State.LURKING
+) -> ActiveBlock:
     block = parse(f'<bml id="{id}"><wait id="w" duration="2"/></bml>')
-    planned, _ = course.plan(block, 0, World(), 0.0, 0.0)
-    waits = [] if after is None else [Wait(after)]
-    made = Playing(planned, KINDS, World(), 0, course.cast.next_number, 0.0, waits, state)
-    made.lay(planned, made.earliest)
-    course.cast.add(made)
-    course.set_out(made)
+    planned, _ = course.plan(block, 0, PlanningContext(), 0.0, 0.0)
+    waits = [] if after is None else [Dependency(after)]
+    made = ActiveBlock(planned, KINDS, PlanningContext(), 0, course.blocks.next_number, 0.0, waits, state)
+    made.apply_plan(planned, made.earliest)
+    course.blocks.add(made)
+    course.place(made)
     return made
 
 
-def course() -> Course:
-    return Course(KINDS, [Character(None)])
+def course() -> BlockTimeline:
+    return BlockTimeline(KINDS, [Character(None)])
 
 
 def test_a_block_that_is_stopped_gives_its_place_to_its_followers() -> None:
@@ -39,7 +41,7 @@ def test_a_block_that_is_stopped_gives_its_place_to_its_followers() -> None:
     blocks.stop(first, 0.5)
     assert (first.state, first.end) == (State.INTERRUPTED, 0.5)
     assert (second.start, third.start) == (0.5, 2.5)
-    ends = [f for f in blocks.reports.take() if isinstance(f, BlockProgress)]
+    ends = [f for f in blocks.reports.take_all() if isinstance(f, BlockProgress)]
     assert [(f.id, f.status) for f in ends] == [("a:end", "INTERRUPTED")]
 
 
@@ -48,17 +50,17 @@ def test_one_that_has_not_started_is_revoked_and_nothing_happens_in_it_any_more(
     first = taken_in(blocks, "a")
     blocks.stop(first, 0.0)
     assert first.state is State.REVOKED
-    assert blocks.calendar.next is None
-    assert blocks.cast.find("a") is None
+    assert blocks.events.next is None
+    assert blocks.blocks.find("a") is None
 
 
 def test_a_block_that_is_not_activated_is_on_no_calendar() -> None:
     blocks = course()
     pending = taken_in(blocks, "p", state=State.PENDING)
-    assert blocks.calendar.next is None
+    assert blocks.events.next is None
     pending.change_state(BlockEvent.ACTIVATE)
     assert blocks.move(pending, 3.0)
-    assert blocks.calendar.next == pending.start == 0.0
+    assert blocks.events.next == pending.start == 0.0
 
 
 def test_blocks_line_up_behind_all_others_and_in_their_own_order() -> None:
@@ -66,7 +68,7 @@ def test_blocks_line_up_behind_all_others_and_in_their_own_order() -> None:
     first = taken_in(blocks, "a")
     second = taken_in(blocks, "b", after=first)
     third = taken_in(blocks, "c")
-    blocks.line_up(first)
+    blocks.reorder(first)
     assert third.order < first.order < second.order
 
 
@@ -78,9 +80,9 @@ def test_blocks_line_up_once_however_many_paths_lead_to_them() -> None:
         layer = [taken_in(blocks, f"{side}{number}", after=layers[-1][0]) for side in "lr"]
         for block in layer:
             for other in layers[-1][1:]:
-                block.await_too(Wait(other))
+                block.add_dependency(Dependency(other))
         layers.append(layer)
-    blocks.line_up(first)
+    blocks.reorder(first)
     orders = [block.order for layer in layers for block in layer]
     assert orders == list(range(orders[0], orders[0] + len(orders)))
 
@@ -88,16 +90,16 @@ def test_blocks_line_up_once_however_many_paths_lead_to_them() -> None:
 def test_blocks_that_wait_for_each_other_cannot_line_up() -> None:
     blocks = course()
     first = taken_in(blocks, "a")
-    first.await_too(Wait(taken_in(blocks, "b", after=first)))
+    first.add_dependency(Dependency(taken_in(blocks, "b", after=first)))
     with pytest.raises(CycleError):
-        blocks.line_up(first)
+        blocks.reorder(first)
 
 
 def test_whatever_changes_what_is_shown_is_a_new_revision() -> None:
     blocks = course()
-    before = blocks.revision
+    before = blocks.version
     first = taken_in(blocks, "a")
-    assert blocks.revision > before
-    before = blocks.revision
+    assert blocks.version > before
+    before = blocks.version
     blocks.stop(first, 0.0)
-    assert blocks.revision > before
+    assert blocks.version > before

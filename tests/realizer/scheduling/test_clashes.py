@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from bml_schema import parse
 from realizer.core.array_types import Float64
 from realizer.scheduling import Schedule, Timing, schedule_block
-from realizer.scheduling.conflict import Clash, Gap
+from realizer.scheduling.conflict import Conflict, Gap
 from realizer.scheduling.explain import in_words
 from realizer.scheduling.problem import ORIGIN, Problem, Relation
 from realizer.scheduling.solve import Solution, solve
@@ -34,7 +34,7 @@ def lasting(*preferred: float, least: float = 0.02) -> Timing:
     return Timing(points, np.array(preferred), np.full(len(preferred), least), np.ones(len(preferred)))
 
 
-def statements(problem: Problem, clash: Clash) -> list[list[Edge]]:
+def statements(problem: Problem, clash: Conflict) -> list[list[Edge]]:
     """What each statement of a clash says, as edges."""
     equal = {id(r) for r in problem.equalities}
     said = [both(r) if id(r) in equal else [(r.u, r.v, r.seconds)] for r in clash.relations]
@@ -73,7 +73,7 @@ def can_hold(n: int, edges: Iterable[Edge]) -> bool:
     return bool(found.status == 0)
 
 
-def clashes_of(recipe: Recipe) -> tuple[Problem, list[Clash]]:
+def clashes_of(recipe: Recipe) -> tuple[Problem, list[Conflict]]:
     problem = built(recipe)
     found = solve(problem)
     return problem, [] if isinstance(found, Solution) else found

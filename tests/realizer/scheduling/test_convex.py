@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realizer.scheduling.convex import Quadratic, kept, optimum, settled
+from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
 
 NODES = 7
 nodes = st.integers(0, NODES - 1)
@@ -32,10 +32,10 @@ def quadratics(draw: st.DrawFn) -> Quadratic:
 @given(quadratics())
 def test_guesses_end_where_the_interior_point_does(quadratic: Quadratic) -> None:
     start = np.zeros(NODES)
-    level, cycle = kept(quadratic, start)
+    level, cycle = feasible_start(quadratic, start)
     assert cycle is None
     surely = optimum(quadratic, level)
-    quickly = settled(quadratic, start)
+    quickly = active_set(quadratic, start)
     room = surely[quadratic.v] - surely[quadratic.u] - quadratic.w
     assert (room >= -1e-6).all()
     if quickly is not None:
@@ -56,6 +56,6 @@ def test_no_guess_answers_a_question_without_an_answer() -> None:
         np.array([1.0, 1.0]),
         np.zeros(NODES, np.intp),
     )
-    assert settled(impossible, np.zeros(NODES)) is None
-    _, cycle = kept(impossible, np.zeros(NODES))
+    assert active_set(impossible, np.zeros(NODES)) is None
+    _, cycle = feasible_start(impossible, np.zeros(NODES))
     assert sorted(cycle or ()) == [0, 1]

@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from realizer.scheduling.longest_paths import components, raise_levels
-from realizer.scheduling.union_find import Ties
+from realizer.scheduling.longest_paths import components, longest_path_levels
+from realizer.scheduling.union_find import UnionFind
 
 NODES = 8
 nodes = st.integers(0, NODES - 1)
@@ -35,7 +35,7 @@ def test_levels_are_the_least_that_keep_every_edge(
     edges: list[tuple[int, int, float]], start: list[float]
 ) -> None:
     level = list(start)
-    cycle = raise_levels(level, edges, 0.0)
+    cycle = longest_path_levels(level, edges, 0.0)
     if cycle is not None:
         chosen = [edges[k] for k in cycle]
         assert sum(w for _, _, w in chosen) > 0
@@ -57,7 +57,7 @@ def test_levels_are_the_least_that_keep_every_edge(
 
 
 def test_ties_keep_distances_and_measure_misfits() -> None:
-    ties = Ties(5)
+    ties = UnionFind(5)
     assert ties.tie(4, 3, 1.0) == 0
     assert ties.tie(3, 1, 2.0) == 0
     assert ties.tie(2, 4, -5.0) == 0
@@ -72,7 +72,7 @@ def test_ties_keep_distances_and_measure_misfits() -> None:
 
 @given(st.lists(st.tuples(nodes, nodes), max_size=20), st.lists(st.integers(-9, 9), min_size=8, max_size=8))
 def test_ties_find_no_misfit_between_true_distances(pairs: list[tuple[int, int]], time: list[int]) -> None:
-    ties = Ties(NODES)
+    ties = UnionFind(NODES)
     for u, v in pairs:
         assert ties.tie(u, v, float(time[u] - time[v])) == 0
     for k in range(NODES):

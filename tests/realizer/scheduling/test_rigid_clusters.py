@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from realizer.scheduling.rigid_clusters import SPARSE_FROM, settle
+from realizer.scheduling.rigid_clusters import SPARSE_FROM, least_squares
 
 
 @pytest.mark.parametrize("size", [3, SPARSE_FROM, 5 * SPARSE_FROM])
@@ -20,7 +20,7 @@ def test_pulls_cancel_at_every_node_that_is_free(size: int) -> None:
     fixed = rng.random(size) < 0.1
     fixed[0] = True
     before = rng.random(size)
-    x = settle(i, j, wanted, stiffness, fixed, before)
+    x = least_squares(i, j, wanted, stiffness, fixed, before)
     pull = stiffness * (x[j] - x[i] - wanted)
     total = np.bincount(j, pull, size) - np.bincount(i, pull, size)
     np.testing.assert_allclose(total[~fixed], 0, atol=1e-9 * stiffness.max())

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 
 from realizer.scheduling import solve as solver
 from realizer.scheduling.problem import ORIGIN
-from realizer.scheduling.small_solver import direct
+from realizer.scheduling.small_solver import solve_small
 from tests.realizer.scheduling.recipes import Body, Recipe, built, possible, tenths, wild
 
 FREE = Body([1.0, 1.0], 0.1, 1.0, False, None)
@@ -26,7 +26,7 @@ def in_arrays(recipe: Recipe, earliest: float = 0.0) -> solver.Solution:
 @given(possible() | wild, tenths)
 def test_the_times_and_the_cost_are_those_found_in_arrays(recipe: Recipe, earliest: float) -> None:
     recipe = recipe._replace(orders=[])
-    found = direct(built(recipe, earliest=earliest))
+    found = solve_small(built(recipe, earliest=earliest))
     assume(found is not None)
     time, cost = found
     other = in_arrays(recipe, earliest)
@@ -41,7 +41,7 @@ def test_the_times_and_the_cost_are_those_found_in_arrays(recipe: Recipe, earlie
 
 def test_two_that_hold_each_other_share_what_is_missing_and_start_at_once() -> None:
     short, long = FREE, Body([1.0, 2.0], 0.1, 1.0, False, None)
-    found = direct(built(Recipe([short, long], [((0, 0), (1, 0), 0.0), ((0, 2), (1, 2), 0.0)], [], [])))
+    found = solve_small(built(Recipe([short, long], [((0, 0), (1, 0), 0.0), ((0, 2), (1, 2), 0.0)], [], [])))
     assert found is not None
     assert found[0][3] == pytest.approx(found[0][6])
     assert found[0][1] == found[0][4] == 0.0
@@ -60,4 +60,4 @@ def test_two_that_hold_each_other_share_what_is_missing_and_start_at_once() -> N
     ids=["an order", "a clash", "least gaps", "greatest gaps", "too soon"],
 )
 def test_what_has_more_to_it_is_left_to_arrays(recipe: Recipe) -> None:
-    assert direct(built(recipe)) is None
+    assert solve_small(built(recipe)) is None

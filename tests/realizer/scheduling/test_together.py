@@ -49,8 +49,8 @@ def running(plays: Schedule, block: Block, timings: dict[str, Timing], origin: f
         timings,
         start=plays.start - origin,
         earliest=max(plays.start, now) - origin,
-        passed={name: when for name, when in passed.items() if when},
-        firm=True,
+        passed_times={name: when for name, when in passed.items() if when},
+        is_fixed=True,
     )
 
 

@@ -11,9 +11,9 @@ import pytest
 
 import realizer
 from bml_schema import Speech
-from realizer.behaviours.kind import World
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import VOCABULARY
-from realizer.behaviours.speech import say
+from realizer.behaviours.speech import speech_request
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
 from realizer.server.runtime.engines import Studio
@@ -140,7 +140,7 @@ def test_the_language_of_the_text_is_what_the_voice_is_asked_for() -> None:
     for given, wanted in ((' xml:lang="nl-NL"', "nl-NL"), ("", "fr-FR")):
         node = parse(document(f"<text{given}>hallo</text>"), VOCABULARY).behaviours[0]
         assert isinstance(node, Speech)
-        asked = say(node, World(language="fr-FR"))
+        asked = speech_request(node, PlanningContext(language="fr-FR"))
         assert asked is not None
         assert asked.language == wanted
 

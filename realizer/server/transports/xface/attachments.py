@@ -9,9 +9,9 @@ from bml_schema import Block, BMLError, read
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.behaviours.fap_document import document_of
-from realizer.behaviours.fap_values import MOST_BYTES
-from realizer.behaviours.fap_visemes import shown
-from realizer.behaviours.kind import World
+from realizer.behaviours.fap_values import MAX_BYTES
+from realizer.behaviours.fap_visemes import expand_compound
+from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.media import media_file
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
@@ -50,9 +50,9 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
         case "UPLOAD_FAP", (text, *_) if text.strip():
             return _clip(text, settings)
         case "LOAD_FAP", (name, *_) if name.strip():
-            path = media_file(name, World(media=settings.media))
-            if (size := path.stat().st_size) > MOST_BYTES:
-                raise RealizerError(f"wanted at most {MOST_BYTES} bytes of FAP text, got {size}")
+            path = media_file(name, PlanningContext(media=settings.media))
+            if (size := path.stat().st_size) > MAX_BYTES:
+                raise RealizerError(f"wanted at most {MAX_BYTES} bytes of FAP text, got {size}")
             return _clip(path.read_bytes(), settings)
         case "UPLOAD_SCRIPT", (text, processor, *_) if processor.strip().upper() == "BML":
             script = text if "<" in text else unescape(text)
@@ -73,7 +73,7 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
 
 def _clip(text: str | bytes, settings: Settings) -> FAPClip:
     most = settings.max_document - ROOM
-    clip = shown(read_fap(text))
+    clip = expand_compound(read_fap(text))
     if not len(clip.values):
         raise RealizerError("wanted frames, got none")
     if len(clip.values) > 1 and clip.mask.any() and len(document_of(clip, "")) > most:

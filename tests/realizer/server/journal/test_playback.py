@@ -64,7 +64,7 @@ def test_feedback_is_the_same_to_the_last_digit(tmp_path: Path) -> None:
     realization, again = played(read_record(path))
     assert again == playback.told(read_record(path)) == told
     assert any('"b:end"' in text for text in told)
-    assert [w.text for w in realization.speaking[0].utterance.words] == ["Hello", "how", "are", "you"]
+    assert [w.text for w in realization.speeches[0].utterance.words] == ["Hello", "how", "are", "you"]
 
 
 def test_a_record_that_broke_off_is_played_to_the_end_of_what_was_planned(tmp_path: Path) -> None:

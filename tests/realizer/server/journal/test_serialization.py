@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from realizer.animation.axis import axis
 from realizer.animation.channel import Channel, Gain, Joint, Layer
 from realizer.animation.idle.blinks import Fewer
-from realizer.playback.character import Character, Shift
+from realizer.playback.character import BaseShift, Character
 from realizer.scheduling.timing import Schedule
 from realizer.server.journal.serialization import character_of, plain_character, plain_schedule, schedule_of
 
@@ -43,7 +43,7 @@ def channels(draw: st.DrawFn) -> Channel:
 
 
 SHIFTS = st.builds(
-    Shift,
+    BaseShift,
     NUMBER,
     NUMBER,
     st.frozensets(st.sampled_from(("head", "eyes", "mouth"))),
@@ -59,7 +59,7 @@ def same(one: object, other: object) -> bool:
         return False
     if isinstance(one, np.ndarray):
         return one.dtype == other.dtype and np.array_equal(one, other)  # type: ignore[attr-defined]
-    if isinstance(one, Channel | Shift | Character | Schedule):
+    if isinstance(one, Channel | BaseShift | Character | Schedule):
         return all(same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
     if isinstance(one, dict):
         assert isinstance(other, dict)

@@ -353,7 +353,7 @@ def test_in_any_order_every_block_that_starts_ends_and_nothing_is_left(acts) -> 
         if isinstance(f, BlockProgress) and f.id.endswith(":end") and f.status != "REVOKED"
     )
     assert driver.send({"type": "state"}).of("state")[-1]["blocks"] == []
-    assert not driver.session.player.cast.anticipators  # a session that speaks for days keeps nothing of it
+    assert not driver.session.player.blocks.anticipators  # a session that speaks for days keeps nothing of it
 
 
 async def spoken_over(socket, last: str) -> list[str | bytes]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.playback.audio_mix import heard
+from realizer.playback.audio_mix import render_utterance
 from realizer.server.streams.audio_stream import Sound
 from realizer.speech.utterance import Utterance
 from tests.realizer.server.conftest import RATE, Driver
@@ -23,7 +23,7 @@ def test_sound_made_block_by_block_is_that_of_a_film(rate: int, stopped: float |
         driver.run(stopped)
         driver.send({"type": "stop"})
     (speaking,) = driver.session.player.speech()
-    whole, offset = heard(speaking, rate), round(speaking.start * rate)
+    whole, offset = render_utterance(speaking, rate), round(speaking.start * rate)
     sound = Sound(driver.session.player, rate, None)
     packets = [sound.packet(n) for n in range(501)]
     made = np.concatenate([np.frombuffer(p or bytes(rate // 25), "<i2") for p in packets])
