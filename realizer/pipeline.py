@@ -71,7 +71,7 @@ def play(documents: Documents, options: PlayOptions, voice: Voice | str | None =
         for times in frame_times(player.end, options.fps):
             channels, idle = player.motion(times, index)
             windows.append(blend(channels, times, player.rules, idle))  # 5 blend
-        aus = AUFrames.joined(windows)
+        aus = AUFrames.concatenate(windows)
         characters[name] = Performance(aus, to_fap(aus, mapping))  # 6 map
     return realization_of(player, options, mapping, characters, feedback, schedules, refused)
 

@@ -169,7 +169,7 @@ def fap_files() -> tuple[bytes, ...]:
         visemes = np.full((count, 4), 3 if used[0] else 0, np.int32)
         expressions = np.full((count, 6), 1 if used[1] else 0, np.int32)
         clip = FAPClip("x", 25.0, values, used, visemes, expressions)
-        found += [encode(clip).encode(), encode(clip.since(count // 2)).encode()]
+        found += [encode(clip).encode(), encode(clip.from_frame(count // 2)).encode()]
     return tuple(found)
 
 

@@ -26,7 +26,7 @@ from realizer.server.journal.replay import restored
 from realizer.server.runtime.session_registry import Hub
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 from tests.mutants import mutants
@@ -410,7 +410,7 @@ class Interleaving:
 
 def spoken(order: Speak) -> Utterance:
     """What a voice makes of a text, always the same; of every other text with sound."""
-    utterance = fitted(SilentVoice(), replace(order.say, voice=None))
+    utterance = speak_to_length(SilentVoice(), replace(order.say, voice=None))
     if crc32(repr(order.say).encode()) % 2 or not utterance.duration:
         return utterance
     pcm = np.full(round(utterance.duration * RATE), 1000, np.int16)

@@ -134,7 +134,7 @@ def field_of(node: object, name: str) -> str:
 
 
 def check_meaning(case: Case, played: Played) -> None:
-    """`as_if` is the same in every way, `unlike` differs in what is read and in what comes of it."""
+    """`as_if` is the same in every way, `distance` differs in what is read and in what comes of it."""
     if not {"as_if", "unlike"} & case.wanted.keys():
         return
     film = [Instant(float(time)) for time in np.arange(0, min(played.end, 30) + 0.25, 0.1)]

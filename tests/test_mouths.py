@@ -14,7 +14,7 @@ from realizer.animation.pose import poses
 from realizer.core.array_types import Float64
 from realizer.face.load import load_face
 from realizer.offline import realize
-from realizer.speech.utterance import Phoneme, Say, Utterance, Word
+from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 from tests.mouths import Mouth
 
 FACES = ("ada", "ben", "ida")
@@ -45,7 +45,7 @@ class Said:
 
     name = "said"
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         end = phonemes()[-1].end
         return Utterance(end, (Word(0.4, end - 0.4, "x"),), phonemes(), {})
 

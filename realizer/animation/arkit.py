@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from realizer.animation.axis import AU_NAMES, axis, presence
+from realizer.animation.axis import AU_NAMES, axis, mask_channel
 from realizer.animation.fap.au_fap_mapping import FapMapping
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
@@ -76,13 +76,13 @@ def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
     """
     whole = to_fap(frames, mapping).values
     columns, share, owned = _from_aus(mapping)
-    lips = frames.values[:, presence("lips").column, None]
+    lips = frames.values[:, mask_channel("lips").column, None]
     moving = frames.moving.T
     first = moving @ share * (1 - owned * lips)
     told = frames.values.copy()
     told[:, : len(AU_NAMES()) + 68] = 0
     told[:, columns] = moving[:, columns]
-    rest = whole - to_fap(AUFrames(frames.times, told, held=frames.held), mapping).values
+    rest = whole - to_fap(AUFrames(frames.times, told, overridden=frames.overridden), mapping).values
     weights = np.empty((len(whole), len(ARKIT_NAMES())), np.float32)
     for start in range(0, len(whole), CHUNK):
         part = slice(start, start + CHUNK)

@@ -10,7 +10,7 @@ from realizer import tables
 # How far (0..1) something is taken from what shows it otherwise: speech takes the lips, a temporary gaze
 # takes eyes and head from the base gaze, a document takes blinks and small movements from the idle face, and
 # the successive mixer takes the action units from the additive one.
-PRESENCES = ("lips", "eyes", "head", "blinks", "motion", "successive")
+MASKED_REGIONS = ("lips", "eyes", "head", "blinks", "motion", "successive")
 
 
 class Target(NamedTuple):
@@ -29,7 +29,7 @@ def axis() -> dict[str, Target]:
     """Name -> Target of every column: AUs (one a side where they have sides), 68 FAPs, presences, ranks."""
     # What turns is not mixed: turns follow one another as they must.
     ranks = (f"rank {row.au}" for row in tables.action_units() if not row.degrees)
-    names = [*_au_names(), *(row.name for row in tables.faps()), *PRESENCES, *ranks]
+    names = [*_au_names(), *(row.name for row in tables.faps()), *MASKED_REGIONS, *ranks]
     return {name: Target(name, column) for column, name in enumerate(names)}
 
 
@@ -66,12 +66,12 @@ def fap(number: int) -> Target:
     return axis()[tables.faps()[number - 1].name]
 
 
-def presence(region: str) -> Target:
-    """The column that says how far one of `PRESENCES` is taken."""
+def mask_channel(region: str) -> Target:
+    """The column that says how far one of `MASKED_REGIONS` is taken."""
     return axis()[region]
 
 
-def rank(number: int) -> Target:
+def mixing_order(number: int) -> Target:
     """The column that says how early (0..1) an AU comes where AUs follow one another.
 
     Raises:
@@ -88,7 +88,7 @@ def region(target: Target) -> str:
     name = target.name
     if name == "successive" or name.startswith("rank "):
         return "face"
-    if name in PRESENCES:
+    if name in MASKED_REGIONS:
         return {"lips": "face", "blinks": "idle", "motion": "idle"}.get(name, name)
     if not name.rstrip("LR").isdigit():
         number = next(row.fap for row in tables.faps() if row.name == name)

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, au, axis, presence, region
+from realizer.animation.axis import AU_NAMES, au, axis, mask_channel, region
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import Samples, in_order, sample, samples, weights
 from realizer.animation.frames import AUFrames
@@ -38,8 +38,8 @@ def blend(
       not show. A blink comes whole or not at all, as it is when it begins.
     - FAPs add up; presences add up to at most 1.
     - FAPS, and above it DIRECT: as far as such a channel is there, it replaces all that lies below; of a FAP
-      that is also what AUs ask of it (`AUFrames.held`). Several in one layer that are there more than once
-      together each get their share.
+      that is also what AUs ask of it (`AUFrames.overridden`). Several in one layer that are there more than
+      once together each get their share.
 
     AUs are limited to 0..1 at the end.
 
@@ -52,7 +52,7 @@ def blend(
     asked = np.asarray(times, np.float64)
     order = in_order(asked)
     times = asked if order is None else asked[order]
-    alive = _alive(channels, times)
+    alive = _visible(channels, times)
     # Only the columns that something moves are worked on; `place` says where each of them stands.
     moved = {channel.target.column for channel in alive}
     if idle is not None:
@@ -61,7 +61,7 @@ def blend(
     place = {column: i for i, column in enumerate(columns)}
     values, base, gaze = _layers(alive, idle, place, times)
     if gaze is not None:
-        _share(gaze, base, place)
+        _share_regions(gaze, base, place)
         values += gaze
     if base is not None:
         # Base states and expressions: the stronger one shows; rotations add up.
@@ -79,7 +79,7 @@ def blend(
     return AUFrames(asked, frames, rules, _by_column(held[first:last], faps, 68, order), tuple(columns))
 
 
-def _alive(channels: Iterable[Channel], times: Float64) -> list[Channel]:
+def _visible(channels: Iterable[Channel], times: Float64) -> list[Channel]:
     if not len(times):
         return []
     first, last = float(times[0]), float(times[-1])
@@ -107,7 +107,7 @@ def _layers(
         _begin_idle(whole[0], idle, channels, place, times)
     if own:
         found = samples(own, times)
-        values = _kept(found, own, channels, times)
+        values = _idle_share(found, own, channels, times)
         at = found.spread(np.array(rows) * len(times))
         at += found.frames
         adding = found.spread(np.array(adds))
@@ -134,7 +134,7 @@ def _by_column(rows: Float64, columns: list[int], count: int, order: Index | Non
     return whole.T
 
 
-def _share(gaze: Float64, base: Float64 | None, place: dict[int, int]) -> None:
+def _share_regions(gaze: Float64, base: Float64 | None, place: dict[int, int]) -> None:
     """Give each gaze its part of a region that several take, and take it from the base states, in place."""
     for name, aus in _regions().items():
         if (taken := place.get(axis()[name].column)) is None:
@@ -152,26 +152,26 @@ def _begin_idle(
 ) -> None:
     """Write what the face does by itself, as far as `channels` let it, into rows that are still 0."""
     blinks = idle.blinks
-    if fewer := [channel for channel in channels if channel.target.column == presence("blinks").column]:
-        blinks = blinks.kept(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
+    if fewer := [channel for channel in channels if channel.target.column == mask_channel("blinks").column]:
+        blinks = blinks.reduced(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
     values[[place[lid] for lid in _lids()]] = blinks.at(times)
     moved = idle.motion.at(times)
-    if (still := _still(channels, times)) is not None:
+    if (still := _idle_weight(channels, times)) is not None:
         moved *= still
     values[[place[column] for column in idle.motion.columns]] = moved
 
 
-def _kept(found: Samples, own: list[Channel], channels: list[Channel], times: Float64) -> Float64:
+def _idle_share(found: Samples, own: list[Channel], channels: list[Channel], times: Float64) -> Float64:
     """(e,) the values that were found, of the idle layer what its presence leaves."""
     idle = [channel.layer is Layer.IDLE for channel in own]
-    if any(idle) and (still := _still(channels, times)) is not None:
+    if any(idle) and (still := _idle_weight(channels, times)) is not None:
         return found.values * np.where(found.spread(np.array(idle)), still[found.frames], 1.0)
     return found.values
 
 
-def _still(channels: list[Channel], times: Float64) -> Float64 | None:
+def _idle_weight(channels: list[Channel], times: Float64) -> Float64 | None:
     """(n,) how much of idle motion the presence "motion" leaves; None: all of it."""
-    column = presence("motion").column
+    column = mask_channel("motion").column
     taking = [channel for channel in channels if channel.target.column == column]
     return 1.0 - np.minimum(sample(taking, times).sum(axis=0), 1.0) if taking else None
 

@@ -40,7 +40,7 @@ class Gain(NamedTuple):
         return self._replace(begin=self.begin + seconds, end=self.end + seconds)
 
 
-class Joint(NamedTuple):
+class Crossfade(NamedTuple):
     """How a channel goes on from the one before it: by what it differs at `at`, which `length` seconds heal.
 
     `value` and `slope` are what was shown at that time less what this channel would show, and a second of it;
@@ -53,7 +53,7 @@ class Joint(NamedTuple):
     length: float
     share: float = 0.0
 
-    def shifted(self, seconds: float) -> Joint:
+    def shifted(self, seconds: float) -> Crossfade:
         return self._replace(at=self.at + seconds)
 
 
@@ -68,13 +68,13 @@ class Channel:
         values: (k,) float64; AU and presence 0..1, FAP in its FAPU.
         curve: name in `animation.curves`: "smooth" (velocity zero at each key) or "linear".
         layer: where it is blended.
-        holds: the last value stays for ever (base states); otherwise the channel is 0 outside its keys.
+        keeps_last: the last value stays for ever (base states); otherwise the channel is 0 outside its keys.
         gains: what it is multiplied with, 1 before the first: where a behaviour is cut off, a base state is
             replaced or an amount changes. Each goes on from what those before it have reached, so that
             nothing jumps.
         until: it shows nothing from then on: another channel goes on in its place.
-        joint: it is such a channel, and shows nothing before `joint.at`.
-        there: (k,) 0..1 or None: how far it takes the place of what lies below, at each key; whole where it
+        crossfade: it is such a channel, and shows nothing before `joint.at`.
+        weight: (k,) 0..1 or None: how far it takes the place of what lies below, at each key; whole where it
             is None. Only of the layers FAPS and DIRECT, whose values are what is shown, so 0 where this is 0.
         source: "block:behaviour" that made it, for messages.
     """
@@ -84,11 +84,11 @@ class Channel:
     values: Float64
     curve: str = "smooth"
     layer: Layer = Layer.EXPRESSION
-    holds: bool = False
+    keeps_last: bool = False
     gains: tuple[Gain, ...] = ()
     until: float = float("inf")
-    joint: Joint | None = None
-    there: Float64 | None = None
+    crossfade: Crossfade | None = None
+    weight: Float64 | None = None
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -108,7 +108,7 @@ class Channel:
 
     def faded(self, begin: float, end: float) -> Channel:
         """The same channel faded out from `begin` to `end`; an earlier fade stays as it is."""
-        if self.gone <= end:
+        if self.faded_at <= end:
             return self
         return self.scaled(Gain(begin, end, 0.0))
 
@@ -126,14 +126,16 @@ class Channel:
         return other
 
     @property
-    def share(self) -> Channel:
+    def weight_channel(self) -> Channel:
         """How far it takes the place of what lies below, as a channel itself."""
-        there = np.ones(len(self.times)) if self.there is None else self.there
-        joint = None if self.joint is None else self.joint._replace(value=self.joint.share, slope=0.0)
-        return replace(self, values=there, joint=joint)
+        there = np.ones(len(self.times)) if self.weight is None else self.weight
+        joint = (
+            None if self.crossfade is None else self.crossfade._replace(value=self.crossfade.share, slope=0.0)
+        )
+        return replace(self, values=there, crossfade=joint)
 
     @property
-    def gone(self) -> float:
+    def faded_at(self) -> float:
         """When it has been faded out for good; infinite where it is not."""
         last = self.gains[-1] if self.gains else None
         return last.end if last is not None and last.to == 0.0 else float("inf")
@@ -141,11 +143,11 @@ class Channel:
     @cached_property
     def span(self) -> tuple[float, float]:
         """(first, last) seconds at which it may be other than 0; last is infinite where it holds."""
-        last = float("inf") if self.holds else float(self.times[-1])
+        last = float("inf") if self.keeps_last else float(self.times[-1])
         first = float(self.times[0])
-        if self.joint is not None:
-            first, last = self.joint.at, max(last, self.joint.at + self.joint.length)
-        return first, min(last, self.gone, self.until)
+        if self.crossfade is not None:
+            first, last = self.crossfade.at, max(last, self.crossfade.at + self.crossfade.length)
+        return first, min(last, self.faded_at, self.until)
 
 
 def later(channels: Sequence[Channel], seconds: float, source: str) -> tuple[Channel, ...]:
@@ -159,7 +161,7 @@ def later(channels: Sequence[Channel], seconds: float, source: str) -> tuple[Cha
         changes: dict[str, object] = {"times": times, "until": channel.until + seconds, "source": source}
         if channel.gains:
             changes["gains"] = tuple(gain.shifted(seconds) for gain in channel.gains)
-        if channel.joint is not None:
-            changes["joint"] = channel.joint.shifted(seconds)
+        if channel.crossfade is not None:
+            changes["crossfade"] = channel.crossfade.shifted(seconds)
         found.append(channel.changed(changes))
     return tuple(found)

@@ -9,25 +9,25 @@ from typing import NamedTuple
 import numpy as np
 
 from realizer.animation.axis import AU_NAMES
-from realizer.animation.group_reduce import Rounds
+from realizer.animation.group_reduce import GroupReduction
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 
-class Shown(NamedTuple):
+class Allowed(NamedTuple):
     """What is left of the units that were asked for.
 
     Attributes:
         aus: (n_au, n) float32, 0..1: what a coder of the face would score.
-        held: (n_au, n) float32: what another unit's own appearance holds (the parting of the lips in a jaw
-            that drops). It is not scored, but it does not leave the face.
+        overridden: (n_au, n) float32: what another unit's own appearance holds (the parting of the lips in a
+            jaw that drops). It is not scored, but it does not leave the face.
     """
 
     aus: Float32
-    held: Float32
+    overridden: Float32
 
 
-def cooccur(aus: Float32, rules: Rules) -> Shown:
+def cooccur(aus: Float32, rules: Rules) -> Allowed:
     """Apply all rules at once: each reads what came in, and a unit keeps the least that any rule leaves it.
 
     So the order of rules does not matter, a second pass changes nothing, and a small change of what comes in
@@ -44,7 +44,7 @@ def cooccur(aus: Float32, rules: Rules) -> Shown:
     shown, held = np.zeros_like(aus), np.zeros_like(aus)
     shown[live] = known.scored(asked, moving)
     held[live] = moving - shown[live]
-    return Shown(shown, held)
+    return Allowed(shown, held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Terms:
         terms = np.flatnonzero(up[self.weaker] & strong[self.stronger].all(axis=0))
         if not len(terms):
             return None
-        rounds = Rounds.of(self.weaker[terms])
+        rounds = GroupReduction.of(self.weaker[terms])
         used, stronger = np.unique(self.stronger[:, terms[rounds.order]], return_inverse=True)
         one, other = row[self.rows[:, used]]
         return Bound(
@@ -95,7 +95,7 @@ class Bound:
     """`Terms` of some units, in their rows; terms in the order of `rounds`, `units` as its groups."""
 
     units: Index
-    rounds: Rounds
+    rounds: GroupReduction
     stronger: Index
     rows: Index
     start: Float32

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from realizer.animation.channel import Channel, Joint
+from realizer.animation.channel import Channel, Crossfade
 from realizer.animation.curves import sample, weights
 
 # s; a face is back on its new course after that: about the attack of an expression.
@@ -18,7 +18,7 @@ SAME = 1e-9
 STEP = 1e-4
 
 
-def joined(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[Channel, ...]:
+def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[Channel, ...]:
     """What is shown passes from old channels to new ones at `now`, without a jump in value or velocity.
 
     Args:
@@ -28,7 +28,7 @@ def joined(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[
     kept = [c for c in old if c.until < float("inf")]
     playing = [c for c in old if c.until == float("inf")]
     # Of a speech that grows most is as it was.
-    there = {(id(c.values), c.target): c for c in playing if c.joint is None and not c.gains}
+    there = {(id(c.values), c.target): c for c in playing if c.crossfade is None and not c.gains}
     stays: set[int] = set()
     news: list[Channel] = []
     for channel in new:
@@ -51,7 +51,7 @@ def joined(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[
     value, ahead = (shown[0] - shown[1]).T
     present = weights([*before, *after], np.array([now])).reshape(2, len(follow))
     joints = [
-        replace(c, joint=Joint(now, float(v), float((a - v) / STEP), HEALS, float(share)))
+        replace(c, crossfade=Crossfade(now, float(v), float((a - v) / STEP), HEALS, float(share)))
         for c, v, a, share in zip(after, value, ahead, present[0] - present[1], strict=True)
     ]
     return (*kept, *(replace(c, until=now) for c in before), *joints, *lonely, *fresh)

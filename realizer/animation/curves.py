@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from realizer.animation.channel import Channel, Gain, Joint
+from realizer.animation.channel import Channel, Crossfade, Gain
 from realizer.core.array_types import Float64, Index
 
 Values = TypeVar("Values", Float64, Index)
@@ -90,12 +90,12 @@ def in_order(times: Float64) -> Index | None:
 
 
 def weights(channels: Sequence[Channel], times: Float64) -> Float64:
-    """How far every channel takes the place of what lies below: as its `there` says, times its gains.
+    """How far every channel takes the place of what lies below: as its `weight` says, times its gains.
 
     Returns:
         (m, n) float64, 0..1.
     """
-    return np.clip(sample([channel.share for channel in channels], times), 0.0, 1.0)
+    return np.clip(sample([channel.weight_channel for channel in channels], times), 0.0, 1.0)
 
 
 def samples(channels: Sequence[Channel], times: Float64) -> Samples:
@@ -110,7 +110,7 @@ def samples(channels: Sequence[Channel], times: Float64) -> Samples:
     for i, channel in enumerate(channels):
         many = channel.curve == "linear" and len(channel.times) >= MANY_KEYS
         by_curve.setdefault(None if many else channel.curve, []).append(i)
-        if channel.gains or channel.joint is not None or channel.until < np.inf:
+        if channel.gains or channel.crossfade is not None or channel.until < np.inf:
             changed.append(i)
     found: list[Samples] = []
     for curve, rows in by_curve.items():
@@ -136,7 +136,7 @@ def _interpolated(numbers: Index, channels: Sequence[Channel], times: Float64) -
     """
     groups: dict[tuple[int, bool], list[int]] = {}
     for i, channel in enumerate(channels):
-        groups.setdefault((id(channel.times), channel.holds), []).append(i)
+        groups.setdefault((id(channel.times), channel.keeps_last), []).append(i)
     return _joined([_together(numbers[rows], [channels[i] for i in rows], times) for rows in groups.values()])
 
 
@@ -144,7 +144,7 @@ def _together(numbers: Index, channels: Sequence[Channel], times: Float64) -> Sa
     """Linear channels of the same keys."""
     keys, end = channels[0].times, len(channels[0].times) - 1
     first = int(times.searchsorted(keys[0]))
-    last = len(times) if channels[0].holds else int(times.searchsorted(keys[-1], "right"))
+    last = len(times) if channels[0].keeps_last else int(times.searchsorted(keys[-1], "right"))
     before = keys.searchsorted(times[first:last], "right") - 1
     after = np.minimum(before + 1, end)
     length = keys[after] - keys[before]
@@ -189,7 +189,7 @@ def _between(
     ends = stops - 1
     first = times.searchsorted(keys)
     last = times.searchsorted(keys[ends], "right")
-    if any(holds := [channel.holds for channel in channels]):
+    if any(holds := [channel.keeps_last for channel in channels]):
         last[holds] = len(times)
     frames = _steps(first, ends)
     frames[ends] = last - first[ends]
@@ -224,7 +224,7 @@ def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int]
     gains: dict[tuple[Gain, ...], Float64] = {}  # what is cut off together has the same
     more = [found]
     for i in changed:
-        channel, joint = channels[i], channels[i].joint
+        channel, joint = channels[i], channels[i].crossfade
         part = slice(stops[i] - counts[i], stops[i])
         frames, values = found.frames[part], found.values[part]
         if joint is not None:  # it heals beyond its keys too
@@ -246,7 +246,7 @@ def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int]
     return found if len(more) == 1 else _joined(more)
 
 
-def _healing(joint: Joint, times: Float64) -> Float64:
+def _healing(joint: Crossfade, times: Float64) -> Float64:
     """(n,) what is added so that value and slope go on at the joint; 0 when it has healed."""
     passed = times - joint.at
     left = 1.0 - smooth(np.clip(passed / joint.length, 0.0, 1.0))

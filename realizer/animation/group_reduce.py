@@ -10,7 +10,7 @@ from realizer.core.array_types import Float32, Index
 
 
 @dataclass(frozen=True, eq=False)
-class Rounds:
+class GroupReduction:
     """The first row of every group stands first, then the second of those that have one, and so on.
 
     So a group is reduced by operations on whole slices: ten times as fast as `reduceat` down an axis.
@@ -26,7 +26,7 @@ class Rounds:
     counts: tuple[int, ...]
 
     @classmethod
-    def of(cls, group: Index) -> Rounds:
+    def of(cls, group: Index) -> GroupReduction:
         """Of the group (m,) of each row, not falling."""
         first = np.flatnonzero(np.concatenate([[True], group[1:] != group[:-1]])[: len(group)])
         sizes = np.diff(first, append=len(group))

@@ -11,7 +11,7 @@ from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32
 
 
-def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
+def poses(frames: AUFrames, inputs: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
     """What a face is drawn by: stills, films, sheets and streams of pictures and meshes alike.
 
     A column for each name, in its order: action units as they move a face (0..1), presences (0..1), and FAPs
@@ -21,7 +21,7 @@ def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None =
 
     Args:
         frames: n frames.
-        takes: names of `targets.axis()` (`Face.takes`).
+        inputs: names of `targets.axis()` (`Face.takes`).
         mapping: what AUs ask of FAPs; None is the one that ships.
 
     Returns:
@@ -30,16 +30,18 @@ def poses(frames: AUFrames, takes: tuple[str, ...], mapping: FapMapping | None =
     Raises:
         KeyError: a name that is not of the axis.
     """
-    columns = [axis()[name].column for name in takes]
+    columns = [axis()[name].column for name in inputs]
     count = len(AU_NAMES())
     values = frames.values.copy()
     values[:, :count] = frames.moving.T
     rest = values.copy()
     rest[:, [column for column in columns if column < count]] = 0
-    values[:, count : count + 68] = to_fap(AUFrames(frames.times, rest, held=frames.held), mapping).values
-    if frames.held is not None:
+    values[:, count : count + 68] = to_fap(
+        AUFrames(frames.times, rest, overridden=frames.overridden), mapping
+    ).values
+    if frames.overridden is not None:
         moved, left = values.copy(), rest.copy()
         moved[:, count : count + 68] = left[:, count : count + 68] = 0
         both = (to_fap(AUFrames(frames.times, one), mapping).values for one in (moved, left))
-        values[:, count : count + 68] -= frames.held * np.subtract(*both)
+        values[:, count : count + 68] -= frames.overridden * np.subtract(*both)
     return np.ascontiguousarray(values[:, columns])

@@ -15,7 +15,7 @@ from realizer.outputs.output import Drawing
 from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import play
 from realizer.render import Renderer
-from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class _Speaker:
         self.name = name
         self._voice: Voice | None = None
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         if self._voice is None:
             from realizer.speech.registry import find_voice
 

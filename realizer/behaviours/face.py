@@ -67,7 +67,7 @@ def expand_shift(node: FaceShift, times: Float64, context: PlanningContext) -> t
         for target, value in _targets(part, context).items():
             values[target] = max(values.get(target, 0.0), value * node.amount)
     return tuple(
-        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=node.id)
+        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, keeps_last=True, source=node.id)
         for target, value in values.items()
     )
 

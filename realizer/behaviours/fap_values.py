@@ -31,7 +31,7 @@ def expand(node: Faps, times: Float64, context: PlanningContext) -> tuple[Channe
     """There at attackPeak, held to relax, gone at end; they replace what else moves these FAPs."""
     there = np.array([0.0, 1.0, 1.0, 0.0])
     return tuple(
-        Channel(fap(part.number), times, part.value * there, layer=Layer.FAPS, there=there, source=node.id)
+        Channel(fap(part.number), times, part.value * there, layer=Layer.FAPS, weight=there, source=node.id)
         for part in node.values
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bml_schema import Gaze, GazeShift
 from realizer import tables
-from realizer.animation.axis import au, presence
+from realizer.animation.axis import au, mask_channel
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.gaze_targets import Turn, angles, facts, limited, limits, target_faults, turn
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
@@ -111,7 +111,7 @@ def expand(node: Gaze, times: Float64, context: PlanningContext) -> tuple[Channe
         *turn("head", keys, head, layer=Layer.GAZE, source=node.id),
         *_converge(keys, to.inward, Layer.GAZE, node.id),
         *(
-            Channel(presence(region), keys, values, layer=Layer.GAZE, source=node.id)
+            Channel(mask_channel(region), keys, values, layer=Layer.GAZE, source=node.id)
             for region, values in taken.items()
         ),
     )
@@ -145,7 +145,7 @@ def _converge(
     if not inward:
         return ()
     values = min(inward / tables.by_number()[66].degrees, 1.0) * EYES_TAKEN[: len(times)]
-    return (Channel(au(66)[0], times, values, layer=layer, holds=holds, source=source),)
+    return (Channel(au(66)[0], times, values, layer=layer, keeps_last=holds, source=source),)
 
 
 def claims(node: Gaze, context: PlanningContext) -> frozenset[str]:

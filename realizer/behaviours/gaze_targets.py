@@ -103,5 +103,5 @@ def turn(
                 whole = tables.by_number()[number].degrees
                 values = np.array([max(0.0, sign * angle) / whole for angle in degrees])
                 target = au(number)[0]
-                channels.append(Channel(target, times, values, layer=layer, holds=holds, source=source))
+                channels.append(Channel(target, times, values, layer=layer, keeps_last=holds, source=source))
     return tuple(channels)

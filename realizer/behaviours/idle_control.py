@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bml_schema import Idle
-from realizer.animation.axis import presence
+from realizer.animation.axis import mask_channel
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.idle.blinks import Fewer
+from realizer.animation.idle.blinks import BlinkReduction
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
@@ -25,9 +25,14 @@ def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channe
     """
     return tuple(
         channel(
-            presence(name), times, np.array([0.0, 1.0 - part]), layer=Layer.BASE, holds=True, source=node.id
+            mask_channel(name),
+            times,
+            np.array([0.0, 1.0 - part]),
+            layer=Layer.BASE,
+            holds=True,
+            source=node.id,
         )
-        for channel, name, part in ((Fewer, "blinks", node.blinks), (Channel, "motion", node.motion))
+        for channel, name, part in ((BlinkReduction, "blinks", node.blinks), (Channel, "motion", node.motion))
     )
 
 

@@ -35,7 +35,7 @@ def track(target: Target, times: Float64, values: Float64, source: str) -> Chann
     keys = np.unique(np.concatenate([times, ends]))
     there = np.interp(keys, ends, [0.0, 1.0, 1.0, 0.0])
     values = np.interp(keys, times, values)
-    return Channel(target, keys, values, curve="linear", layer=Layer.FAPS, there=there, source=source)
+    return Channel(target, keys, values, curve="linear", layer=Layer.FAPS, weight=there, source=source)
 
 
 def _eased(times: Float64, values: Float64, ease: float) -> tuple[Float64, Float64]:

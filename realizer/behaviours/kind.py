@@ -11,7 +11,7 @@ from realizer.animation.channel import Channel
 from realizer.core.array_types import Float64
 from realizer.expressions.library import Library, shipped
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import Recording, Say, Utterance
+from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 
 Position = tuple[float, float, float]
 
@@ -114,7 +114,7 @@ class BehaviourKind:
     timing: Callable[[Any, PlanningContext], Timing]
     expand: Callable[[Any, Float64, PlanningContext], tuple[Channel, ...]]
     check: Callable[[Any, PlanningContext], tuple[Fault, ...]] = lambda node, context: ()
-    speech_request: Callable[[Any, PlanningContext], Say | None] | None = None
+    speech_request: Callable[[Any, PlanningContext], SpeechRequest | None] | None = None
     command: Callable[[Any], BlockCommand] | None = None
     stretch: Callable[[Any, PlanningContext], Timing | None] = lambda node, context: None
     sound: Callable[[Any, PlanningContext], Utterance | None] = lambda node, context: None

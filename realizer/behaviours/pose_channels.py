@@ -37,7 +37,7 @@ def hold(values: Mapping[Target, float], times: Float64, source: str) -> tuple[C
 def keep_base(values: Mapping[Target, float], times: Float64, source: str) -> tuple[Channel, ...]:
     """Channels of a base state that rise from start to end, and stay: times (2,)."""
     return tuple(
-        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, holds=True, source=source)
+        Channel(target, times, np.array([0.0, value]), layer=Layer.BASE, keeps_last=True, source=source)
         for target, value in values.items()
     )
 

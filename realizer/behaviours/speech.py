@@ -16,7 +16,7 @@ from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.behaviours.media import MediaError
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import MOST_TEXT, Recording, Say, Utterance
+from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
 SSML = "application/ssml+xml"
 # 1/s: a second of speech resists as much as a stiff gap of the face; shorter gaps than SHORT count as such.
@@ -35,7 +35,7 @@ class SpokenContent:
     language: str | None = None
 
 
-def speech_request(node: Speech, context: PlanningContext) -> Say | None:
+def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | None:
     """The description of highest priority that is SSML, or else the text with its syncs as marks.
 
     A description that is an audio file says how it sounds; what is said in it stands in the others, or came
@@ -45,10 +45,10 @@ def speech_request(node: Speech, context: PlanningContext) -> Say | None:
     spoken = _spoken_content(node)
     if spoken is None and recording is not None:
         spoken = SpokenContent(escape(recording.text or ""), ())
-    if spoken is None or len(spoken.ssml) > MOST_TEXT:
+    if spoken is None or len(spoken.ssml) > MAX_TEXT:
         return None
     language = spoken.language or context.language
-    return Say(spoken.ssml, spoken.marks, language=language, recording=recording)
+    return SpeechRequest(spoken.ssml, spoken.marks, language=language, recording=recording)
 
 
 def timing(node: Speech, context: PlanningContext) -> Timing:
@@ -89,7 +89,7 @@ def stretch(node: Speech, context: PlanningContext) -> Timing | None:
 def expand(node: Speech, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Lips, jaw and tongue, from the phonemes."""
     utterance, start = context.utterances[node.id], float(times[0])
-    parts = utterance.parts or ((0.0, utterance),)
+    parts = utterance.sections or ((0.0, utterance),)
     return tuple(channel.named(node.id) for at, part in parts for channel in _lips(part, start + at))
 
 
@@ -124,9 +124,9 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
         words = f"speech: {faults[0].text}"
     elif spoken is None:
         words = f"speech: wanted <text>, a description of type {SSML} or a recording, got none"
-    elif len(spoken.ssml) > MOST_TEXT:
+    elif len(spoken.ssml) > MAX_TEXT:
         words = (
-            f"speech: wanted a text of at most {MOST_TEXT} characters, got {len(spoken.ssml)}; "
+            f"speech: wanted a text of at most {MAX_TEXT} characters, got {len(spoken.ssml)}; "
             "say it in several behaviours"
         )
     else:

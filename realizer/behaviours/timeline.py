@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bml_schema import Timeline as Node
-from realizer.animation.axis import Target, presence, rank
+from realizer.animation.axis import Target, mask_channel, mixing_order
 from realizer.animation.channel import Channel
 from realizer.behaviours import media, pose_channels
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
@@ -91,7 +91,7 @@ def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[C
     times = np.array([start, start + change, end - change, end])
     # Ranks add up to 1 at most: two timelines at once stay below it, or their orders would be lost.
     ranks = np.linspace(0.5, 0.0, len(timeline.order), endpoint=False)
-    targets = [(presence("successive"), 1.0), *zip(map(rank, timeline.order), ranks, strict=True)]
+    targets = [(mask_channel("successive"), 1.0), *zip(map(mixing_order, timeline.order), ranks, strict=True)]
     return [
         Channel(target, times, np.array([0.0, value, value, 0.0]), source=source) for target, value in targets
     ]

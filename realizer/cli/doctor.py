@@ -35,7 +35,7 @@ def _voices() -> Iterator[Finding]:
     from realizer.speech.registry import voices
 
     for voice in voices():
-        yield voice.available, voice.name, voice.says
+        yield voice.available, voice.name, voice.description
 
 
 def _film() -> Iterator[Finding]:

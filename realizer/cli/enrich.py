@@ -133,7 +133,7 @@ def enrich(
     """
     from bml_schema import write
     from realizer.knowledge.enrich import Enricher
-    from realizer.speech.utterance import MOST_TEXT
+    from realizer.speech.utterance import MAX_TEXT
 
     said = _read(text)
     if not said.strip():
@@ -148,7 +148,7 @@ def enrich(
         clean = _writable(said)
         if not clean.strip():
             raise click.UsageError("wanted a text or a BML document, got nothing that can be said")
-        blocks = list(enricher.texts(clean, MOST_TEXT))
+        blocks = list(enricher.texts(clean, MAX_TEXT))
         languages = [lists.language]
     if not context.obj["quiet"]:
         tell_unknown(lists, languages, set())

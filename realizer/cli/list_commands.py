@@ -16,7 +16,7 @@ def voices() -> None:
     from realizer.speech.registry import voices as known
 
     for voice in known():
-        click.echo(f"{voice.name:<16} {voice.says}")
+        click.echo(f"{voice.name:<16} {voice.description}")
 
 
 @click.command()

@@ -148,7 +148,7 @@ def tell_silence(voice: str | None) -> None:
     from realizer.speech.registry import find_voice, voices
 
     if voice is None and find_voice(None).name == "silent":
-        missing = next((v.says for v in voices() if not v.available), "")
+        missing = next((v.description for v in voices() if not v.available), "")
         click.echo(f"realizer: no voice is installed, speech is silent; {missing}", err=True)
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from realizer.speech.letter_to_sound import syllable_facts, units
+from realizer.speech.letter_to_sound import syllable_facts, vowel_units
 from realizer.speech.words import words_in
 
 QUESTION, EXCLAMATION = "?？؟՞\u037e", "!！՜"  # U+037E is the Greek one, which looks like a semicolon
@@ -59,7 +59,7 @@ def sentences(text: str, language: str = "en", rate: float = 1.0) -> tuple[Sente
             if not SAID.search(word):
                 continue
             now += _pauses(text[at : place + start]) * _unit(rate)
-            length = units(word, language) * _unit(rate)
+            length = vowel_units(word, language) * _unit(rate)
             words.append(SpokenWord(word, place + start, now, now + length))
             now += length
             at = place + start + len(word)

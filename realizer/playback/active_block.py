@@ -9,7 +9,7 @@ import numpy as np
 
 from bml_schema import Block, SyncRef, without
 from realizer.animation.channel import Channel, Gain, Layer, later
-from realizer.animation.crossfade import joined
+from realizer.animation.crossfade import crossfade
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core.array_types import Float64
 from realizer.playback.block_planner import Plan
@@ -244,11 +244,11 @@ class ActiveBlock:
                 old = self.shifts[behaviour].channels
                 begin, end = (self.start + float(times[behaviour][k]) for k in (0, -1))
                 self.shifts[behaviour] = BaseShift.of(
-                    begin, end, region, joined(old, new, now) if begun else new
+                    begin, end, region, crossfade(old, new, now) if begun else new
                 )
             elif new:
                 old = self.channels.get(behaviour, ())
-                self.channels[behaviour] = joined(old, new, now) if begun else new
+                self.channels[behaviour] = crossfade(old, new, now) if begun else new
             if behaviour in self.speech and not begun:
                 late = float(times[behaviour][0]) - float(before.times[behaviour][0])
                 heard = self.speech[behaviour]

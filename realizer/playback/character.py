@@ -93,8 +93,8 @@ class Character:
             for index, shift in enumerate(self.shifts)
             if not any(s.end < before and shift.regions <= s.regions for s in self.shifts[index + 1 :])
         ]
-        self.direct = {n: c for n, c in self.direct.items() if c.gone > before}
-        self.emotion = {n: c for n, c in self.emotion.items() if c.gone > before}
+        self.direct = {n: c for n, c in self.direct.items() if c.faded_at > before}
+        self.emotion = {n: c for n, c in self.emotion.items() if c.faded_at > before}
 
 
 def _hold(
@@ -115,4 +115,6 @@ def _hold(
             before, share = float(sample([old], at)[0, 0]), float(weights([old], at)[0, 0])
         keys, ends = np.array([now, now + rise]), np.array([before, value])
         there = np.array([share, 1.0])
-        held[name] = Channel(targets[name], keys, ends, layer=layer, holds=True, there=there, source="set")
+        held[name] = Channel(
+            targets[name], keys, ends, layer=layer, keeps_last=True, weight=there, source="set"
+        )

@@ -18,7 +18,7 @@ from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle.motion import Idle, idle_face
-from realizer.animation.idle.prosody import AFTERMATH, Asked, Talk, phrase_ends, prosody_channels
+from realizer.animation.idle.prosody import AFTERMATH, KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.array_types import Float64
@@ -30,7 +30,7 @@ from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.block_store import BlockStore
 from realizer.playback.character import RELAX, Character
 from realizer.scheduling.timing import Schedule, Warning
-from realizer.speech.utterance import Recording, Say, Utterance
+from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.tables.cooccurrence import chosen
 
 # Frames up to this long before `now` can still be asked for.
@@ -87,9 +87,9 @@ class Player:
 
     # documents in -------------------------------------------------------------------------------
 
-    def speech_requests(self, block: Block) -> dict[str, Say]:
+    def speech_requests(self, block: Block) -> dict[str, SpeechRequest]:
         """{behaviour id: what a voice has to say} before the block can be submitted."""
-        says: dict[str, Say] = {}
+        says: dict[str, SpeechRequest] = {}
         for node in block.behaviours:
             kind = self.kinds.get(node.tag)
             if (
@@ -293,14 +293,14 @@ class Player:
         seed = self.context.seed + 7919 * character
         said = (s for p in blocks for s in p.speech.values()) if self.prosody else ()
         talks = [
-            Talk(s.start + at, s.until, part)
+            SpeechSpan(s.start + at, s.until, part)
             for s in said
-            for at, part in s.utterance.parts or [(0.0, s.utterance)]
+            for at, part in s.utterance.sections or [(0.0, s.utterance)]
         ]
         near = [t for t in talks if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first]
         if near:
-            asked = [Asked(p.not_before, c) for p in blocks for c in p.moving_channels()]
-            asked += [Asked(c.span[0], c) for c in own]
+            asked = [KnownMotion(p.not_before, c) for p in blocks for c in p.moving_channels()]
+            asked += [KnownMotion(c.span[0], c) for c in own]
             channels += prosody_channels(near, first, last, seed, asked)
         return channels, idle_face(first, last, seed, phrase_ends(talks))
 

@@ -10,8 +10,8 @@ from bml_schema import Block
 from realizer.core.errors import VoiceError
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
-from realizer.speech.duration_fit import fitted, stretched, without_sound
-from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.speech.duration_fit import silent_fallback, speak_to_length, stretched
+from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 
 def submit_with_speech(player: Player, block: Block, voice: Voice, now: float = 0.0) -> Schedule:
@@ -28,14 +28,14 @@ def submit_with_speech(player: Player, block: Block, voice: Voice, now: float = 
     return planned
 
 
-def synthesize(requests: Mapping[str, Say], voice: Voice) -> dict[str, Utterance]:
+def synthesize(requests: Mapping[str, SpeechRequest], voice: Voice) -> dict[str, Utterance]:
     """Speak what a block wants; where the voice fails the silent voice takes over, with a warning."""
     utterances: dict[str, Utterance] = {}
     for behaviour, request in requests.items():
         try:
-            utterances[behaviour] = fitted(voice, request)
+            utterances[behaviour] = speak_to_length(voice, request)
         except VoiceError as error:
-            utterances[behaviour] = without_sound(request, error)
+            utterances[behaviour] = silent_fallback(request, error)
     return utterances
 
 
@@ -73,7 +73,7 @@ class _NamedVoice:
         self.name = name or "default"
         self._voice = None if name is None else self._find(name)
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         if self._voice is None:
             self._voice = self._find(None)
         return self._voice.say(request)

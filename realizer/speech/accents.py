@@ -53,11 +53,11 @@ def phrases(utterance: Utterance) -> tuple[Phrase, ...]:
     """
     found = _known.get(utterance)
     if found is None:
-        found = _known[utterance] = tuple(_found(utterance))
+        found = _known[utterance] = tuple(_find_phrases(utterance))
     return found
 
 
-def _found(utterance: Utterance) -> list[Phrase]:
+def _find_phrases(utterance: Utterance) -> list[Phrase]:
     sounds = [(p.start, p.end) for p in utterance.phonemes if p.ipa]
     words = [(w.start, w.end) for w in utterance.words] or sounds
     stressed = [(p.start + p.end) / 2 for p in utterance.phonemes if p.stress == PRIMARY and p.ipa]
@@ -72,7 +72,7 @@ def _found(utterance: Utterance) -> list[Phrase]:
         if stressed:
             times = [t for t in stressed if start <= t < end]
         else:
-            times = _standing_out(utterance, [w for w in words if start <= (w[0] + w[1]) / 2 < end])
+            times = _accent_times(utterance, [w for w in words if start <= (w[0] + w[1]) / 2 < end])
         accents = [Accent(time) for time in times]
         if accents:
             accents[-1] = replace(accents[-1], nuclear=True)
@@ -80,7 +80,7 @@ def _found(utterance: Utterance) -> list[Phrase]:
     return found
 
 
-def _standing_out(utterance: Utterance, words: Sequence[tuple[float, float]]) -> list[float]:
+def _accent_times(utterance: Utterance, words: Sequence[tuple[float, float]]) -> list[float]:
     """When the loudest words of a phrase are loudest, or the middle of the longest."""
     if not words:
         return []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 class BaseVoice(ABC):
@@ -38,7 +38,7 @@ class BaseVoice(ABC):
         return ()
 
     @abstractmethod
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         """Speak.
 
         Raises:

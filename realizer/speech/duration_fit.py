@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from realizer.core.errors import VoiceError
-from realizer.speech.utterance import WARP, Say, Utterance, Voice
+from realizer.speech.utterance import WARP, SpeechRequest, Utterance, Voice
 from realizer.speech.volume import with_volumes
 
 # A voice is asked again at another rate so often; its rate has steps, and pauses do not stretch evenly.
@@ -18,7 +18,7 @@ TRIES = 9
 NEAR = 0.006
 
 
-def fitted(voice: Voice, say: Say) -> Utterance:
+def speak_to_length(voice: Voice, request: SpeechRequest) -> Utterance:
     """Speak, `say.seconds` long where that is given: at the rate that comes nearest, then by resampling.
 
     What is recorded is not spoken (`speech.given`), and stays as long as it is.
@@ -26,14 +26,14 @@ def fitted(voice: Voice, say: Say) -> Utterance:
     Raises:
         VoiceError: as `voice.say`.
     """
-    if say.recording is not None:
-        from realizer.speech.recorded.recorded_speech import played
+    if request.recording is not None:
+        from realizer.speech.recorded.recorded_speech import utterance_of
 
-        return with_volumes(say, played(say, say.recording))
-    return with_volumes(say, _spoken(voice, say))
+        return with_volumes(request, utterance_of(request, request.recording))
+    return with_volumes(request, _synthesize(voice, request))
 
 
-def without_sound(say: Say, fault: VoiceError | str) -> Utterance:
+def silent_fallback(request: SpeechRequest, fault: VoiceError | str) -> Utterance:
     """What the silent voice makes of what another one failed to say, with a warning that says why.
 
     Raises:
@@ -41,36 +41,36 @@ def without_sound(say: Say, fault: VoiceError | str) -> Utterance:
     """
     from realizer.speech.silent import SilentVoice
 
-    made = fitted(SilentVoice(), say)
+    made = speak_to_length(SilentVoice(), request)
     return replace(made, warnings=(*made.warnings, f"{fault}; this one has no sound"))
 
 
-def _spoken(voice: Voice, say: Say) -> Utterance:
-    utterance = voice.say(replace(say, seconds=None))
-    if say.seconds is None or not utterance.duration:
+def _synthesize(voice: Voice, request: SpeechRequest) -> Utterance:
+    utterance = voice.say(replace(request, seconds=None))
+    if request.seconds is None or not utterance.duration:
         return utterance
-    rate, best = say.rate, utterance
+    rate, best = request.rate, utterance
     slow: tuple[float, float] | None = None  # the fastest rate that is too slow, and how long it takes
     fast: tuple[float, float] | None = None
     for _ in range(TRIES):
-        if abs(best.duration / say.seconds - 1.0) <= NEAR:
+        if abs(best.duration / request.seconds - 1.0) <= NEAR:
             break
-        if utterance.duration > say.seconds:
+        if utterance.duration > request.seconds:
             slow = (rate, utterance.duration)
         else:
             fast = (rate, utterance.duration)
         if slow and fast and slow[1] > fast[1]:
             # Between the two, by length as they lie, but never so near to one of them that nothing is won.
-            part = min(0.8, max(0.2, (slow[1] - say.seconds) / (slow[1] - fast[1])))
+            part = min(0.8, max(0.2, (slow[1] - request.seconds) / (slow[1] - fast[1])))
             rate = slow[0] + part * (fast[0] - slow[0])
         else:
-            rate *= utterance.duration / say.seconds
-        before, utterance = utterance, voice.say(replace(say, rate=rate, seconds=None))
-        if abs(utterance.duration - say.seconds) < abs(best.duration - say.seconds):
+            rate *= utterance.duration / request.seconds
+        before, utterance = utterance, voice.say(replace(request, rate=rate, seconds=None))
+        if abs(utterance.duration - request.seconds) < abs(best.duration - request.seconds):
             best = utterance
         elif utterance.duration == before.duration and not (slow and fast):
             break  # as slow or as fast as it can
-    return near(stretched(best, {"end": say.seconds}))
+    return allow_small_warp(stretched(best, {"end": request.seconds}))
 
 
 def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
@@ -100,10 +100,10 @@ def stretched(utterance: Utterance, times: Mapping[str, float]) -> Utterance:
         marks={name: times[name] if name in times else moved(at) for name, at in utterance.marks.items()},
         pcm=pcm,
         stretch=(1.0, 1.0),
-        parts=(),
+        sections=(),
     )
 
 
-def near(utterance: Utterance) -> Utterance:
+def allow_small_warp(utterance: Utterance) -> Utterance:
     """An utterance that the voice is not asked for again: it can be warped a little."""
     return replace(utterance, stretch=WARP if utterance.duration else (1.0, 1.0))

@@ -28,12 +28,12 @@ class Engine:
     Attributes:
         name: what messages call it.
         worker: its file, as `engine_worker` takes it.
-        missing: None where it is installed, otherwise the sentence that says what to install.
+        install_hint: None where it is installed, otherwise the sentence that says what to install.
     """
 
     name: str
     worker: Path
-    missing: Callable[[], str | None]
+    install_hint: Callable[[], str | None]
 
 
 class EngineProcess:
@@ -110,7 +110,7 @@ class EngineProcess:
             if self._running.process.poll() is None:
                 return self._running
             self._stop()  # it died while nobody asked
-        fix = self._engine.missing()
+        fix = self._engine.install_hint()
         if fix:
             raise VoiceError(fix)
         process = subprocess.Popen(

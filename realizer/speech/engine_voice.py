@@ -6,10 +6,10 @@ from abc import abstractmethod
 from typing import ClassVar
 
 from realizer.speech.base_voice import BaseVoice
-from realizer.speech.cache import Kept
+from realizer.speech.cache import UtteranceCache
 from realizer.speech.engine_process import Engine, EngineProcess
 from realizer.speech.ssml import Break, Script, read_script
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 class EngineVoice(BaseVoice):
@@ -32,9 +32,9 @@ class EngineVoice(BaseVoice):
         super().__init__(voice)
         self._voice = voice
         self._process = EngineProcess(self.worker, options, limit)
-        self._kept = Kept()
+        self._cache = UtteranceCache()
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         """Speak; `duration` is exactly the sound's.
 
         Wrong SSML is spoken as plain text, control characters and emoji are left out, an unknown language is
@@ -43,7 +43,7 @@ class EngineVoice(BaseVoice):
         Raises:
             VoiceError: the text is too long, or the engine is missing, died or hung.
         """
-        return self._kept.get(request, self._spoken)
+        return self._cache.get(request, self._speak)
 
     def close(self) -> None:
         """End the process; may be called twice. A later request starts it again."""
@@ -54,12 +54,12 @@ class EngineVoice(BaseVoice):
         """Id of the engine's process while it runs."""
         return self._process.pid
 
-    def _spoken(self, request: Say) -> Utterance:
+    def _speak(self, request: SpeechRequest) -> Utterance:
         script = read_script(request)
         if script.is_silent and not any(isinstance(part, Break) for part in script.parts):
             return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)
         return self._synthesize(request, script)
 
     @abstractmethod
-    def _synthesize(self, request: Say, script: Script) -> Utterance:
+    def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
         """Return what the engine makes of a request that has something to say, uncached."""

@@ -32,7 +32,7 @@ def syllable_facts() -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4096)  # a text says the same words again and again
-def units(word: str, language: str) -> int:
+def vowel_units(word: str, language: str) -> int:
     """How many vowel units a word lasts; at least 1. Digits count by their names.
 
     Args:

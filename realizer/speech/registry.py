@@ -33,14 +33,14 @@ class VoiceInfo:
         engine: what speaks.
         languages: BCP-47 tags; () if they are not known before the engine is installed.
         available: whether it works on this machine.
-        says: one sentence: what it is, or what to install.
+        description: one sentence: what it is, or what to install.
     """
 
     name: str
     engine: str
     languages: tuple[str, ...]
     available: bool
-    says: str
+    description: str
 
 
 def voices() -> tuple[VoiceInfo, ...]:

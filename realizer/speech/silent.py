@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from realizer.speech.base_voice import BaseVoice
-from realizer.speech.letter_to_sound import GENERIC, letters_to_phonemes, syllable_facts, units
+from realizer.speech.letter_to_sound import GENERIC, letters_to_phonemes, syllable_facts, vowel_units
 from realizer.speech.ssml import Mark, read_script
-from realizer.speech.utterance import STRETCH, Phoneme, Say, Utterance, Word
-from realizer.speech.words import Item, Pause, Spelled, items
+from realizer.speech.utterance import STRETCH, Phoneme, SpeechRequest, Utterance, Word
+from realizer.speech.words import Pause, Token, WordToken, tokens
 from realizer.tables.phonemes import vowels
 
 SLOWEST, FASTEST = 0.25, 4.0  # of the voice's own rate
@@ -25,7 +25,7 @@ class SilentVoice(BaseVoice):
     def languages(cls) -> tuple[str, ...]:
         return tuple(name for name in syllable_facts()["languages"] if name != GENERIC)
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         """Words last as many units (0.2 s at rate 1) as they have vowels; a punctuation mark lasts one.
 
         Raises:
@@ -36,10 +36,10 @@ class SilentVoice(BaseVoice):
         if script.is_silent and not any(not isinstance(part, (str, Mark)) for part in script.parts):
             return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)
         rate = min(FASTEST, max(SLOWEST, request.rate))
-        return _laid_out(items(script, facts["phrase"]), request.language, rate, script.warnings)
+        return _layout(tokens(script, facts["phrase"]), request.language, rate, script.warnings)
 
 
-def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:
+def _layout(things: Sequence[Token], language: str, rate: float, warnings: tuple[str, ...]) -> Utterance:
     facts = syllable_facts()
     now = facts["edge"]
     words: list[Word] = []
@@ -59,7 +59,7 @@ def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tupl
         else:
             marks.update(dict.fromkeys(waiting, now))
             waiting = []
-            length = units(thing.text, language) * facts["unit"] / (rate * thing.rate)
+            length = vowel_units(thing.text, language) * facts["unit"] / (rate * thing.rate)
             words.append(Word(now, now + length, thing.text))
             phonemes += _phonemes(thing, language, now, length, facts["consonant"])
         now += length
@@ -76,7 +76,7 @@ def _laid_out(things: Sequence[Item], language: str, rate: float, warnings: tupl
     )
 
 
-def _phonemes(word: Spelled, language: str, start: float, length: float, consonant: float) -> list[Phoneme]:
+def _phonemes(word: WordToken, language: str, start: float, length: float, consonant: float) -> list[Phoneme]:
     ipa = letters_to_phonemes(word.text, language) or ("",)
     vowel = [not sound or sound[0] in vowels() for sound in ipa]  # what has no sound counts as one
     times = [1.0 if is_vowel else consonant for is_vowel in vowel]

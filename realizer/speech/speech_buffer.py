@@ -16,7 +16,7 @@ FADE = 0.004  # s, where a sound is cut
 
 
 @dataclass(slots=True)
-class Track:
+class SpeechBuffer:
     """What has been spoken so far.
 
     Attributes:

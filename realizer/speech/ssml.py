@@ -10,8 +10,8 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
 from realizer.core.errors import VoiceError
-from realizer.speech.ssml_prosody import understood
-from realizer.speech.utterance import MOST_TEXT, Say
+from realizer.speech.ssml_prosody import is_supported
+from realizer.speech.utterance import MAX_TEXT, SpeechRequest
 
 LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice's
 LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
@@ -94,7 +94,7 @@ class Script:
         return not any(unicodedata.category(c)[0] in "LNS" for c in self.text)
 
 
-def read_script(request: Say) -> Script:
+def read_script(request: SpeechRequest) -> Script:
     """The script of a request. Wrong SSML is spoken as plain text, its marks kept, with a warning.
 
     Control characters, lone surrogates, emoji, elements that are not SSML (their text is spoken), marks
@@ -102,11 +102,11 @@ def read_script(request: Say) -> Script:
     warning; attributes that are not SSML are left out silently.
 
     Raises:
-        VoiceError: the text is longer than `MOST_TEXT` characters.
+        VoiceError: the text is longer than `MAX_TEXT` characters.
     """
-    if len(request.ssml) > MOST_TEXT:
+    if len(request.ssml) > MAX_TEXT:
         raise VoiceError(
-            f"wanted a text of at most {MOST_TEXT} characters, got {len(request.ssml)}: "
+            f"wanted a text of at most {MAX_TEXT} characters, got {len(request.ssml)}: "
             "split it over several behaviours"
         )
     warnings: list[str] = []
@@ -159,7 +159,7 @@ def _parse(ssml: str) -> tuple[list[Part], list[str]]:
                 odd.extend(
                     f'{key}="{value[:40]}" of prosody is not understood'
                     for key, value in attributes.items()
-                    if not understood(key, value)
+                    if not is_supported(key, value)
                 )
             kept = ((k, attributes[k][:LONGEST_ATTRIBUTE]) for k in SPOKEN[name] if k in attributes)
             parts.append(Tag(name, tuple(kept)))

@@ -18,9 +18,9 @@ VOLUMES = {
     "loud": 1.4,
     "x-loud": 2.0,
 }
-LEAST_RATE, MOST_RATE = 0.25, 4.0
-LEAST_PITCH, MOST_PITCH = 0.5, 2.0
-MOST_VOLUME = 4.0
+MIN_RATE, MAX_RATE = 0.25, 4.0
+MIN_PITCH, MAX_PITCH = 0.5, 2.0
+MAX_VOLUME = 4.0
 HERTZ = re.compile(r"\s*[+-]?(\d+(?:\.\d+)?|\.\d+)\s*Hz\s*", re.IGNORECASE)
 NUMBER = re.compile(r"\s*([+-]?)(\d+(?:\.\d+)?|\.\d+)\s*(%|st|dB|)\s*", re.IGNORECASE)
 
@@ -42,16 +42,16 @@ class Prosody:
     def within(self, attributes: Mapping[str, str]) -> Prosody:
         """How the text of a <prosody> inside this one is spoken; what is not understood changes nothing."""
         return Prosody(
-            self.rate * _bounded(_factor(attributes.get("rate", ""), RATES), LEAST_RATE, MOST_RATE),
-            self.pitch * _bounded(_factor(attributes.get("pitch", ""), PITCHES), LEAST_PITCH, MOST_PITCH),
-            self.volume * _bounded(_factor(attributes.get("volume", ""), VOLUMES), 0.0, MOST_VOLUME),
+            self.rate * _bounded(_factor(attributes.get("rate", ""), RATES), MIN_RATE, MAX_RATE),
+            self.pitch * _bounded(_factor(attributes.get("pitch", ""), PITCHES), MIN_PITCH, MAX_PITCH),
+            self.volume * _bounded(_factor(attributes.get("volume", ""), VOLUMES), 0.0, MAX_VOLUME),
         )
 
 
 PLAIN = Prosody()
 
 
-def understood(attribute: str, value: str) -> bool:
+def is_supported(attribute: str, value: str) -> bool:
     """Whether an attribute of <prosody> says something; of another one than rate, pitch and volume: True."""
     names = {"rate": RATES, "pitch": PITCHES, "volume": VOLUMES}.get(attribute)
     if names is None or value.strip() in names or NUMBER.fullmatch(value):

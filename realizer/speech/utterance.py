@@ -12,7 +12,7 @@ from realizer.core.array_types import Int16
 STRETCH = (0.6, 1.8)
 # And a sound can be played so much faster or slower, here more and there less, without asking the voice.
 WARP = (0.92, 1.08)
-MOST_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
+MAX_TEXT = 20_000  # characters; about 20 minutes of speech, beyond what one behaviour can want
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,7 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
-class Say:
+class SpeechRequest:
     """What a voice is asked to say.
 
     Attributes:
@@ -94,7 +94,7 @@ class Utterance:
         warnings: sentences for the client, such as "the text is empty".
         stretch: the shortest and the longest it could be made, as parts of its duration, by asking the voice
             again; (1, 1) where it is as it is.
-        parts: (start, utterance) of what it was joined of; () where it is one. While a long text is being
+        sections: (start, utterance) of what it was joined of; () where it is one. While a long text is being
             made the duration is a guess, and the sound ends with the last part.
     """
 
@@ -106,7 +106,7 @@ class Utterance:
     pcm: Int16 | None = None
     warnings: tuple[str, ...] = field(default=())
     stretch: tuple[float, float] = (1.0, 1.0)
-    parts: tuple[tuple[float, Utterance], ...] = ()
+    sections: tuple[tuple[float, Utterance], ...] = ()
 
 
 class Voice(Protocol):
@@ -114,7 +114,7 @@ class Voice(Protocol):
 
     name: str
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         """Speak.
 
         Raises:

@@ -6,19 +6,19 @@ from bisect import bisect_right
 from dataclasses import replace
 
 from realizer.speech.ssml import read_script
-from realizer.speech.utterance import Say, Utterance
-from realizer.speech.words import Spelled, items
+from realizer.speech.utterance import SpeechRequest, Utterance
+from realizer.speech.words import WordToken, tokens
 
 
-def with_volumes(say: Say, utterance: Utterance) -> Utterance:
+def with_volumes(request: SpeechRequest, utterance: Utterance) -> Utterance:
     """The utterance, each phoneme with the volume of the <prosody> elements around its word.
 
     By the text and not by the sound: how loud a voice or a recording is of itself says nothing of effort.
     Where the voice has other words than the text, they lie over each other evenly.
     """
-    if "volume" not in say.ssml or not utterance.words:
+    if "volume" not in request.ssml or not utterance.words:
         return utterance
-    volumes = [item.volume for item in items(read_script(say), "") if isinstance(item, Spelled)]
+    volumes = [item.volume for item in tokens(read_script(request), "") if isinstance(item, WordToken)]
     if all(volume == 1.0 for volume in volumes):
         return utterance
     starts = [word.start for word in utterance.words]

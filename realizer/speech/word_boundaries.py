@@ -8,11 +8,13 @@ import numpy as np
 
 from realizer.tables.phonemes import vowels
 
-MOST_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
+MAX_CELLS = 60_000  # of an alignment; beyond it words share by their number of phonemes
 SKIP, UNLIKE, ALIKE, HINT = 0.7, 1.2, 0.4, -0.5  # costs of the alignment, ours
 
 
-def cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collection[int] = ()) -> list[int]:
+def boundaries(
+    expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collection[int] = ()
+) -> list[int]:
     """For each word the index of its first phoneme: the cheapest alignment of the words spoken alone.
 
     Args:
@@ -20,12 +22,12 @@ def cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collect
         heard: phonemes of all of them together.
         hints: indices where the engine reports some word.
     """
-    flat = [(bare(sound), n == 0) for word in expected for n, sound in enumerate(word)]
-    if not flat or len(flat) * len(heard) > MOST_CELLS:
+    flat = [(strip_marks(sound), n == 0) for word in expected for n, sound in enumerate(word)]
+    if not flat or len(flat) * len(heard) > MAX_CELLS:
         counts = np.array([max(len(word), 1) for word in expected], float)
         shares = np.concatenate(([0.0], np.cumsum(counts)[:-1])) / counts.sum()
         return [round(share * len(heard)) for share in shares]
-    plain = [bare(sound) for sound in heard]
+    plain = [strip_marks(sound) for sound in heard]
     # Plain lists: the groups are small, and indexing arrays one number at a time is slow.
     cost = [SKIP * j for j in range(len(plain) + 1)]
     steps = [[2] * (len(plain) + 1)]  # 0 both, 1 expected alone, 2 heard alone
@@ -54,7 +56,7 @@ def cuts(expected: Sequence[Sequence[str]], heard: Sequence[str], hints: Collect
     return found
 
 
-def bare(ipa: str) -> str:
+def strip_marks(ipa: str) -> str:
     """A phoneme without stress and length."""
     return ipa.strip("ˈˌː_").replace("ː", "")
 

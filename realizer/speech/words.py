@@ -20,7 +20,7 @@ WORD = re.compile(
 
 
 @dataclass(frozen=True, slots=True)
-class Spelled:
+class WordToken:
     """A word as it is written; `place` counts characters in the text that the engine is given."""
 
     text: str
@@ -46,7 +46,7 @@ class PlacedMark:
     paused: bool
 
 
-Item = Spelled | Pause | Mark
+Token = WordToken | Pause | Mark
 
 
 def words_in(text: str) -> Iterator[tuple[str, int]]:
@@ -57,14 +57,14 @@ def words_in(text: str) -> Iterator[tuple[str, int]]:
             yield found[0], found.start()
 
 
-def items(script: Script, phrase: str) -> tuple[Item, ...]:
+def tokens(script: Script, phrase: str) -> tuple[Token, ...]:
     """Words, pauses and marks in the order of the text, for a voice that has no engine.
 
     Args:
         script: the parts; <prosody> scales the words inside it, <sub alias> replaces its text.
         phrase: the characters that make a pause; a run of them is one.
     """
-    found: list[Item] = []
+    found: list[Token] = []
     manners = [PLAIN]  # of the open tags, outermost first
     hidden = 0  # depth inside <sub>
     place = 0
@@ -89,12 +89,12 @@ def items(script: Script, phrase: str) -> tuple[Item, ...]:
     return tuple(found)
 
 
-def _spelled(text: str, place: int, manner: Prosody, phrase: str) -> Iterator[Item]:
+def _spelled(text: str, place: int, manner: Prosody, phrase: str) -> Iterator[Token]:
     at = 0
     for word, start in [*words_in(text), ("", len(text))]:
         signs = "".join(c for c in text[at:start] if c in phrase)
         if signs:
             yield Pause(signs)
         if word:
-            yield Spelled(word, place + start, manner.rate, manner.volume)
+            yield WordToken(word, place + start, manner.rate, manner.volume)
         at = start + len(word)

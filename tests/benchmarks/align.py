@@ -23,7 +23,7 @@ from realizer.core.errors import RealizerError
 from realizer.speech.align.aligner import align
 from realizer.speech.align.alignment import Alignment
 from realizer.speech.registry import find_voice
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 
 RECORDINGS = Path("/usr/share/pocketsphinx/test/data/librivox")
 NEEDED = "no recordings in {}: apt-get install pocketsphinx-testdata, or --recordings DIR"
@@ -92,7 +92,9 @@ def spoken(name: str, language: str) -> Iterator[Sample]:
     variants = VARIANTS.get(language, (f"{language}+f2", f"{language}+m3")) if name == "espeak" else (None,)
     for k, text in enumerate(SENTENCES[language]):
         said = voice.say(
-            Say(text, language=language, voice=variants[k % len(variants)], rate=RATES[k % len(RATES)])
+            SpeechRequest(
+                text, language=language, voice=variants[k % len(variants)], rate=RATES[k % len(RATES)]
+            )
         )
         pause = round(SILENCE[k % len(SILENCE)] * said.sample_rate)
         clean = np.pad(said.pcm.astype(float), pause)

@@ -15,7 +15,7 @@ from align import SENTENCES
 from realizer.core.errors import RealizerError
 from realizer.speech.align.aligner import align
 from realizer.speech.registry import find_voice
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 
 
 def main() -> None:
@@ -26,7 +26,7 @@ def main() -> None:
     voice = find_voice(asked.voice)
     late: list[float] = []
     for text in SENTENCES["en-US"]:
-        said = voice.say(Say(text))
+        said = voice.say(SpeechRequest(text))
         if said.pcm is None:
             sys.exit(f"{asked.voice} has no sound: there is nothing to calibrate")
         try:

@@ -31,7 +31,7 @@ from realizer.server.journal.recordings import FolderJournal
 from realizer.server.journal.replay import restored
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 
@@ -84,7 +84,7 @@ def timed_checkpoints() -> Iterator[list[float]]:
 
 
 def spoken(order: Speak) -> Utterance:
-    return fitted(SilentVoice(), order.say)
+    return speak_to_length(SilentVoice(), order.say)
 
 
 def opened() -> Session:

@@ -19,7 +19,7 @@ from realizer.animation.pose import poses
 from realizer.face.load import load_face
 from realizer.offline import realize
 from realizer.speech.registry import find_voice
-from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 from tests.mouths import Mouth
 
 SENTENCES = {
@@ -118,7 +118,7 @@ class At:
     rate: float
     name: str = "at"
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         return self.voice.say(replace(request, rate=request.rate * self.rate))
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.protocol import PHONEME, WORD, read_answer
 from realizer.speech.espeak.voice import EspeakVoice, choose_voice
 from realizer.speech.ssml import read_script
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 
 __all__ = ["TEXTS", "Errors", "errors"]
 
@@ -63,13 +63,13 @@ def errors(voice: EspeakVoice, count: int, seed: int = 0) -> Iterator[Errors]:
     while made < count:
         language = draw.choice(sorted(TEXTS))
         text = draw.choice(TEXTS[language])
-        document = write_document(read_script(Say(text)))
+        document = write_document(read_script(SpeechRequest(text)))
         chosen = sorted(draw.sample(range(len(document.words)), min(draw.randint(1, 4), count - made)))
         places = [document.words[k][1] - len("<speak>") - 1 for k in chosen]
         marked = text
         for n, place in sorted(enumerate(places), reverse=True):
             marked = f'{marked[:place]}<mark name="m{n}"/>{marked[place:]}'
-        said = voice.say(Say(marked, tuple(f"m{n}" for n in range(len(chosen))), language))
+        said = voice.say(SpeechRequest(marked, tuple(f"m{n}" for n in range(len(chosen))), language))
         reported, begins = _reported(voice, marked, language)
         for n, k in enumerate(chosen):
             mark = said.marks[f"m{n}"]
@@ -82,7 +82,7 @@ def _reported(voice: EspeakVoice, text: str, language: str) -> tuple[dict[int, f
     """As the engine says, in seconds: words by index, and where any word or phoneme begins."""
     process = voice._process
     hello = process.hello()
-    document = write_document(read_script(Say(text)))
+    document = write_document(read_script(SpeechRequest(text)))
     name, _ = choose_voice(hello, None, language)
     events, _ = read_answer(*process.ask({"op": "say", "text": document.text, "voice": name, "wpm": 175}))
     at: dict[int, int] = {}

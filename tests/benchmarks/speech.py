@@ -29,10 +29,10 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech.cache import Kept
-from realizer.speech.duration_fit import fitted
+from realizer.speech.cache import UtteranceCache
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.registry import find_voice, voices
-from realizer.speech.utterance import MOST_TEXT, Say, Utterance, Voice
+from realizer.speech.utterance import MAX_TEXT, SpeechRequest, Utterance, Voice
 
 SENTENCE = "Hello, I am very pleased to meet you, number {}."
 PARAGRAPH = "I am number {0}, and it would have been the one of the best that you have seen. " * 8
@@ -53,7 +53,7 @@ def milliseconds(call: Callable[[int], object]) -> tuple[float, float]:
 
 def lips(voice: Voice, text: str) -> Utterance:
     """The whole path: text to lips."""
-    said = voice.say(Say(text))
+    said = voice.say(SpeechRequest(text))
     lip_channels(said.phonemes, 0.0)
     return said
 
@@ -70,7 +70,7 @@ def first_sound(voice: Voice, message: str) -> float:
         for effect in session.outgoing():
             match effect:
                 case Speak(id, say):
-                    session.spoken(id, fitted(voice, replace(say, voice=None)), time.perf_counter())
+                    session.spoken(id, speak_to_length(voice, replace(say, voice=None)), time.perf_counter())
                 case Send(_, bytes() as data):
                     frame = unpack(data)
                     if frame.stream == "audio" and np.any(frame.values):
@@ -85,14 +85,14 @@ def measure(voice: Voice) -> None:
     print(f"{voice.name}: start {1000 * (time.perf_counter() - begin):.0f} ms")
     for name, text in (("sentence", SENTENCE), ("paragraph", PARAGRAPH)):
         said = lips(voice, text.format("x"))
-        spoken, worst = milliseconds(lambda k, text=text: voice.say(Say(text.format(k))))
+        spoken, worst = milliseconds(lambda k, text=text: voice.say(SpeechRequest(text.format(k))))
         whole, _ = milliseconds(lambda k, text=text: lips(voice, text.format(100 + k)))
         print(
             f"  {name} of {said.duration:.2f} s, {len(said.phonemes)} phonemes: utterance {spoken:.2f} ms "
             f"(p99 {worst:.2f}), to the lips {whole:.2f} ms, "
             f"real-time factor {whole / 1000 / said.duration:.5f}"
         )
-    text = "".join(LONGEST.format(k) for k in range(MOST_TEXT // len(LONGEST)))[:MOST_TEXT]
+    text = "".join(LONGEST.format(k) for k in range(MAX_TEXT // len(LONGEST)))[:MAX_TEXT]
     begin = time.perf_counter()
     said = lips(voice, text)
     spent = time.perf_counter() - begin
@@ -115,15 +115,15 @@ def measure(voice: Voice) -> None:
             print(
                 f"  first sound of a {name} after {statistics.median(spent):.1f} ms, at most {spent[-1]:.1f}"
             )
-    again, _ = milliseconds(lambda k: voice.say(Say("first")))
+    again, _ = milliseconds(lambda k: voice.say(SpeechRequest("first")))
     print(f"  the same text again {again:.4f} ms")
     repeats = REPEATS.get(voice.name, 0)
     if repeats:
         first = lips(voice, SENTENCE)
         same = 0
         for _ in range(repeats):
-            vars(voice)["_kept"] = Kept()  # so that it is spoken anew
-            said = voice.say(Say(SENTENCE))
+            vars(voice)["_kept"] = UtteranceCache()  # so that it is spoken anew
+            said = voice.say(SpeechRequest(SENTENCE))
             same += (said.words, said.phonemes) == (first.words, first.phonemes) and np.array_equal(
                 said.pcm if said.pcm is not None else [], first.pcm if first.pcm is not None else []
             )

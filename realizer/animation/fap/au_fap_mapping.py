@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 from realizer import tables
-from realizer.animation.fap.piecewise_matrix import Demand
+from realizer.animation.fap.piecewise_matrix import PiecewiseMatrix
 from realizer.tables import AuToFap
 from realizer.tables.mappings import Units
 
@@ -24,9 +24,9 @@ class FapMapping:
     sources: tuple[str, ...]
 
     @cached_property
-    def demand(self) -> Demand:
+    def matrix(self) -> PiecewiseMatrix:
         """The rows, ready for whole arrays."""
-        return Demand.of(self.rows)
+        return PiecewiseMatrix.of(self.rows)
 
     def replaced(self, units: Units, source: str) -> FapMapping:
         """This mapping, but of the action units that `units` names what it says and nothing else."""

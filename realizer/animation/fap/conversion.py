@@ -8,9 +8,9 @@ from functools import cache, lru_cache
 import numpy as np
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, axis, presence
+from realizer.animation.axis import AU_NAMES, axis, mask_channel
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
-from realizer.animation.fap.piecewise_matrix import LOWERS, RAISES, Asking, Demand
+from realizer.animation.fap.piecewise_matrix import LOWERS, RAISES, AuFapRows, PiecewiseMatrix
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.core.array_types import Float32, Index
 
@@ -38,12 +38,12 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
         n frames; the mask is the same for all frames of one mapping.
     """
     count = len(AU_NAMES())
-    live = frames.live
+    live = frames.moving_columns
     given = tuple(column - count for column in live if count <= column < count + 68)
-    demand = (mapping or standard()).demand
-    plan = _plan(demand, frames.live_aus, given)
+    demand = (mapping or standard()).matrix
+    plan = _plan(demand, frames.moving_aus, given)
     aus = frames.moving_rows
-    raised, lowered = plan.asking.of(aus)
+    raised, lowered = plan.asking.evaluate(aus)
     values = np.zeros((len(plan.faps), len(frames.times)), np.float32)
     values[: len(raised)] = raised
     for upper, lids, closed in plan.lids:
@@ -56,10 +56,10 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
         values[fap] += value * np.minimum(aus[unit], aus[other])
     for upper, lower in plan.gaps:
         np.minimum(values[lower], APERTURE - values[upper], out=values[lower])
-    if (lips := presence("lips").column) in live:
+    if (lips := mask_channel("lips").column) in live:
         values *= 1.0 - plan.own * frames.values[:, lips]
-    if frames.held is not None:
-        values *= 1.0 - frames.held.T[plan.faps]
+    if frames.overridden is not None:
+        values *= 1.0 - frames.overridden.T[plan.faps]
     if given:
         values[plan.given] += frames.faps.T[list(given)]
     np.maximum(values, plan.least, out=values)
@@ -88,7 +88,7 @@ class _Plan:
         own, least, most: (f, 1) how much of a FAP speech owns, its least and its most value.
     """
 
-    asking: Asking
+    asking: AuFapRows
     faps: Index
     lids: tuple[tuple[int, list[int], np.float32], ...]
     combinations: tuple[tuple[int, int, int, float], ...]
@@ -102,7 +102,7 @@ class _Plan:
 
 # Sessions move the same few sets of units again and again; 10 kB each.
 @lru_cache(maxsize=512)
-def _plan(demand: Demand, live: tuple[int, ...], given: tuple[int, ...]) -> _Plan:
+def _plan(demand: PiecewiseMatrix, live: tuple[int, ...], given: tuple[int, ...]) -> _Plan:
     asking = demand.among(live)
     unit = {column: row for row, column in enumerate(live)}
     together = [row for row in _combinations() if row[0] in unit and row[1] in unit]

@@ -46,7 +46,7 @@ class FAPClip:
             name, fps, values, mask, np.zeros((count, 4), np.int32), np.zeros((count, 6), np.int32)
         )
 
-    def since(self, frame: int) -> FAPClip:
+    def from_frame(self, frame: int) -> FAPClip:
         """What is left of it from a frame on."""
         parts = (self.values[frame:], self.mask, self.visemes[frame:], self.expressions[frame:])
         return FAPClip(self.name, self.fps, *parts, self.notes)

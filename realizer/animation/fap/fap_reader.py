@@ -40,8 +40,8 @@ class _Notes:
 
     found: dict[str, list[int]] = field(default_factory=dict)
 
-    def add(self, says: str, line: int = 0) -> None:
-        self.found.setdefault(says, []).append(line)
+    def add(self, text: str, line: int = 0) -> None:
+        self.found.setdefault(text, []).append(line)
 
     def sentences(self) -> tuple[str, ...]:
         out = []
@@ -159,8 +159,8 @@ def _frame(mask: Line, values: Line, notes: _Notes) -> _Frame:
     line, words = values
     number, *numbers = _integers(words, notes, line)
     layout = _layout(tuple(mask[1]), len(numbers))
-    if layout.says:
-        notes.add(layout.says, line)
+    if layout.note:
+        notes.add(layout.note, line)
     return _Frame(number, line, layout, numbers)
 
 
@@ -171,12 +171,12 @@ class _Layout:
     Attributes:
         used: the FAPs that the mask gives.
         columns: of each number: the FAP, behind them the four of FAP 1 and the six of FAP 2.
-        says: what is odd about it.
+        note: what is odd about it.
     """
 
     used: npt.NDArray[np.intp]
     columns: npt.NDArray[np.intp]
-    says: str
+    note: str
 
 
 @lru_cache(maxsize=64)

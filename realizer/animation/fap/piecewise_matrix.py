@@ -10,7 +10,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.animation.axis import AU_NAMES, axis
-from realizer.animation.group_reduce import Rounds
+from realizer.animation.group_reduce import GroupReduction
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables import AuToFap
 
@@ -19,7 +19,7 @@ RAISES, LOWERS, TURNS = range(3)
 
 
 @dataclass(frozen=True, eq=False)
-class Bends:
+class Breakpoints:
     """Where polylines bend for the k-th time: `lines` (b,), rows of their units, knots, changes (b, 1)."""
 
     lines: Index
@@ -29,7 +29,7 @@ class Bends:
 
 
 @dataclass(frozen=True, eq=False)
-class Demand:
+class PiecewiseMatrix:
     """The rows, ready for whole arrays: every polyline is slope * au, and a hinge where it bends.
 
     One that both raises and lowers a FAP stands there twice; those that lower it stand upside down.
@@ -50,7 +50,7 @@ class Demand:
     mask: Bool
 
     @classmethod
-    def of(cls, rows: Iterable[AuToFap]) -> Demand:
+    def of(cls, rows: Iterable[AuToFap]) -> PiecewiseMatrix:
         """From rows on the axis: the pieces of one (au, side, fap) do not overlap and begin at 0."""
         lines: list[tuple[int, int, list[tuple[float, float]]]] = []
         turns = [row.unit == "angle_unit" for row in tables.faps()]
@@ -83,20 +83,20 @@ class Demand:
             mask=mask,
         )
 
-    def among(self, live: tuple[int, ...]) -> Asking:
+    def among(self, live: tuple[int, ...]) -> AuFapRows:
         """What units ask of which these rows, rising, may be other than 0."""
         row = np.full(len(AU_NAMES()), -1)
         row[list(live)] = np.arange(len(live))
         lines = np.flatnonzero(row[self.column[:-1]] >= 0)
         turning = self.side[lines] % 3 == TURNS
         pulls, turns = lines[~turning], lines[turning]
-        strongest, sums = Rounds.of(self.side[pulls]), Rounds.of(self.side[turns])
+        strongest, sums = GroupReduction.of(self.side[pulls]), GroupReduction.of(self.side[turns])
         # Between them stands the one that asks nothing: for FAPs that nothing raises, or nothing lowers.
         lines = np.concatenate([pulls[strongest.order], [-1], turns[sums.order]])
         none = len(pulls)
         at = dict(zip(strongest.groups.tolist(), range(none), strict=False))
         faps = sorted({side // 3 for side in at})
-        return Asking(
+        return AuFapRows(
             faps=np.array([*faps, *(sums.groups // 3)], np.intp),
             rows=row[self.column[lines]],
             slopes=self.slope[lines][:, None],
@@ -108,7 +108,7 @@ class Demand:
             sides=frozenset(at),
         )
 
-    def _bends(self, lines: Index, row: Index) -> tuple[Bends, ...]:
+    def _bends(self, lines: Index, row: Index) -> tuple[Breakpoints, ...]:
         if not self.bends:
             return ()
         place = {line: i for i, line in enumerate(lines.tolist())}
@@ -119,7 +119,7 @@ class Demand:
                     found.append([])
                 found[before].append((place[line], int(row[self.column[line]]), knot, slope))
         return tuple(
-            Bends(
+            Breakpoints(
                 np.array([line for line, *_ in some]),
                 np.array([unit for _, unit, *_ in some]),
                 np.array([knot for *_, knot, _ in some], np.float32)[:, None],
@@ -149,7 +149,7 @@ def _hinges(pieces: list[AuToFap]) -> tuple[list[tuple[float, float]], list[floa
 
 
 @dataclass(frozen=True, eq=False)
-class Asking:
+class AuFapRows:
     """What some units ask, each a row of whole arrays.
 
     Attributes:
@@ -164,14 +164,14 @@ class Asking:
     faps: Index
     rows: Index
     slopes: Float32
-    bends: tuple[Bends, ...]
-    strongest: Rounds
-    sums: Rounds
+    bends: tuple[Breakpoints, ...]
+    strongest: GroupReduction
+    sums: GroupReduction
     raising: Index
     lowering: Index
     sides: frozenset[int]
 
-    def of(self, aus: Float32) -> tuple[Float32, Float32]:
+    def evaluate(self, aus: Float32) -> tuple[Float32, Float32]:
         """What AUs (u, n) ask of `faps`.
 
         Returns:

@@ -29,7 +29,7 @@ BLINK = float(BLINK_TIMES[-1])
 
 
 @dataclass(frozen=True, eq=False)
-class Fewer(Channel):
+class BlinkReduction(Channel):
     """What is taken from the blinks; it counts for those that began before it had gone, until they end."""
 
     @cached_property
@@ -57,7 +57,7 @@ class Blinks:
     onsets: Float64
     draws: Float64
 
-    def kept(self, part: Float64) -> Blinks:
+    def reduced(self, part: Float64) -> Blinks:
         """Those of which this part (b,) is above their draw: each comes whole or not at all."""
         comes = part > self.draws
         return Blinks(self.onsets[comes], self.draws[comes])
@@ -81,20 +81,20 @@ def blinks_between(start: float, end: float, seed: int, ends: Sequence[PhraseEnd
     """
     moved = prosody_facts()["blinks"]["reach"] + prosody_facts()["blinks"]["delay"] if ends else 0.0
     count = 64
-    while (drawn := _drawn(seed, count))[0, -1] <= end + moved:
+    while (drawn := _draws(seed, count))[0, -1] <= end + moved:
         count *= 2
     first, last = drawn[0].searchsorted((start - BLINK - moved, end + moved), "right")
     onsets, draws, late = drawn[:, first:last]
     if ends:
         onsets = np.array(
-            [_placed(at, part, ends) for at, part in zip(onsets.tolist(), late.tolist(), strict=True)]
+            [_blink_time(at, part, ends) for at, part in zip(onsets.tolist(), late.tolist(), strict=True)]
         )
         seen = (onsets + BLINK >= start) & (onsets <= end)
         onsets, draws = onsets[seen], draws[seen]
     return Blinks(onsets, draws)
 
 
-def _placed(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
+def _blink_time(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
     """When a blink comes that is due: at the nearest end of a phrase, if it is due since the speech began.
 
     No blink depends on another one, so that what is forgotten changes nothing that is still to be seen.
@@ -111,7 +111,7 @@ def _placed(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
 
 
 @lru_cache(maxsize=64)
-def _drawn(seed: int, count: int) -> Float64:
+def _draws(seed: int, count: int) -> Float64:
     """(3, count) of the first blinks of a face: when they are due, in seconds, rising; two draws of each."""
     normal, turn, draw, late = uniform(seed, (301, 302, 304, 305), np.arange(count))
     # Box-Muller: two uniform numbers make a normal one.

@@ -44,7 +44,7 @@ class Motion:
         poses: (m, k) 0..1: the columns in these poses.
         way: (m,) the way of the head to turn that moves each column.
         jumps: (j,) seconds: when the eyes leave for a new point.
-        lasts: (j,) seconds: how long they are on their way.
+        durations: (j,) seconds: how long they are on their way.
         points: (e, j) 0..1: what is added to the last e columns when they are there.
     """
 
@@ -53,7 +53,7 @@ class Motion:
     poses: Float64
     way: Index
     jumps: Float64
-    lasts: Float64
+    durations: Float64
     points: Float64
 
     def at(self, times: Float64) -> Float64:
@@ -73,7 +73,7 @@ class Motion:
         # A minimum-jerk course is the same both ways: what is left to go is 1 at first and falls to 0.
         to_go = self._arrivals.repeat(at_points)
         to_go -= times
-        to_go /= self.lasts.repeat(at_points)
+        to_go /= self.durations.repeat(at_points)
         np.maximum(to_go, 0.0, out=to_go)
         eyes = moved[-len(self.points) :]
         eyes += self.points.repeat(at_points, axis=1)
@@ -89,7 +89,7 @@ class Motion:
     @cached_property
     def _arrivals(self) -> Float64:
         """(j,) seconds: when the eyes are at each point."""
-        arrivals: Float64 = self.jumps + self.lasts
+        arrivals: Float64 = self.jumps + self.durations
         return arrivals
 
     @cached_property

@@ -32,7 +32,7 @@ BROW_FAPS = range(31, 39)
 SOURCE = "prosody"
 
 
-class Talk(NamedTuple):
+class SpeechSpan(NamedTuple):
     """Something said from `start` on, seconds on the session clock, and cut off at `until`."""
 
     start: float
@@ -40,7 +40,7 @@ class Talk(NamedTuple):
     utterance: Utterance
 
 
-class Asked(NamedTuple):
+class KnownMotion(NamedTuple):
     """What a document or a client moves, and since when (session clock) that is known."""
 
     known: float
@@ -63,7 +63,7 @@ class Gesture:
         return float(self.channels[0].times[-1])
 
 
-def phrase_ends(talks: Iterable[Talk]) -> tuple[PhraseEnd, ...]:
+def phrase_ends(talks: Iterable[SpeechSpan]) -> tuple[PhraseEnd, ...]:
     """Where blinks belong, in order of time; beyond a cut as far as a blink might have been moved."""
     reach = prosody_facts()["blinks"]["reach"]
     ends = [
@@ -76,7 +76,11 @@ def phrase_ends(talks: Iterable[Talk]) -> tuple[PhraseEnd, ...]:
 
 
 def prosody_channels(
-    talks: Iterable[Talk], start: float, end: float, seed: int, asked: Iterable[Asked] = ()
+    talks: Iterable[SpeechSpan],
+    start: float,
+    end: float,
+    seed: int,
+    known_motions: Iterable[KnownMotion] = (),
 ) -> list[Channel]:
     """What can be seen in start..end of the nods, raised brows and looks aside of those who speak.
 
@@ -88,7 +92,7 @@ def prosody_channels(
         talks: what the character says.
         start, end: seconds on the session clock.
         seed: of the character.
-        asked: what else moves it, whatever it moves.
+        known_motions: what else moves it, whatever it moves.
     """
     shown: list[Channel] = []
     fade = prosody_facts()["yield"]["fade"]
@@ -98,7 +102,7 @@ def prosody_channels(
             if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
                 continue
             if claims is None:  # most of the time nobody speaks
-                claims = list(_claims(asked))
+                claims = list(_claims(known_motions))
             leaves = talk.until
             for part, known, first, last in claims:
                 if part == gesture.region and first < gesture.end and last > gesture.begin:
@@ -110,9 +114,9 @@ def prosody_channels(
     return shown
 
 
-def _claims(asked: Iterable[Asked]) -> Iterator[tuple[str, float, float, float]]:
+def _claims(known_motions: Iterable[KnownMotion]) -> Iterator[tuple[str, float, float, float]]:
     """(part of the face, since when known, first and last second) of what is asked of it."""
-    for known, channel in asked:
+    for known, channel in known_motions:
         part = _parts().get(channel.target.column)
         # Nods are laid on the direction that a head keeps, as its sway is.
         if part is None or (part == "head" and channel.layer is Layer.BASE) or not channel.values.any():
@@ -137,7 +141,7 @@ def _parts() -> dict[int, str]:
 @lru_cache(maxsize=64)
 def _gestures(said: tuple[Phrase, ...], start: float, seed: int) -> tuple[Gesture, ...]:
     """All that comes with an utterance that starts at `start`, if nothing is in its way."""
-    return (*_accents(said, start, seed), *_asides(said, start, seed))
+    return (*_accents(said, start, seed), *_looks_aside(said, start, seed))
 
 
 def _accents(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
@@ -186,7 +190,7 @@ def _raise(time: float, most: float) -> Gesture:
     return Gesture("brows", tuple(Channel(t, keys, values, layer=Layer.IDLE, source=SOURCE) for t in lifts))
 
 
-def _asides(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
+def _looks_aside(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gesture]:
     aside = prosody_facts()["aside"]
     if not said or said[-1].end - said[0].start < aside["least"]:
         return

@@ -11,7 +11,7 @@ from realizer.core.array_types import Bool, Float64
 BILABIAL, LABIODENTAL = 1, 2  # visemes
 
 
-def lips_taken(track: Track, times: Float64) -> Float64:
+def lip_weight(track: Track, times: Float64) -> Float64:
     """(n,) 0..1: how far speech has the lips; 0 at the ends and in long pauses.
 
     Whole from the first sound that closes the lips to the last: an expression would part them.
@@ -47,7 +47,7 @@ def _smoothstep(x: Float64) -> Float64:
     return x * x * (3 - 2 * x)
 
 
-def held(track: Track, times: Float64) -> tuple[Bool, Bool]:
+def closure_mask(track: Track, times: Float64) -> tuple[Bool, Bool]:
     """(n,) each: whether a sound that closes the lips, or bites the lower one, holds them at each time.
 
     Two different ones that stand close together part as far as a frame allows, and share what is between.

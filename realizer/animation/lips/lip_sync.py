@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from realizer.animation.axis import fap, presence
+from realizer.animation.axis import fap, mask_channel
 from realizer.animation.channel import Channel, Layer
-from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight
 from realizer.animation.lips.dominance import CLASSES, Track, dominances, key_times, track_of
 from realizer.animation.lips.mouth_faps import mouth_faps
 from realizer.animation.lips.visemes import SHAPE, coarticulation, shape_table
@@ -42,7 +42,7 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
     if track is None:
         return ()
     times = key_times(phonemes, min(room, facts["pauses"]["attack"]))
-    taken = lips_taken(track, times)
+    taken = lip_weight(track, times)
     mouth = _mouth(track, times) * taken
     _constrain(mouth, track, times, taken, facts)
     mouth[:, [0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
@@ -69,7 +69,7 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
     """Closures, speeds and smoothness, in place."""
     shapes, _ = shape_table()
     column = {name: k for k, name in enumerate(SHAPE)}
-    closed, bitten = held(track, times)
+    closed, bitten = closure_mask(track, times)
     upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
     speed = facts["speed"]["lips"]
     # The upper lip clears the teeth for f v: raised where it is lower, then lowered wherever p b m close.
@@ -122,6 +122,6 @@ def _bell(half: int) -> Float64:
 
 
 def _channels(times: Float64, mouth: Float64, taken: Float64) -> tuple[Channel, ...]:
-    lips = Channel(presence("lips"), times, taken, "linear", Layer.SPEECH)
+    lips = Channel(mask_channel("lips"), times, taken, "linear", Layer.SPEECH)
     moved = mouth_faps(mouth.T).items()
     return (lips, *(Channel(fap(number), times, value, "linear", Layer.SPEECH) for number, value in moved))

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from realizer import tables
-from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight
 from realizer.animation.lips.dominance import dominances, key_times, track_of
 from realizer.animation.lips.visemes import VISEMES
 from realizer.core.array_types import Float64, Int32
@@ -55,11 +55,11 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
     classes = list(dominances(track, keys))
     for near, parts, _ in classes:
         shown += np.einsum("kn,knv->nv", parts, track.mix[near]) / len(classes)
-    for viseme, holds in zip((BILABIAL, LABIODENTAL), held(track, keys), strict=True):
+    for viseme, holds in zip((BILABIAL, LABIODENTAL), closure_mask(track, keys), strict=True):
         # Over a key on either side, as the lips themselves pass into a closure.
         share = np.convolve(np.pad(holds.astype(float), 1, "edge"), [0.25, 0.5, 0.25], "valid")[:, None]
         shown = shown * (1 - share) + share * np.eye(VISEMES)[viseme]
-    shown *= lips_taken(track, keys)[:, None]
+    shown *= lip_weight(track, keys)[:, None]
     for viseme in range(1, VISEMES):
         weights[:, viseme] = np.interp(times, keys, shown[:, viseme], left=0.0, right=0.0)
     weights[:, 0] = np.maximum(1 - weights[:, 1:].sum(axis=1), 0.0)

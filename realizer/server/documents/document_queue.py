@@ -20,7 +20,7 @@ from realizer.server.documents.pending_blocks import Preparation, Waiting
 from realizer.server.documents.tts_requests import Orders
 from realizer.server.session.effects import Effect
 from realizer.server.speech.speech_streams import Speeches
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 
 log = logging.getLogger(__name__)
 
@@ -219,7 +219,7 @@ class Intake:
         waiting.since, waiting.final = t, True
         self._speak(waiting, again)
 
-    def _speak(self, waiting: Waiting, wants: Mapping[str, Say]) -> None:
+    def _speak(self, waiting: Waiting, wants: Mapping[str, SpeechRequest]) -> None:
         """Order what a voice has to say."""
         voice = self.voices.get(waiting.character) or self._settings.voice
         chosen = {b: replace(say, voice=say.voice or voice) for b, say in wants.items()}

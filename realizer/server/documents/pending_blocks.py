@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from bml_schema import Block
 from realizer.playback.references import references
-from realizer.speech.duration_fit import near
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.duration_fit import allow_small_warp
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 @dataclass(eq=False)
@@ -27,7 +27,7 @@ class Waiting:
     block: Block
     character: int
     since: float
-    says: dict[int, tuple[str, Say]]
+    says: dict[int, tuple[str, SpeechRequest]]
     utterances: dict[str, Utterance] = field(default_factory=dict)
     after: set[Waiting] = field(default_factory=set)
     final: bool = False
@@ -49,7 +49,9 @@ class Preparation:
     def __len__(self) -> int:
         return len(self.waiting)
 
-    def add(self, block: Block, character: int, says: dict[int, tuple[str, Say]], now: float) -> Waiting:
+    def add(
+        self, block: Block, character: int, says: dict[int, tuple[str, SpeechRequest]], now: float
+    ) -> Waiting:
         """Let a block wait for its voice, and for the earlier blocks it depends on.
 
         It depends on blocks whose sync points it names, on those it is to follow, on one with its own id,
@@ -82,14 +84,14 @@ class Preparation:
         for waiting in self.waiting:
             if speak in waiting.says:
                 behaviour, _ = waiting.says.pop(speak)
-                waiting.utterances[behaviour] = near(utterance) if waiting.final else utterance
+                waiting.utterances[behaviour] = allow_small_warp(utterance) if waiting.final else utterance
 
     def unspoken(self, speak: int) -> None:
         """No voice can say it: the block goes on without, its speech is dropped when it is planned."""
         for waiting in self.waiting:
             waiting.says.pop(speak, None)
 
-    def said(self, speak: int) -> Say | None:
+    def said(self, speak: int) -> SpeechRequest | None:
         """What a speak id asked for; None where nobody waits for it."""
         return next((w.says[speak][1] for w in self.waiting if speak in w.says), None)
 

@@ -11,8 +11,8 @@ from realizer.scheduling.timing import Warning
 from realizer.server.documents.pending_blocks import Preparation, Waiting
 from realizer.server.session.effects import Speak
 from realizer.server.speech.long_text import Growing, shortened
-from realizer.speech.duration_fit import without_sound
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.duration_fit import silent_fallback
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 # A voice that has not answered by then is taken for silent.
 PATIENCE = 20.0  # s
@@ -32,7 +32,7 @@ class _Text:
     waiting: Waiting
     behaviour: str
     growing: Growing
-    part: Say
+    part: SpeechRequest
     given: Utterance | None = None
 
 
@@ -56,7 +56,7 @@ class Orders:
         """Long texts of which a part is being said."""
         return len(self._texts)
 
-    def place(self, waiting: Waiting, wants: Mapping[str, Say]) -> list[Speak]:
+    def place(self, waiting: Waiting, wants: Mapping[str, SpeechRequest]) -> list[Speak]:
         """Ask for what a block wants said, of a long text for its first clause.
 
         Args:
@@ -94,7 +94,7 @@ class Orders:
         if not isinstance(result, Utterance):
             self.fault = str(result)
             try:
-                result = without_sound(say, self.fault)
+                result = silent_fallback(say, self.fault)
             except VoiceError:
                 self._preparation.unspoken(speak)
                 return []
@@ -122,7 +122,7 @@ class Orders:
         """When `overdue` will have something."""
         return self._preparation.deadline(PATIENCE)
 
-    def _speak(self, say: Say) -> Speak:
+    def _speak(self, say: SpeechRequest) -> Speak:
         self.placed += 1
         return Speak(self.placed, say)
 

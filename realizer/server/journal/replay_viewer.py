@@ -51,7 +51,7 @@ class Viewer:
         ends = [playing.invisible_after for playing in self.blocks if playing.end < math.inf]
         for character in self._session.player.character_states:
             held = (*character.direct.values(), *character.emotion.values())
-            ends += [float(one.times[-1]) if one.gone == math.inf else one.gone for one in held]
+            ends += [float(one.times[-1]) if one.faded_at == math.inf else one.faded_at for one in held]
             ends += [shift.end for shift in character.shifts]
         return max(ends, default=0.0)
 
@@ -125,15 +125,15 @@ class _Seat:
     def frames(self) -> AUFrames:
         """All of them; the time of the first one is 0."""
         self._settle()
-        joined = AUFrames.joined(self._parts)
+        joined = AUFrames.concatenate(self._parts)
         times = np.arange(len(joined.times)) / self._fps
-        return AUFrames(times, joined.values, joined.rules, joined.held, joined.columns)
+        return AUFrames(times, joined.values, joined.rules, joined.overridden, joined.columns)
 
     def _settle(self) -> None:
         """Keep of a window what was looked at: a plan may change long before its end."""
         if self._window is not None:
             first, last = (frame - self._window.first for frame in (self._begin, self._next))
             part = self._window.aus.part(first, last)
-            held = None if part.held is None else part.held.copy()
+            held = None if part.overridden is None else part.overridden.copy()
             self._parts.append(AUFrames(part.times, part.values.copy(), part.rules, held, part.columns))
         self._window = None

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from realizer.animation.axis import axis
-from realizer.animation.channel import Channel, Gain, Joint, Layer
-from realizer.animation.idle.blinks import Fewer
+from realizer.animation.channel import Channel, Crossfade, Gain, Layer
+from realizer.animation.idle.blinks import BlinkReduction
 from realizer.playback.character import BaseShift, Character
 from realizer.scheduling.timing import Schedule
 
 # Python writes a float so that it is read again to the last bit.
-CHANNELS = {"channel": Channel, "fewer": Fewer}
+CHANNELS = {"channel": Channel, "fewer": BlinkReduction}
 
 
 def plain_character(character: Character) -> dict[str, Any]:
@@ -87,17 +87,17 @@ def _plain_channel(channel: Channel) -> dict[str, Any]:
         "values": channel.values.tolist(),
         "curve": channel.curve,
         "layer": channel.layer.name,
-        "holds": channel.holds,
+        "holds": channel.keeps_last,
         "source": channel.source,
     }
     if channel.gains:
         told["gains"] = [list(gain) for gain in channel.gains]
     if channel.until < float("inf"):
         told["until"] = channel.until
-    if channel.joint is not None:
-        told["joint"] = list(channel.joint)
-    if channel.there is not None:
-        told["there"] = channel.there.tolist()
+    if channel.crossfade is not None:
+        told["joint"] = list(channel.crossfade)
+    if channel.weight is not None:
+        told["there"] = channel.weight.tolist()
     return told
 
 
@@ -109,10 +109,10 @@ def _channel(told: Mapping[str, Any]) -> Channel:
         np.array(told["values"], np.float64),
         curve=told["curve"],
         layer=Layer[told["layer"]],
-        holds=told["holds"],
+        keeps_last=told["holds"],
         gains=tuple(Gain(*gain) for gain in told.get("gains", ())),
         until=told.get("until", float("inf")),
-        joint=None if told.get("joint") is None else Joint(*told["joint"]),
-        there=None if there is None else np.array(there, np.float64),
+        crossfade=None if told.get("joint") is None else Crossfade(*told["joint"]),
+        weight=None if there is None else np.array(there, np.float64),
         source=told["source"],
     )

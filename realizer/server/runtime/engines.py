@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
 from realizer.server.session.effects import Draw, Look, Speak
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Studio:
         """What a voice made of it; or why it could not, which is also said once on stderr."""
         try:
             # The name is the whole of what chooses the voice; an engine would take it for one of its own.
-            return fitted(self._voice(order.say.voice), replace(order.say, voice=None))
+            return speak_to_length(self._voice(order.say.voice), replace(order.say, voice=None))
         except VoiceError as error:
             self._tell(str(error))
             return error

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from realizer.core.array_types import Float32
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 
 
 class Send(NamedTuple):
@@ -21,7 +21,7 @@ class Speak:
     """Let a voice say it and answer `session.spoken(id, utterance or error, now)`."""
 
     id: int
-    say: Say
+    say: SpeechRequest
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from realizer.core.array_types import Int16
 from realizer.playback.audio_mix import resample
 from realizer.server.speech.sentence_splitter import TAG, Clauses, whole
 from realizer.speech.ssml import NAMED
-from realizer.speech.utterance import Phoneme, Say, Utterance, Word
+from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
 # Characters up to which a text is said in one: espeak needs 15 ms for so many.
 SHORT = 160
@@ -41,7 +41,7 @@ class Growing:
         made: seconds of sound that are there.
     """
 
-    def __init__(self, say: Say) -> None:
+    def __init__(self, say: SpeechRequest) -> None:
         self.made = 0.0
         self._say = say
         # Taken apart as it is said: that of a long text takes a while too.
@@ -58,11 +58,11 @@ class Growing:
         self._rate = 0
 
     @staticmethod
-    def suits(say: Say) -> bool:
+    def suits(say: SpeechRequest) -> bool:
         """Whether it is better said in parts."""
         return len(say.ssml) > SHORT and say.seconds is None and say.recording is None
 
-    def next(self) -> Say | None:
+    def next(self) -> SpeechRequest | None:
         """The next part, which is to be said now; None where there is no more."""
         if self._coming is None:
             return None
@@ -108,7 +108,7 @@ class Growing:
             pcm=self._room[: self._length] if self._rate else None,
             warnings=tuple(dict.fromkeys(text for _, one in self._joined for text in one.warnings)),
             stretch=part.stretch,
-            parts=tuple(self._joined),
+            sections=tuple(self._joined),
         )
 
     def _sound(self, part: Utterance, start: float) -> None:

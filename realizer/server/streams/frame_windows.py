@@ -64,7 +64,7 @@ SOURCES: Mapping[str, FrameSource] = {
     ),
     "au": FrameSource(
         lambda: list(AU_NAMES()),
-        lambda frames, mapping, asked: frames.asked if asked else frames.aus,
+        lambda frames, mapping, asked: frames.before_rules if asked else frames.aus,
     ),
     "arkit": FrameSource(lambda: [*ARKIT_NAMES(), *TURNS], _arkit_rows),
 }

@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Float32
 from realizer.speech.align import sphinx
-from realizer.speech.align.alignment import AlignError, Alignment, likely, moved
-from realizer.speech.align.dtw_align import by_sound
-from realizer.speech.align.model_align import by_model
+from realizer.speech.align.alignment import AlignError, Alignment, moved, probability
+from realizer.speech.align.dtw_align import dtw_align
+from realizer.speech.align.model_align import model_align
 from realizer.speech.align.recording import mono, to_aligner
-from realizer.speech.align.uniform_align import even
+from realizer.speech.align.uniform_align import uniform_align
 from realizer.speech.registry import reference_voice
-from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
@@ -57,11 +57,13 @@ def align(
         AlignError: the recording or the text cannot be used, or the aligner that was asked for cannot.
         VoiceError: the text is too long, or espeak-ng died.
     """
-    return aligned(mono(pcm, rate), int(rate), Say(escape(text), language=language), aligner, voice)[0]
+    return align_request(
+        mono(pcm, rate), int(rate), SpeechRequest(escape(text), language=language), aligner, voice
+    )[0]
 
 
-def aligned(
-    sound: Float32, rate: int, request: Say, aligner: Aligner | None, voice: Voice | None
+def align_request(
+    sound: Float32, rate: int, request: SpeechRequest, aligner: Aligner | None, voice: Voice | None
 ) -> tuple[Alignment, Utterance]:
     """The alignment of a recording, and what a voice made of the same request.
 
@@ -75,7 +77,7 @@ def aligned(
         AlignError, VoiceError: as `align`.
     """
     heard, duration = to_aligner(sound, rate), len(sound) / rate
-    fix = _unable(aligner, voice)
+    fix = _unusable_reason(aligner, voice)
     if fix:
         raise AlignError(fix)
     speaker = voice or reference_voice()
@@ -90,8 +92,10 @@ def aligned(
         )
     told = reference.warnings
     found = None
-    if aligner == "pocketsphinx" or (aligner is None and _english(request.language) and not sphinx.missing()):
-        found = by_model(heard, duration, reference)
+    if aligner == "pocketsphinx" or (
+        aligner is None and _english(request.language) and not sphinx.install_hint()
+    ):
+        found = model_align(heard, duration, reference)
         if found is None:
             words = "pocketsphinx does not find the text in the recording"
             if aligner is not None:
@@ -99,7 +103,7 @@ def aligned(
             log.info("%s: aligned by espeak-ng instead", words)
     if found is None:
         if reference.pcm is None:
-            found = even(heard, duration, reference)
+            found = uniform_align(heard, duration, reference)
         else:
             others = [speaker.say(replace(plain, voice=OTHER))] if voice is None else []
             found = _by_sound(heard, duration, [reference, *others])
@@ -108,15 +112,15 @@ def aligned(
     return replace(found, warnings=(*told, *found.warnings)), reference
 
 
-def _unable(aligner: str | None, voice: Voice | None) -> str | None:
+def _unusable_reason(aligner: str | None, voice: Voice | None) -> str | None:
     """Why the aligner that was asked for cannot be used."""
     from realizer.speech.espeak import voice as espeak
 
     if aligner not in (None, "pocketsphinx", "espeak"):
         return f"aligner: wanted pocketsphinx or espeak, got {aligner!r}"
     if aligner == "pocketsphinx":
-        return sphinx.missing()
-    return espeak.missing() if aligner == "espeak" and voice is None else None
+        return sphinx.install_hint()
+    return espeak.install_hint() if aligner == "espeak" and voice is None else None
 
 
 def _english(language: str) -> bool:
@@ -128,8 +132,8 @@ HOP = 160  # samples
 
 def _by_sound(sound: Float32, duration: float, references: list[Utterance]) -> Alignment:
     """By voices that say the same."""
-    spans = by_sound(sound, references)
-    each = [likely(cost, COST_OF_WORD) for cost in spans.costs]
+    spans = dtw_align(sound, references)
+    each = [probability(cost, COST_OF_WORD) for cost in spans.costs]
     return moved(
-        "espeak", spans.reference, duration, spans.words, spans.phonemes, each, likely(spans.cost, COST)
+        "espeak", spans.reference, duration, spans.words, spans.phonemes, each, probability(spans.cost, COST)
     )

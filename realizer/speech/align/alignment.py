@@ -11,7 +11,7 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
 from realizer.speech.utterance import Phoneme, Utterance, Word
 
-LEAST_PAUSE = 0.02  # s; shorter ones are of the sound before
+MIN_PAUSE = 0.02  # s; shorter ones are of the sound before
 
 
 class AlignError(RealizerError):
@@ -43,7 +43,7 @@ class Alignment:
     warnings: tuple[str, ...] = ()
 
 
-def laid_out(
+def build(
     aligner: str,
     reference: Utterance,
     duration: float,
@@ -74,11 +74,11 @@ def laid_out(
         start = min(max(phoneme.start, now), duration)
         end = min(max(phoneme.end, start), duration)
         following = sounds[0][k + 1].start if k + 1 < len(sounds[0]) else duration
-        if start - now >= LEAST_PAUSE or (not tiled and start > 0):
+        if start - now >= MIN_PAUSE or (not tiled and start > 0):
             tiled.append((Phoneme(now, start, ""), 1.0))
         elif tiled:
             start = now
-        if 0 < following - end < LEAST_PAUSE:
+        if 0 < following - end < MIN_PAUSE:
             end = min(following, duration)
         if end > start:
             tiled.append((replace(phoneme, start=start, end=end), each[owner]))
@@ -112,10 +112,10 @@ def moved(
         if phoneme.ipa:
             phonemes.append(replace(phoneme, start=float(start), end=float(end)))
             owners.append(max(0, int(np.searchsorted(starts, phoneme.start + 1e-6, side="right")) - 1))
-    return laid_out(aligner, reference, duration, words, (phonemes, owners), each, confidence)
+    return build(aligner, reference, duration, words, (phonemes, owners), each, confidence)
 
 
-def likely(value: float, where: tuple[float, float]) -> float:
+def probability(value: float, where: tuple[float, float]) -> float:
     """0..1 by a logistic curve: 1/2 at the first of `where`, falling or rising as fast as the second says."""
     middle, width = where
     return 1.0 / (1.0 + math.exp(min(50.0, max(-50.0, -(value - middle) / width))))

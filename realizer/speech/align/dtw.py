@@ -38,7 +38,7 @@ class States:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class Observed:
     """What is heard.
 
     Attributes:
@@ -52,7 +52,7 @@ class Heard:
     usual: float
 
 
-def unlike(features: Float64, others: Float64) -> Float64:
+def distance(features: Float64, others: Float64) -> Float64:
     """(t, j) root mean square differences of (t, d) and (j, d) features."""
     squares = (features**2).sum(axis=1)[:, None] + (others**2).sum(axis=1)
     distance: Float64 = np.sqrt(
@@ -62,9 +62,9 @@ def unlike(features: Float64, others: Float64) -> Float64:
 
 
 def usual(features: Float64, others: Float64) -> float:
-    """The median of `unlike`, of evenly chosen rows."""
+    """The median of `distance`, of evenly chosen rows."""
     some = (rows[:: max(1, len(rows) // SAMPLED)] for rows in (features, others))
-    return max(float(np.median(unlike(*some))), 1e-6)
+    return max(float(np.median(distance(*some))), 1e-6)
 
 
 def quiet(part: Float64, threshold: float) -> Float64:
@@ -73,8 +73,8 @@ def quiet(part: Float64, threshold: float) -> Float64:
     return cost
 
 
-def matched(
-    heard: Heard, states: States, centre: Index | None = None, reach: int = 0
+def best_path(
+    heard: Observed, states: States, centre: Index | None = None, reach: int = 0
 ) -> tuple[Index, Float64]:
     """The cheapest way: (t,) the state of each frame, and (t,) what each costs.
 
@@ -131,11 +131,11 @@ def _penalties(pause: Bool) -> Float64:
     return np.stack([stay, enter, enter + two, enter + three])
 
 
-def _costs(heard: Heard, states: States, lows: Index, width: int) -> Iterator[Float64]:
+def _costs(heard: Observed, states: States, lows: Index, width: int) -> Iterator[Float64]:
     """(width,) for each frame."""
     for k in range(0, len(lows), AT_ONCE):
         band = slice(int(lows[k]), int(lows[k : k + AT_ONCE][-1]) + width)
-        rows = unlike(heard.features[k : k + AT_ONCE], states.features[band]) / heard.usual
+        rows = distance(heard.features[k : k + AT_ONCE], states.features[band]) / heard.usual
         rows[:, states.pause[band]] = heard.quiet[k : k + AT_ONCE, None]
         for row, low in zip(rows, lows[k : k + AT_ONCE] - lows[k], strict=True):
             yield row[low : low + width]

@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.speech.align import features as f
-from realizer.speech.align.dtw import Heard, Index, States, matched, quiet, usual
+from realizer.speech.align.dtw import Index, Observed, States, best_path, quiet, usual
 from realizer.speech.utterance import Utterance
 
 COARSE, FINE = 320, 80  # samples between frames: 20 and 5 ms
@@ -50,7 +50,7 @@ class _Match:
     speed: float
     pace: float
     states: States
-    heard: Heard
+    heard: Observed
     way: Index
     spent: Float64
     null: float
@@ -61,7 +61,7 @@ class _Match:
         return float(self.spent[said].mean()) / self.null if said.any() else 1.0
 
 
-def by_sound(sound: Float32, references: Sequence[Utterance]) -> Spans:
+def dtw_align(sound: Float32, references: Sequence[Utterance]) -> Spans:
     """Warp a voice that says the same text to the recording; no model, any language that the voice speaks.
 
     Args:
@@ -75,7 +75,7 @@ def by_sound(sound: Float32, references: Sequence[Utterance]) -> Spans:
 
     # The same with the voice made to sound like the recording, closer, and only near the way found.
     energy = f.energies(sound, FINE)
-    part, talks = f.sounding(f.loudness(energy))
+    part, talks = f.voice_activity(f.loudness(energy))
     fine = _states(best.spoken, FINE * best.speed, reference)
     change = _likened(best.heard.features, states, way)
     likened = States(
@@ -85,7 +85,7 @@ def by_sound(sound: Float32, references: Sequence[Utterance]) -> Spans:
     about = np.minimum(np.arange(len(energy)) * FINE // COARSE, len(way) - 1)
     centre = np.maximum.accumulate(np.searchsorted(fine.times, states.times[way[about]]).astype(np.intp))
     centre[-1] = len(fine.times) - 1
-    closely, _ = matched(heard, likened, centre, round(NEAR * f.RATE / FINE))
+    closely, _ = best_path(heard, likened, centre, round(NEAR * f.RATE / FINE))
 
     def spans(pairs: Sequence[tuple[float, float]]) -> Float64:
         return _spans(np.array(pairs).reshape(-1, 2), fine, closely) * FINE / f.RATE
@@ -106,14 +106,14 @@ def _matched(sound: Float32, reference: Utterance) -> _Match:
     spoken = f.resampled((reference.pcm / 32768).astype(np.float32), reference.sample_rate)
     seconds = sum(p.end - p.start for p in reference.phonemes if p.ipa)
     energy = f.energies(sound, COARSE)
-    part, talks = f.sounding(f.loudness(energy))
+    part, talks = f.voice_activity(f.loudness(energy))
     pace = max(seconds, LEAST) / max(float(talks.sum()) * COARSE / f.RATE, LEAST)
     speed = min(max(pace, SLOWEST), FASTEST)
     states = _states(spoken, COARSE * speed, reference)
     heard = _heard(f.cepstra(energy), part, talks, states)
     centre = np.rint(np.linspace(0, len(states.times) - 1, len(energy))).astype(np.intp)
     reach = max(round(FAR * f.RATE / COARSE), 1)
-    way, spent = matched(heard, states, centre, reach)
+    way, spent = best_path(heard, states, centre, reach)
     null = _null(heard, states, centre, reach)
     return _Match(reference, spoken, speed, pace, states, heard, way, spent, null)
 
@@ -140,10 +140,10 @@ def _states(spoken: Float32, hop: float, reference: Utterance) -> States:
     )
 
 
-def _heard(values: Float64, part: Float64, talks: Bool, states: States) -> Heard:
+def _heard(values: Float64, part: Float64, talks: Bool, states: States) -> Observed:
     values = f.normalised(values, talks)
     unit = usual(values[talks] if talks.any() else values, states.features[~states.pause])
-    return Heard(values, quiet(part, f.HEARD), unit)
+    return Observed(values, quiet(part, f.HEARD), unit)
 
 
 def _likened(values: Float64, states: States, way: Index) -> Float64:
@@ -155,14 +155,14 @@ def _likened(values: Float64, states: States, way: Index) -> Float64:
     return np.asarray(change, np.float64)
 
 
-def _null(heard: Heard, states: States, centre: Index, reach: int) -> float:
+def _null(heard: Observed, states: States, centre: Index, reach: int) -> float:
     """What a wrong text would cost, of the same sounds: the least of their costs in other orders."""
     places = np.arange(len(states.times))
     found = [1.0]
     for order in (places[::-1], *(np.roll(places, len(places) * part // 3) for part in (1, 2))):
         pause = states.pause[order]
         pause[[0, -1]] = True
-        way, spent = matched(heard, States(states.features[order], pause, states.times), centre, reach)
+        way, spent = best_path(heard, States(states.features[order], pause, states.times), centre, reach)
         said = ~pause[way]
         if said.any():
             found.append(float(spent[said].mean()))

@@ -20,7 +20,7 @@ SLOPE = 2  # frames to each side, for how the cepstra change
 AT_ONCE = 4000  # frames; a spectrum of more would only take memory
 # Silence is near the quietest frames, speech near the loudest: percentiles, and parts of the range between.
 QUIET, LOUD, HEARD = 5, 95, 0.1
-LEAST_RANGE, MOST_RANGE = 1.0, 5.0  # powers of ten; steady noise has no range, digital silence too much
+MIN_RANGE, MAX_RANGE = 1.0, 5.0  # powers of ten; steady noise has no range, digital silence too much
 
 
 def resampled(pcm: Float32, rate: int) -> Float32:
@@ -69,11 +69,11 @@ def loudness(energy: Float64) -> Float64:
     return total
 
 
-def sounding(loud: Float64) -> tuple[Float64, Bool]:
+def voice_activity(loud: Float64) -> tuple[Float64, Bool]:
     """(n,) how loud each frame is between silence (0) and speech (1), and which are more than silence."""
     low, high = np.percentile(loud, (QUIET, LOUD))
-    low = max(low, high - MOST_RANGE)
-    part = (loud - low) / max(high - low, LEAST_RANGE)
+    low = max(low, high - MAX_RANGE)
+    part = (loud - low) / max(high - low, MIN_RANGE)
     return part, part > HEARD
 
 

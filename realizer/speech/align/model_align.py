@@ -6,18 +6,18 @@ import numpy as np
 
 from realizer.core.array_types import Float32
 from realizer.speech.align import sphinx
-from realizer.speech.align.alignment import Alignment, laid_out, likely
+from realizer.speech.align.alignment import Alignment, build, probability
 from realizer.speech.align.arpabet import to_arpabet, to_ipa
 from realizer.speech.utterance import Phoneme, Utterance
 
-# The score (`Said`) of a probability of 1/2, and how fast it falls: between right texts and wrong ones, as
-# measured on human and espeak-ng's speech.
+# The score (`AlignedWord`) of a probability of 1/2, and how fast it falls: between right texts and wrong
+# ones, as measured on human and espeak-ng's speech.
 SCORE, SCORE_OF_WORD = (-35.0, 4.0), (-45.0, 8.0)
 UNSTRESSED = {"ʌ": "ə", "ɝ": "ɚ"}
 VOWELS = set("aeiouæɑɔəɚɛɝɪʊʌ")
 
 
-def by_model(sound: Float32, duration: float, reference: Utterance) -> Alignment | None:
+def model_align(sound: Float32, duration: float, reference: Utterance) -> Alignment | None:
     """The words as the acoustic model hears them; None where it finds them not.
 
     Words that its dictionary does not have are said as the reference says them.
@@ -35,7 +35,7 @@ def by_model(sound: Float32, duration: float, reference: Utterance) -> Alignment
         (word.text, to_arpabet(p.ipa for p in mine))
         for word, mine in zip(reference.words, of_words, strict=True)
     ]
-    said = sphinx.by_model(sound, asked)
+    said = sphinx.align_words(sound, asked)
     if said is None:
         return None
     spans, phonemes, owners, latest = [], [], [], 0.0
@@ -54,12 +54,12 @@ def by_model(sound: Float32, duration: float, reference: Utterance) -> Alignment
     found = [word for word in said if word is not None]
     lengths = np.array([word.phones[-1][1] - word.phones[0][0] for word in found])
     score = float(np.average([word.score for word in found], weights=lengths))
-    return laid_out(
+    return build(
         "pocketsphinx",
         reference,
         duration,
         np.array(spans),
         (phonemes, owners),
-        [0.0 if word is None else likely(word.score, SCORE_OF_WORD) for word in said],
-        likely(score, SCORE),
+        [0.0 if word is None else probability(word.score, SCORE_OF_WORD) for word in said],
+        probability(score, SCORE),
     )

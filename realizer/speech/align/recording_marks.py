@@ -8,14 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.core.errors import RealizerError
-from realizer.speech.align.aligner import Aligner, aligned
+from realizer.speech.align.aligner import Aligner, align_request
 from realizer.speech.align.recording import mono
-from realizer.speech.utterance import Recording, Say, Utterance
+from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 
 KEPT = 8  # recordings; a document is looked at more than once before it plays
 
 
-def recorded(pcm: npt.ArrayLike, rate: float, request: Say, *, aligner: Aligner | None = None) -> Utterance:
+def utterance_of_recording(
+    pcm: npt.ArrayLike, rate: float, request: SpeechRequest, *, aligner: Aligner | None = None
+) -> Utterance:
     """A recording of what is asked for as an utterance: its words, phonemes and marks where they are heard.
 
     Args:
@@ -28,7 +30,7 @@ def recorded(pcm: npt.ArrayLike, rate: float, request: Say, *, aligner: Aligner 
         AlignError, VoiceError: as `align`.
     """
     sound = mono(pcm, rate)
-    found, reference = aligned(sound, int(rate), request, aligner, None)
+    found, reference = align_request(sound, int(rate), request, aligner, None)
     knots = [(time, at) for a, b in zip(reference.words, found.words, strict=True) for time, at in
              ((a.start, b.start), (a.end, b.end))]  # fmt: skip
     was, now = np.maximum.accumulate(np.array([(0.0, 0.0), *knots]), axis=0).T
@@ -47,10 +49,10 @@ def recorded(pcm: npt.ArrayLike, rate: float, request: Say, *, aligner: Aligner 
 
 
 @lru_cache(KEPT)
-def align_recording(request: Say, recording: Recording) -> Utterance:
-    """As `recorded`; it sounds also where it cannot be aligned, with a warning."""
+def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
+    """As `utterance_of_recording`; it sounds also where it cannot be aligned, with a warning."""
     try:
-        return recorded(recording.pcm, recording.rate, request)
+        return utterance_of_recording(recording.pcm, recording.rate, request)
     except RealizerError as error:
         told = f"the lips do not move with the recording: {error}"
         duration = len(recording.pcm) / recording.rate

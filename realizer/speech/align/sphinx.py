@@ -20,7 +20,7 @@ _lock = threading.Lock()  # a decoder is for one thread at a time
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class AlignedWord:
     """A word: its phones as (start, end, ARPABET), in seconds, and how well the model knows them.
 
     Attributes:
@@ -32,12 +32,14 @@ class Said:
     score: float
 
 
-def missing() -> str | None:
+def install_hint() -> str | None:
     """None where pocketsphinx is installed; otherwise the sentence that says what to install."""
     return None if importlib.util.find_spec("pocketsphinx") else INSTALL
 
 
-def by_model(sound: Float32, words: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[Said | None, ...] | None:
+def align_words(
+    sound: Float32, words: Sequence[tuple[str, tuple[str, ...]]]
+) -> tuple[AlignedWord | None, ...] | None:
     """What was found for each word; None where the sound cannot be the words, or the model does not know how.
 
     Args:
@@ -58,7 +60,7 @@ def by_model(sound: Float32, words: Sequence[tuple[str, tuple[str, ...]]]) -> tu
                 return None
             decoder.set_alignment()
             _hear(decoder, pcm)
-            found = [_said(word) for word in decoder.get_alignment() if word.name[0] not in "<[("]
+            found = [_aligned_word(word) for word in decoder.get_alignment() if word.name[0] not in "<[("]
         except RuntimeError:
             # A pass that failed leaves the decoder in the middle of it.
             _decoder.cache_clear()
@@ -96,10 +98,10 @@ def _hear(decoder: Any, pcm: bytes) -> None:
     decoder.end_utt()
 
 
-def _said(word: Any) -> Said:
+def _aligned_word(word: Any) -> AlignedWord:
     phones = tuple((p.start * FRAME, (p.start + p.duration) * FRAME, p.name, p.score) for p in word)
     frames = sum(end - start for start, end, _, _ in phones) / FRAME
-    return Said(
+    return AlignedWord(
         tuple((start, end, name) for start, end, name, _ in phones),
         sum(score for *_, score in phones) / max(frames, 1.0),
     )

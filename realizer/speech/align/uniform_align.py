@@ -15,10 +15,10 @@ HOP = 160  # samples
 INSTALL = "no aligner, words are spread evenly: pip install 'bml-realizer[speech,align]'"
 
 
-def even(sound: Float32, duration: float, reference: Utterance) -> Alignment:
+def uniform_align(sound: Float32, duration: float, reference: Utterance) -> Alignment:
     """What is left where no aligner is installed; the confidence is 0."""
     loud = features.loudness(features.energies(sound, HOP))
-    _, talks = features.sounding(loud)
+    _, talks = features.voice_activity(loud)
     passed = np.append(0.0, np.cumsum(talks)) / max(int(talks.sum()), 1)
     passed += np.arange(len(passed)) * 1e-12  # rising, so that it can be turned round
     times = np.minimum(np.arange(len(passed)) * HOP / features.RATE, duration)

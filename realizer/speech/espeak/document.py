@@ -15,7 +15,7 @@ from realizer.speech.words import PlacedMark, words_in
 
 # Of its pitch, from 50 % to 200 % of the setting: octaves for each doubling, as heard in its sound.
 OCTAVES = 0.72
-MOST_PITCH = 198.0  # %; its setting ends there
+MAX_PITCH = 198.0  # %; its setting ends there
 STOPS = re.compile(r"\.+(?!\w)")
 
 
@@ -84,5 +84,5 @@ def _in_its_units(tag: Tag) -> Tag:
     if "volume" in given:
         given["volume"] = f"{100 * manner.volume:.1f}%"
     if manner.pitch != PLAIN.pitch:  # of Hz it alone knows what they are
-        given["pitch"] = f"{min(MOST_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
+        given["pitch"] = f"{min(MAX_PITCH, max(0.0, 100 + 100 * np.log2(manner.pitch) / OCTAVES)):.1f}%"
     return Tag(tag.name, tuple(given.items()))

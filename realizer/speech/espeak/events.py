@@ -10,11 +10,11 @@ from realizer.core.array_types import Int16
 from realizer.speech.espeak.document import Document
 from realizer.speech.espeak.protocol import END, MARK, PHONEME, WORD, Event
 from realizer.speech.utterance import Phoneme, Word
-from realizer.speech.word_boundaries import bare, cuts, is_vowel
+from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
 
 STRESS = {"ˈ": 1, "ˌ": 2}
 SILENCE = 8  # of 32768; a closure is exact zeros but for the tail of the sound before
-LEAST_CLOSURE = 0.01  # s
+MIN_CLOSURE = 0.01  # s
 KEPT_OF_VOWEL = 0.4  # of a sound that a closure is cut from
 
 Spoken = Callable[[Sequence[str]], Sequence[Sequence[str]]]
@@ -28,7 +28,7 @@ class Timeline:
 
 
 @dataclass(slots=True)
-class Group:
+class WordGroup:
     """A run of phonemes that begins where one of our words surely begins, and the words in it."""
 
     sample: int
@@ -104,17 +104,17 @@ def _words(
     if not document.words:
         return []
     starts = {place: index for index, (_, place) in enumerate(document.words)}
-    groups: list[Group] = []
+    groups: list[WordGroup] = []
     last = -1
     for sample, place, first in events:
         # After some punctuation the place is that of the blank before the word.
         index = starts.get(place, starts.get(place + 1, -1))
         if index > last:
-            groups.append(Group(sample, first))
+            groups.append(WordGroup(sample, first))
             groups[-1].words.append(index)
             last = index
     if not groups:
-        groups = [Group(begins[0] if begins else 0, 0)]
+        groups = [WordGroup(begins[0] if begins else 0, 0)]
     if not groups[0].words or groups[0].words[0] != 0:  # words before the first that was reported
         groups[0].words = [0]
         groups[0].first = 0
@@ -132,7 +132,7 @@ def _words(
         places = [0]
         if len(group.words) > 1:
             hints = {n for n, i in enumerate(own) if i in inner}
-            places = cuts([alone[w] for w in group.words], [sounds[i] for i in own], hints)
+            places = boundaries([alone[w] for w in group.words], [sounds[i] for i in own], hints)
         places.append(len(own))
         for n in range(len(group.words)):
             mine = own[places[n] : places[n + 1]]
@@ -189,7 +189,7 @@ def _with_closures(begins: Sequence[int], sounds: Sequence[str], pcm: Int16, rat
         backwards = loud[before:here][::-1]
         still = int(backwards.argmax())  # 0 also where nothing is loud
         quiet = here - still if still else before
-        if here - quiet >= LEAST_CLOSURE * rate:
+        if here - quiet >= MIN_CLOSURE * rate:
             begins[k] = max(quiet, before + round(KEPT_OF_VOWEL * (here - before)))
     return begins
 
@@ -221,4 +221,4 @@ def _plain(sound: str) -> tuple[str, int]:
 
 @lru_cache(maxsize=2048)
 def _is_vowel(sound: str) -> bool:
-    return is_vowel(bare(sound))
+    return is_vowel(strip_marks(sound))

@@ -15,15 +15,15 @@ from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import timeline
 from realizer.speech.espeak.protocol import read_answer
 from realizer.speech.ssml import Script
-from realizer.speech.utterance import STRETCH, Say, Utterance
+from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance
 
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
 SLOWEST, FASTEST = 80, 450  # words a minute; what it accepts
-KEPT_WORDS = 4096
+MAX_CACHED_WORDS = 4096
 INSTALL = "espeak-ng is not installed: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
 
 
-def missing() -> str | None:
+def install_hint() -> str | None:
     """None where espeak-ng is installed; otherwise the sentence that says what to install."""
     if importlib.util.find_spec("espeakng_loader") is not None:
         return None
@@ -32,7 +32,7 @@ def missing() -> str | None:
     return None if ctypes.util.find_library("espeak-ng") else INSTALL
 
 
-ENGINE = Engine("espeak-ng", Path(__file__).with_name("worker.py"), missing)
+ENGINE = Engine("espeak-ng", Path(__file__).with_name("worker.py"), install_hint)
 
 
 class EspeakVoice(EngineVoice):
@@ -58,9 +58,9 @@ class EspeakVoice(EngineVoice):
 
     @classmethod
     def missing(cls, voice: str | None = None) -> str | None:
-        return missing()
+        return install_hint()
 
-    def _synthesize(self, request: Say, script: Script) -> Utterance:
+    def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
         hello = self._process.hello()
         voice, warnings = choose_voice(hello, request.voice or self._voice, request.language)
         wpm = round(min(FASTEST, max(SLOWEST, WORDS_A_MINUTE * request.rate)))
@@ -68,7 +68,7 @@ class EspeakVoice(EngineVoice):
         head, body = self._process.ask({"op": "say", "text": document.text, "voice": voice, "wpm": wpm})
         rate: int = hello["rate"]
         events, pcm = read_answer(head, body)
-        times = timeline(document, events, pcm, rate, lambda words: self._spoken_alone(voice, words))
+        times = timeline(document, events, pcm, rate, lambda words: self._word_phonemes(voice, words))
         if not any(phoneme.ipa for phoneme in times.phonemes) and not script.is_silent:
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
         return Utterance(
@@ -82,7 +82,7 @@ class EspeakVoice(EngineVoice):
             warnings=(*script.warnings, *warnings),
         )
 
-    def _spoken_alone(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
+    def _word_phonemes(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
         """The phonemes of each word by itself."""
         with self._lock:
             known = dict(self._alone)
@@ -92,7 +92,7 @@ class EspeakVoice(EngineVoice):
             for word, ipa in zip(unknown, head["phonemes"], strict=True):
                 known[voice, word] = tuple(ipa)
             with self._lock:
-                self._alone = known if len(known) <= KEPT_WORDS else {}
+                self._alone = known if len(known) <= MAX_CACHED_WORDS else {}
         return [known[voice, word] for word in words]
 
 

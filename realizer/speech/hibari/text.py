@@ -10,7 +10,7 @@ from realizer.speech.words import PlacedMark, words_in
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class ProsodyRun:
     """Text spoken in one manner.
 
     Attributes:
@@ -26,12 +26,12 @@ class Run:
     pause: float = 0.0
 
 
-def runs(script: Script) -> tuple[tuple[Run, ...], tuple[PlacedMark, ...]]:
+def runs(script: Script) -> tuple[tuple[ProsodyRun, ...], tuple[PlacedMark, ...]]:
     """Runs end at a <break> and where <prosody> begins or ends; <sub> is read by its alias.
 
     hibari has no other elements of SSML: their text is spoken.
     """
-    found: list[Run] = []
+    found: list[ProsodyRun] = []
     marks: list[PlacedMark] = []
     manners = [PLAIN]  # of the open tags, outermost first
     hidden = 0  # depth inside <sub>
@@ -42,7 +42,7 @@ def runs(script: Script) -> tuple[tuple[Run, ...], tuple[PlacedMark, ...]]:
         nonlocal text, pause, count
         if text.strip() or pause:
             words = tuple(word for word, _ in words_in(text))
-            found.append(Run(text, words, manners[-1], pause))
+            found.append(ProsodyRun(text, words, manners[-1], pause))
             count += len(words)
             text, pause = "", 0.0
 

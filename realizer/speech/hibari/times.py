@@ -11,7 +11,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Int16
-from realizer.speech.word_boundaries import bare, cuts, is_vowel
+from realizer.speech.word_boundaries import boundaries, is_vowel, strip_marks
 from realizer.speech.words import words_in
 
 Role = Literal["sound", "primary", "secondary", "long", "pause", "joint"]
@@ -65,7 +65,7 @@ def _role(sign: str) -> tuple[str, Role]:
     return (row.ipa, row.role) if row else (sign, "sound")
 
 
-def written(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
+def signs_of(sentence: Sequence[Token]) -> tuple[str, tuple[int, ...]]:
     """The signs that hibari is given, and for each the index of its token."""
     signs, owners = "", []
     for k, (_, phonemes, blank) in enumerate(sentence):
@@ -80,7 +80,7 @@ def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
 
     A stress counts to its vowel, and what hibari gives to a blank to the phoneme before.
     """
-    signs, owners = written(sentence)
+    signs, owners = signs_of(sentence)
     found = [Sound("", 0, 0, lengths.lead, 0)]
     at = lengths.lead
     opened: tuple[int, int] | None = None  # stress, and where it began
@@ -109,7 +109,7 @@ def sounds(sentence: Sequence[Token], lengths: Lengths) -> list[Sound]:
     return [sound for sound in found if sound.end > sound.start]
 
 
-def ending_in_silence(told: Sequence[Sound], pcm: Int16) -> list[Sound]:
+def trim_to_sound(told: Sequence[Sound], pcm: Int16) -> list[Sound]:
     """The same with pauses that begin where it falls silent: the last sound of a phrase is told too long."""
     found = list(told)
     for k in range(1, len(found)):
@@ -125,14 +125,14 @@ def ending_in_silence(told: Sequence[Sound], pcm: Int16) -> list[Sound]:
     return found
 
 
-def guessed(sentence: Sequence[Token], pcm: Int16) -> Lengths:
+def guess_lengths(sentence: Sequence[Token], pcm: Int16) -> Lengths:
     """Lengths by rule, where the model does not tell them: shares of the part of the sound that is heard."""
     loud = np.flatnonzero(
         np.abs(pcm.astype(np.int32)) > QUIET * max(1, int(np.abs(pcm.astype(np.int32)).max()))
     )
     first, last = (int(loud[0]), int(loud[-1]) + 1) if len(loud) else (0, len(pcm))
     shares = []
-    for sign in written(sentence)[0]:
+    for sign in signs_of(sentence)[0]:
         ipa, role = _role(sign)
         kind = role if role != "sound" else "vowel" if is_vowel(ipa) else "consonant"
         shares.append(SHARES.get(kind, 0.0))
@@ -143,7 +143,7 @@ def guessed(sentence: Sequence[Token], pcm: Int16) -> Lengths:
     return Lengths(first, tuple(np.diff(borders).tolist()), len(pcm) - int(borders[-1]))
 
 
-def places(
+def word_spans(
     words: Sequence[str],
     tokens: Sequence[Token],
     heard: Sequence[Sound],
@@ -187,7 +187,7 @@ def places(
         own = [i for i in range(begins[opens], until) if heard[i].ipa]
         at = [0]
         if len(inside) > 1:
-            at = cuts(alone([words[i] for i in inside]), [bare(heard[i].ipa) for i in own])
+            at = boundaries(alone([words[i] for i in inside]), [strip_marks(heard[i].ipa) for i in own])
         at.append(len(own))
         for n in range(len(inside)):
             part = own[at[n] : at[n + 1]]

@@ -16,33 +16,33 @@ from realizer import tables
 from realizer.core.array_types import Int16
 from realizer.speech.engine_process import Engine
 from realizer.speech.engine_voice import EngineVoice
-from realizer.speech.hibari.text import Run, runs
+from realizer.speech.hibari.text import ProsodyRun, runs
 from realizer.speech.hibari.times import (
     Lengths,
     Sound,
     Token,
-    ending_in_silence,
-    guessed,
-    places,
+    guess_lengths,
+    signs_of,
     sounds,
-    written,
+    trim_to_sound,
+    word_spans,
 )
 from realizer.speech.letter_to_sound import syllable_facts
-from realizer.speech.speech_buffer import Track, cut
+from realizer.speech.speech_buffer import SpeechBuffer, cut
 from realizer.speech.ssml import Script
-from realizer.speech.utterance import STRETCH, Say, Utterance, Word
+from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word
 
 INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
 SHOWN = 3  # words that a warning names
 
 
-def missing() -> str | None:
+def install_hint() -> str | None:
     """None where hibari is installed; otherwise the sentence that says what to install."""
     there = all(importlib.util.find_spec(name) for name in ("hibari", "onnxruntime"))
     return None if there else INSTALL
 
 
-def missing_voice(name: str) -> str | None:
+def voice_hint(name: str) -> str | None:
     """None where that voice of hibari is on this machine; otherwise the sentence that says what to do."""
     from hibari.voices import VOICES, voice_path
 
@@ -55,7 +55,7 @@ def missing_voice(name: str) -> str | None:
     return None
 
 
-ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), missing)
+ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), install_hint)
 
 
 @cache
@@ -87,18 +87,18 @@ class HibariVoice(EngineVoice):
 
     @classmethod
     def missing(cls, voice: str | None = None) -> str | None:
-        return missing() or (missing_voice(voice) if voice else None)
+        return install_hint() or (voice_hint(voice) if voice else None)
 
     @classmethod
     def languages(cls) -> tuple[str, ...]:
         return "en-US", "en-GB"
 
-    def _synthesize(self, request: Say, script: Script) -> Utterance:
+    def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
         hello = self._process.hello()
         rate: int = hello["rate"]
         parts, placed = runs(script)
         head, _ = self._process.ask({"op": "read", "texts": [run.text for run in parts]})
-        track = Track()
+        track = SpeechBuffer()
         for k, (run, reading) in enumerate(zip(parts, head["texts"], strict=True)):
             goes_on = k + 1 < len(parts) and not parts[k + 1].pause
             self._speak(
@@ -118,8 +118,8 @@ class HibariVoice(EngineVoice):
 
     def _speak(
         self,
-        track: Track,
-        run: Run,
+        track: SpeechBuffer,
+        run: ProsodyRun,
         reading: Sequence[Sequence[Token]],
         pace: float,
         rate: int,
@@ -158,7 +158,7 @@ class HibariVoice(EngineVoice):
             tokens += sentence
         end = track.words[-1][1] if track.words else track.length
         for word, (begin, until) in zip(
-            run.words, places(run.words, tokens, heard, self._alone), strict=True
+            run.words, word_spans(run.words, tokens, heard, self._word_phonemes), strict=True
         ):
             start = heard[begin].start if until > begin else end
             end = heard[until - 1].end if until > begin else end
@@ -166,17 +166,17 @@ class HibariVoice(EngineVoice):
         track.phonemes += heard
 
     def _sentence(
-        self, sentence: Sequence[Token], run: Run, pace: float, rate: int
+        self, sentence: Sequence[Token], run: ProsodyRun, pace: float, rate: int
     ) -> tuple[Int16, list[Sound]]:
         """Sound, and its phonemes when they are heard; they tile it."""
         facts = _facts()
         speed = min(facts["fastest"], max(facts["slowest"], pace * run.prosody.rate))
-        asked = {"op": "say", "phonemes": written(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
+        asked = {"op": "say", "phonemes": signs_of(sentence)[0], "speed": speed, "pitch": run.prosody.pitch}
         head, body = self._process.ask(asked)
         volume = 32767 * run.prosody.volume
         pcm = np.rint(np.clip(np.frombuffer(body, "<f4") * volume, -32768, 32767)).astype(np.int16)
         if head["signs"] is None:
-            return pcm, sounds(sentence, guessed(sentence, pcm))
+            return pcm, sounds(sentence, guess_lengths(sentence, pcm))
         told = sounds(sentence, Lengths(head["lead"], tuple(head["signs"]), head["tail"]))
         shift = round(facts["offset"] * rate)
         borders = [0, *(min(max(0, sound.end + shift), len(pcm)) for sound in told[:-1]), len(pcm)]
@@ -184,14 +184,14 @@ class HibariVoice(EngineVoice):
             replace(sound, start=start, end=end)
             for sound, start, end in zip(told, borders, borders[1:], strict=False)
         ]
-        return pcm, ending_in_silence(heard, pcm)
+        return pcm, trim_to_sound(heard, pcm)
 
-    def _alone(self, words: Sequence[str]) -> list[list[str]]:
+    def _word_phonemes(self, words: Sequence[str]) -> list[list[str]]:
         """The phonemes of each word by itself."""
         head, _ = self._process.ask({"op": "read", "texts": list(words)})
         found = []
         for text in head["texts"]:
-            each = (sounds(sentence, Lengths(0, (1,) * len(written(sentence)[0]), 0)) for sentence in text)
+            each = (sounds(sentence, Lengths(0, (1,) * len(signs_of(sentence)[0]), 0)) for sentence in text)
             found.append([sound.ipa for told in each for sound in told if sound.ipa])
         return found
 
@@ -201,11 +201,11 @@ def _is_latin(letter: str) -> bool:
 
 
 def _ends_in_pause(sentence: Sequence[Token]) -> bool:
-    signs = written(sentence)[0].rstrip()
+    signs = signs_of(sentence)[0].rstrip()
     return not sounds([("", signs[-1:], False)], Lengths(0, (1,), 0))[-1].ipa
 
 
-def _warnings(request: Say, track: Track, hello: dict[str, Any]) -> list[str]:
+def _warnings(request: SpeechRequest, track: SpeechBuffer, hello: dict[str, Any]) -> list[str]:
     found = []
     if request.language.lower().replace("_", "-").split("-")[0] != "en":
         found.append(f"hibari speaks English only: {request.language!r} is read as English")

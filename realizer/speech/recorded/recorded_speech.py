@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.speech.recorded.loudness_lips import by_loudness
-from realizer.speech.utterance import Phoneme, Recording, Say, Utterance, Word
+from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
 
 # Words of a voice touch where those of a recording may lie apart: what ends with a word ends so much before
 # the next one begins.
@@ -17,7 +17,7 @@ EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
 
 
-def played(request: Say, recording: Recording) -> Utterance:
+def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
     """The recording as an utterance: by the times that came with it, or else aligned, or else by loudness.
 
     Phonemes that were told move the lips as they are; of words alone, each has the phonemes a voice gives
@@ -38,7 +38,7 @@ def played(request: Say, recording: Recording) -> Utterance:
     words, phonemes = recording.words, recording.phonemes
     if request.ssml.strip() and (request.marks or not words or not phonemes):
         reference = _reference(request)
-        own = words or _whole(phonemes, reference)
+        own = words or _one_word(phonemes, reference)
         was, now = _knots(reference.words, own)
         marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
         if not words:
@@ -88,14 +88,14 @@ def _opening(recording: Recording) -> tuple[Phoneme, ...]:
     return by_loudness(recording.pcm, recording.rate)
 
 
-def _reference(request: Say) -> Utterance:
+def _reference(request: SpeechRequest) -> Utterance:
     """What a voice makes of the same text; its times are those of nobody."""
     from realizer.speech.registry import reference_voice
 
     return reference_voice().say(replace(request, voice=None, rate=1.0, seconds=None, recording=None))
 
 
-def _whole(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:
+def _one_word(phonemes: Sequence[Phoneme], reference: Utterance) -> tuple[Word, ...]:
     """All the text as one word, from the first sound to the last."""
     said = [p for p in phonemes if p.ipa] or list(phonemes)
     return (Word(said[0].start, said[-1].end, "".join(w.text for w in reference.words)),)

@@ -10,7 +10,7 @@ from realizer import tables
 
 
 @dataclass(frozen=True, slots=True)
-class GivenViseme:
+class NamedViseme:
     """A row of the table; `ipa` is "" for silence."""
 
     set: str
@@ -39,7 +39,7 @@ def sound_of(set: str, viseme: str) -> str:
 
 @cache
 def _sounds() -> Mapping[str, Mapping[str, str]]:
-    rows = tables.read_csv(tables.text_of("visemes_given.csv"), GivenViseme, "visemes_given.csv")
+    rows = tables.read_csv(tables.text_of("visemes_given.csv"), NamedViseme, "visemes_given.csv")
     return {
         name: {r.viseme: r.ipa for r in rows if r.set == name} for name in dict.fromkeys(r.set for r in rows)
     }

@@ -5,17 +5,26 @@ from __future__ import annotations
 import pytest
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, PRESENCES, au, axis, fap, presence, rank, region
+from realizer.animation.axis import (
+    AU_NAMES,
+    MASKED_REGIONS,
+    au,
+    axis,
+    fap,
+    mask_channel,
+    mixing_order,
+    region,
+)
 
 
 def test_the_axis_is_aus_then_68_faps_then_presences_then_ranks() -> None:
     names = list(axis())
     faps = len(AU_NAMES())
     presences = faps + 68
-    ranks = presences + len(PRESENCES)
+    ranks = presences + len(MASKED_REGIONS)
     assert names[:faps] == list(AU_NAMES())
     assert names[faps:presences] == [row.name for row in tables.faps()]
-    assert names[presences:ranks] == list(PRESENCES)
+    assert names[presences:ranks] == list(MASKED_REGIONS)
     assert all(name.startswith("rank ") for name in names[ranks:])
     assert [target.column for target in axis().values()] == list(range(len(names)))
 
@@ -29,10 +38,10 @@ def test_an_au_with_sides_has_two_columns_and_one_without_has_one() -> None:
 
 
 def test_every_au_but_those_that_turn_something_has_a_rank() -> None:
-    assert [rank(number).name for number in (1, 12, 43)] == ["rank 1", "rank 12", "rank 43"]
+    assert [mixing_order(number).name for number in (1, 12, 43)] == ["rank 1", "rank 12", "rank 43"]
     for turn in (51, 63, 99):
         with pytest.raises(KeyError):
-            rank(turn)
+            mixing_order(turn)
 
 
 @pytest.mark.parametrize(
@@ -47,12 +56,12 @@ def test_every_au_but_those_that_turn_something_has_a_rank() -> None:
         (fap(23), "eyes"),
         (fap(48), "head"),
         (fap(19), "face"),
-        (presence("eyes"), "eyes"),
-        (presence("lips"), "face"),
-        (presence("blinks"), "idle"),
-        (presence("motion"), "idle"),
-        (presence("successive"), "face"),
-        (rank(12), "face"),
+        (mask_channel("eyes"), "eyes"),
+        (mask_channel("lips"), "face"),
+        (mask_channel("blinks"), "idle"),
+        (mask_channel("motion"), "idle"),
+        (mask_channel("successive"), "face"),
+        (mixing_order(12), "face"),
     ],
 )
 def test_a_target_belongs_to_a_region(target: object, wanted: str) -> None:

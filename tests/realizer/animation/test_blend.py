@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.axis import AU_NAMES, Target, au, axis, fap, presence
+from realizer.animation.axis import AU_NAMES, Target, au, axis, fap, mask_channel
 from realizer.animation.blend import OVER, blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
-from realizer.animation.idle.blinks import Blinks, Fewer
+from realizer.animation.idle.blinks import BlinkReduction, Blinks
 from realizer.animation.idle.motion import Idle, Motion, idle_face
 from realizer.core.array_types import Float64
 
@@ -19,7 +19,7 @@ ONE = np.array([0.0])
 
 
 def still(target: Target, value: float, layer: Layer = Layer.EXPRESSION) -> Channel:
-    return Channel(target, ONE, np.array([value]), layer=layer, holds=True)
+    return Channel(target, ONE, np.array([value]), layer=layer, keeps_last=True)
 
 
 def value_of(channels: list[Channel], target: Target, time: float = 0.0) -> float:
@@ -41,7 +41,7 @@ def channels(draw: st.DrawFn) -> Channel:
         np.cumsum([start, *gaps]),
         np.array(values),
         layer=draw(st.sampled_from(Layer)),
-        holds=draw(st.booleans()),
+        keeps_last=draw(st.booleans()),
     )
 
 
@@ -105,25 +105,25 @@ def test_faps_add_up() -> None:
 
 def test_an_old_mood_passes_evenly_into_the_new_one() -> None:
     old = still(SMILE, 0.6, Layer.BASE).faded(1.0, 2.0)
-    new = Channel(SMILE, np.array([1.0, 2.0]), np.array([0.0, 0.6]), layer=Layer.BASE, holds=True)
+    new = Channel(SMILE, np.array([1.0, 2.0]), np.array([0.0, 0.6]), layer=Layer.BASE, keeps_last=True)
     values = blend([old, new], np.linspace(0.5, 2.5, 51)).values[:, SMILE.column]
     assert values == pytest.approx(0.6)
 
 
 def test_a_gaze_takes_the_eyes_from_the_base_gaze_but_not_from_idle() -> None:
     base, idle = still(GAZE, 0.5, Layer.BASE), still(GAZE, 0.02, Layer.IDLE)
-    look = [still(GAZE, 0.2, Layer.GAZE), still(presence("eyes"), 0.75, Layer.GAZE)]
+    look = [still(GAZE, 0.2, Layer.GAZE), still(mask_channel("eyes"), 0.75, Layer.GAZE)]
     assert value_of([base, idle, *look], GAZE) == pytest.approx(0.5 * 0.25 + 0.02 + 0.2)
 
 
 def test_a_gaze_of_the_eyes_leaves_the_head_where_it_was_turned() -> None:
     turned = au(51)[0]
-    look = [still(GAZE, 0.2, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
+    look = [still(GAZE, 0.2, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
     assert value_of([still(turned, 0.4, Layer.BASE), *look], turned) == pytest.approx(0.4)
 
 
 def test_what_takes_idle_motion_leaves_what_is_asked_for() -> None:
-    motion = still(presence("motion"), 0.75, Layer.BASE)
+    motion = still(mask_channel("motion"), 0.75, Layer.BASE)
     face = [still(NOD, 0.4, Layer.IDLE), still(NOD, 0.2, Layer.HEAD), motion]
     assert value_of(face, NOD) == pytest.approx(0.4 * 0.25 + 0.2)
 
@@ -139,16 +139,18 @@ def lid_of(taking: Channel, draw: float, time: float) -> float:
 
 @pytest.mark.parametrize(("taken", "comes"), [(0.0, True), (0.25, True), (0.5, False), (1.0, False)])
 def test_a_blink_comes_whole_or_not_at_all(taken: float, comes: bool) -> None:
-    assert lid_of(still(presence("blinks"), taken, Layer.BASE), 0.6, 1.1) == comes
+    assert lid_of(still(mask_channel("blinks"), taken, Layer.BASE), 0.6, 1.1) == comes
 
 
 def test_a_blink_that_has_begun_ends_as_it_was_whatever_window_is_looked_at() -> None:
     soon = Channel(
-        presence("blinks"), np.array([1.05, 1.1]), np.array([0.0, 1.0]), layer=Layer.BASE, holds=True
+        mask_channel("blinks"), np.array([1.05, 1.1]), np.array([0.0, 1.0]), layer=Layer.BASE, keeps_last=True
     )
     assert lid_of(soon, 0.0, 1.1) == 1
     # What took it when it began has gone before this window, and counts.
-    gone = Fewer(presence("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, holds=True).faded(1.02, 1.1)
+    gone = BlinkReduction(
+        mask_channel("blinks"), ONE, np.array([1.0]), layer=Layer.BASE, keeps_last=True
+    ).faded(1.02, 1.1)
     assert lid_of(gone, 0.0, 1.11) == 0
 
 
@@ -159,7 +161,7 @@ def test_idle_motion_is_taken_as_far_as_a_document_asks() -> None:
     )
     moves = [column for column in moves if column not in {lid.column for lid in au(45)}]
     alone, less, still_ = (
-        blend([still(presence("motion"), taken, Layer.BASE)], TIMES, idle=idle).values[:, moves]
+        blend([still(mask_channel("motion"), taken, Layer.BASE)], TIMES, idle=idle).values[:, moves]
         for taken in (0.0, 0.75, 1.0)
     )
     assert alone.max() > 0.005
@@ -193,16 +195,16 @@ def test_all_other_columns_than_those_that_may_move_are_0(given: list[Channel]) 
 
 
 def test_two_gazes_at_once_share_the_eyes_and_do_not_add_up() -> None:
-    left = [still(GAZE, 0.6, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
-    up = [still(au(63)[0], 0.4, Layer.GAZE), still(presence("eyes"), 1.0, Layer.GAZE)]
+    left = [still(GAZE, 0.6, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
+    up = [still(au(63)[0], 0.4, Layer.GAZE), still(mask_channel("eyes"), 1.0, Layer.GAZE)]
     assert value_of(left + up, GAZE) == pytest.approx(0.3)
     assert value_of(left + left, GAZE) == pytest.approx(0.6)
-    assert value_of(left + up, presence("eyes")) == 1
+    assert value_of(left + up, mask_channel("eyes")) == 1
 
 
 def test_what_is_set_directly_replaces_all_else_and_lets_go_smoothly() -> None:
     rises = np.array([0.0, 1.0])
-    held = Channel(SMILE, rises / 10, rises / 10, layer=Layer.DIRECT, holds=True, there=rises)
+    held = Channel(SMILE, rises / 10, rises / 10, layer=Layer.DIRECT, keeps_last=True, weight=rises)
     face = [still(SMILE, 0.8), held.faded(2.0, 2.3)]
     times = np.linspace(0, 3, 3001)
     values = blend(face, times).values[:, SMILE.column]
@@ -226,7 +228,7 @@ def set_faps(draw: st.DrawFn) -> Channel:
     times = np.cumsum(draw(st.lists(st.floats(0.1, 1.0), min_size=4, max_size=4)))
     there = np.array([0.0, 1.0, 1.0, 0.0])
     value = draw(st.floats(-200.0, 200.0))
-    return Channel(CORNER, times, value * there, layer=draw(st.sampled_from(OVER)), there=there)
+    return Channel(CORNER, times, value * there, layer=draw(st.sampled_from(OVER)), weight=there)
 
 
 def corner(channels: list[Channel], times: Float64) -> Float64:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.animation.axis import au
-from realizer.animation.channel import Channel, Gain, Joint, Layer, later
+from realizer.animation.channel import Channel, Crossfade, Gain, Layer, later
 
 KEYS = np.array([0.0, 0.5, 1.0])
 
@@ -16,12 +16,14 @@ def channel(**more: object) -> Channel:
 
 
 def test_all_that_is_timed_moves_and_all_else_stays() -> None:
-    one = channel(layer=Layer.HEAD, gains=(Gain(0.5, 1.0, 0.0),), until=2.0, joint=Joint(0.25, 1.0, 0.0, 0.1))
+    one = channel(
+        layer=Layer.HEAD, gains=(Gain(0.5, 1.0, 0.0),), until=2.0, crossfade=Crossfade(0.25, 1.0, 0.0, 0.1)
+    )
     assert one.span == (0.25, 1.0)
     (other,) = later([one], 10.0, "b:s")
     assert other.times.tolist() == [10.0, 10.5, 11.0]
     assert other.gains == (Gain(10.5, 11.0, 0.0),)
-    assert (other.until, other.joint) == (12.0, Joint(10.25, 1.0, 0.0, 0.1))
+    assert (other.until, other.crossfade) == (12.0, Crossfade(10.25, 1.0, 0.0, 0.1))
     assert (other.layer, other.source, other.target) == (Layer.HEAD, "b:s", one.target)
     assert other.values is one.values
     assert other.span == (10.25, 11.0)

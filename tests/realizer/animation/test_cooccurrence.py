@@ -81,7 +81,7 @@ def test_the_jaw_keeps_the_parting_of_the_lips_that_is_no_longer_scored() -> Non
     values[[NAMES.index("25"), NAMES.index("26")]] = 1.0
     result = cooccur(values, rules())
     assert [result.aus[NAMES.index(name), 0] for name in ("25", "26")] == [0.0, 1.0]
-    assert result.held[NAMES.index("25"), 0] == 1.0
+    assert result.overridden[NAMES.index("25"), 0] == 1.0
 
 
 @given(INTENSITIES)
@@ -93,9 +93,9 @@ def test_a_second_pass_changes_nothing(aus: Float32) -> None:
 @given(INTENSITIES)
 def test_nothing_is_added_to_what_was_asked_for(aus: Float32) -> None:
     result = cooccur(aus, rules())
-    assert (result.held >= 0).all()
+    assert (result.overridden >= 0).all()
     assert (result.aus >= 0).all()
-    assert (result.aus + result.held <= aus + 1e-6).all()
+    assert (result.aus + result.overridden <= aus + 1e-6).all()
 
 
 @given(INTENSITIES, arrays(np.float32, (len(NAMES), 4), elements=st.sampled_from([-1.0, 0.0, 1.0])))
@@ -116,5 +116,5 @@ def test_it_makes_no_difference_which_units_that_are_not_up_are_looked_at(aus: F
     known = bounds(rules(), tuple(range(len(NAMES))))
     moving = known.moving(aus)
     result = cooccur(aus, rules())
-    np.testing.assert_array_equal(moving, result.aus + result.held)
+    np.testing.assert_array_equal(moving, result.aus + result.overridden)
     np.testing.assert_array_equal(known.scored(aus, moving), result.aus)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Gain
-from realizer.animation.crossfade import HEALS, joined
+from realizer.animation.crossfade import HEALS, crossfade
 from realizer.animation.curves import sample
 
 SMILE, BROW = au(12, "LEFT")[0], au(4, "LEFT")[0]
@@ -29,7 +29,7 @@ def shown(channels: tuple[Channel, ...], times: np.ndarray) -> np.ndarray:
 def test_value_and_velocity_do_not_jump(now: float, first: float, second: float) -> None:
     old = hill(0.0, 0.5, 2.0, 3.0)
     new = hill(0.0, 0.5, 2.0 + max(first, -1.4), 3.0 + max(first, -1.4) + max(second, -0.9))
-    both = joined([old], [new], now)
+    both = crossfade([old], [new], now)
     times = now + np.arange(-50, 50) * 1e-4
     course = shown(both, times)
     velocity = np.diff(course) / 1e-4
@@ -40,15 +40,15 @@ def test_value_and_velocity_do_not_jump(now: float, first: float, second: float)
 
 def test_before_it_is_the_old_course_and_healed_the_new_one() -> None:
     old, new = hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 3.0, 4.0)
-    both = joined([old], [new], 2.5)
+    both = crossfade([old], [new], 2.5)
     early, late = np.linspace(0, 2.4, 20), np.linspace(2.5 + HEALS, 4, 20)
     assert shown(both, early) == pytest.approx(shown((old,), early))
     assert shown(both, late) == pytest.approx(shown((new,), late))
 
 
 def test_what_changed_before_stays_as_it_was() -> None:
-    first = joined([hill(0.0, 0.5, 2.0, 3.0)], [hill(0.0, 0.5, 3.0, 4.0)], 1.0)
-    second = joined(first, [hill(0.0, 0.5, 3.5, 4.5)], 2.0)
+    first = crossfade([hill(0.0, 0.5, 2.0, 3.0)], [hill(0.0, 0.5, 3.0, 4.0)], 1.0)
+    second = crossfade(first, [hill(0.0, 0.5, 3.5, 4.5)], 2.0)
     early = np.linspace(0, 1.99, 40)
     assert shown(second, early) == pytest.approx(shown(first, early))
     assert shown(second, np.array([4.0])) > 0.1
@@ -56,13 +56,13 @@ def test_what_changed_before_stays_as_it_was() -> None:
 
 def test_gains_go_over_to_the_new_course() -> None:
     old = hill(0.0, 0.5, 2.0, 3.0).scaled(Gain(0.6, 1.0, 0.5))
-    both = joined([old], [hill(0.0, 0.5, 3.0, 4.0)], 1.5)
+    both = crossfade([old], [hill(0.0, 0.5, 3.0, 4.0)], 1.5)
     assert shown(both, np.array([2.5])) == pytest.approx([0.4])
 
 
 def test_each_target_goes_on_in_its_own_and_one_that_is_gone_fades() -> None:
     old = [hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 2.0, 3.0, target=BROW)]
-    both = joined(old, [hill(0.0, 0.5, 2.5, 3.5)], 1.0)
+    both = crossfade(old, [hill(0.0, 0.5, 2.5, 3.5)], 1.0)
     rows = {c.target.name: 0.0 for c in both}
     for channel, value in zip(both, sample(both, np.array([1.0 + HEALS]))[:, 0], strict=True):
         rows[channel.target.name] += value
@@ -72,7 +72,7 @@ def test_each_target_goes_on_in_its_own_and_one_that_is_gone_fades() -> None:
 def test_a_channel_that_is_as_it_was_stays_and_one_of_the_same_values_at_other_times_does_not() -> None:
     stays, goes = hill(0.0, 0.5, 2.0, 3.0), hill(0.0, 0.5, 2.0, 3.0)
     later = replace(goes, times=goes.times * 1.5)
-    both = joined([stays, goes], [replace(stays), later], 1.0)
+    both = crossfade([stays, goes], [replace(stays), later], 1.0)
     assert stays in both
-    assert [c.until for c in both if c.joint is None] == [float("inf"), 1.0]
+    assert [c.until for c in both if c.crossfade is None] == [float("inf"), 1.0]
     assert shown(both[1:], np.array([4.0])) == pytest.approx(shown((later,), np.array([4.0])))

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from realizer.animation.axis import au
-from realizer.animation.channel import Channel, Joint
+from realizer.animation.channel import Channel, Crossfade
 from realizer.animation.curves import CURVES, MANY_KEYS, sample, smooth, weights
 
 TARGET = au(12, "LEFT")[0]
@@ -27,7 +27,7 @@ def channels(draw: st.DrawFn) -> Channel:
         begin + np.cumsum(gaps),
         np.array(values),
         curve=draw(st.sampled_from(sorted(CURVES))),
-        holds=draw(st.booleans()),
+        keeps_last=draw(st.booleans()),
     )
 
 
@@ -41,7 +41,7 @@ def test_every_channel_hits_its_keys(given: list[Channel]) -> None:
 def test_a_channel_is_zero_outside_its_keys_and_holds_where_it_says(channel: Channel, away: float) -> None:
     before, after = sample([channel], np.array([channel.times[0] - away, channel.times[-1] + away]))[0]
     assert before == 0
-    assert after == (channel.values[-1] if channel.holds else 0)
+    assert after == (channel.values[-1] if channel.keeps_last else 0)
 
 
 @given(channels(), st.lists(st.floats(-10, 120), min_size=1, max_size=30))
@@ -71,7 +71,7 @@ def test_smooth_stands_still_at_both_ends() -> None:
 
 @given(st.floats(0.05, 2.0), st.floats(0.0, 3.0))
 def test_a_faded_channel_reaches_zero_without_a_jump(length: float, begin: float) -> None:
-    channel = Channel(TARGET, np.array([0.0, 1.0]), np.array([0.0, 1.0]), holds=True)
+    channel = Channel(TARGET, np.array([0.0, 1.0]), np.array([0.0, 1.0]), keeps_last=True)
     faded = channel.faded(begin, begin + length)
     times = np.linspace(0, begin + length + 0.5, 2000)
     values, before = sample([faded, channel], times)
@@ -82,8 +82,8 @@ def test_a_faded_channel_reaches_zero_without_a_jump(length: float, begin: float
 
 
 def test_a_held_channel_faded_while_another_rises_passes_evenly_into_it() -> None:
-    old = Channel(TARGET, np.array([0.0]), np.array([0.7]), holds=True).faded(1.0, 2.0)
-    new = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.0, 0.7]), holds=True)
+    old = Channel(TARGET, np.array([0.0]), np.array([0.7]), keeps_last=True).faded(1.0, 2.0)
+    new = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.0, 0.7]), keeps_last=True)
     assert sample([old, new], np.linspace(0, 3, 61)).sum(axis=0) == pytest.approx(0.7)
 
 
@@ -104,7 +104,7 @@ def test_an_unknown_curve_is_a_key_error() -> None:
 
 def test_weights_say_how_much_of_a_channel_is_there() -> None:
     ends = Channel(TARGET, np.array([1.0, 2.0]), np.array([0.3, 0.3]))
-    stays = Channel(TARGET, np.array([1.0]), np.array([0.0]), holds=True).faded(3.0, 4.0)
+    stays = Channel(TARGET, np.array([1.0]), np.array([0.0]), keeps_last=True).faded(3.0, 4.0)
     times = np.array([0.9, 1.0, 2.0, 2.1, 3.5, 4.0])
     assert weights([ends, stays], times).tolist() == [[0, 1, 1, 0, 0, 0], [0, 1, 1, 1, 0.5, 0]]
 
@@ -119,7 +119,7 @@ def test_a_channel_that_goes_on_in_anothers_place_joins_it_in_value_and_slope(
     around = sample([old, new], np.array([at - h, at, at + h]))
     value = around[0, 1] - around[1, 1]
     slope = ((around[0, 2] - around[0, 0]) - (around[1, 2] - around[1, 0])) / (2 * h)
-    pair = [replace(old, until=at), replace(new, joint=Joint(at, value, slope, length))]
+    pair = [replace(old, until=at), replace(new, crossfade=Crossfade(at, value, slope, length))]
     times = np.array([at - 2 * h, at - h, at, at + h, at + 2 * h])
     shown = sample(pair, times).sum(axis=0)
     assert np.abs(np.diff(shown)).max() < 5 * h, "no jump"
@@ -141,9 +141,9 @@ def test_each_of_many_channels_is_as_it_is_alone() -> None:
     keys = np.linspace(0.5, 2.0, MANY_KEYS)
     many = [
         Channel(TARGET, np.array([0.1, 0.9, 1.4]), np.array([0.0, 1.0, 0.0])),
-        Channel(TARGET, keys, keys / 2, curve="linear", holds=True),
-        Channel(TARGET, np.array([0.3]), np.array([0.6]), holds=True).faded(1.0, 2.0),
-        Channel(TARGET, np.array([0.0, 2.0]), np.array([0.0, 0.7]), joint=Joint(0.7, 0.2, 0.1, 0.4)),
+        Channel(TARGET, keys, keys / 2, curve="linear", keeps_last=True),
+        Channel(TARGET, np.array([0.3]), np.array([0.6]), keeps_last=True).faded(1.0, 2.0),
+        Channel(TARGET, np.array([0.0, 2.0]), np.array([0.0, 0.7]), crossfade=Crossfade(0.7, 0.2, 0.1, 0.4)),
         Channel(TARGET, np.array([0.0, 2.0]), np.array([0.3, 0.7]), curve="linear", until=1.2),
         Channel(TARGET, np.array([5.0, 6.0]), np.array([0.3, 0.7])),
         Channel(TARGET, keys, 1 - keys / 4, curve="linear"),
@@ -160,7 +160,7 @@ def test_each_of_many_channels_is_as_it_is_alone() -> None:
 def test_a_channel_of_many_keys_is_interpolated_between_them(times: list[float]) -> None:
     keys = np.linspace(0.5, 2.0, MANY_KEYS) ** 2
     values = np.sin(9 * keys)
-    both = [Channel(TARGET, keys, values, curve="linear", holds=holds) for holds in (False, True)]
+    both = [Channel(TARGET, keys, values, curve="linear", keeps_last=holds) for holds in (False, True)]
     ends, stays = sample(both, np.array(times))
     np.testing.assert_allclose(stays, np.interp(times, keys, values, left=0.0), atol=1e-12)
     np.testing.assert_allclose(ends, np.interp(times, keys, values, left=0.0, right=0.0), atol=1e-12)

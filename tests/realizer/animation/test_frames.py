@@ -20,8 +20,8 @@ def rows(*columns: int) -> Float32:
 
 
 def test_columns_that_are_not_named_are_looked_up() -> None:
-    assert AUFrames(np.arange(3.0), rows(SMILE, fap(3).column)).live == (SMILE, fap(3).column)
-    assert AUFrames(np.arange(3.0), rows()).live == ()
+    assert AUFrames(np.arange(3.0), rows(SMILE, fap(3).column)).moving_columns == (SMILE, fap(3).column)
+    assert AUFrames(np.arange(3.0), rows()).moving_columns == ()
 
 
 def test_it_makes_no_difference_whether_more_columns_are_named_than_move() -> None:
@@ -38,12 +38,12 @@ def test_joined_windows_may_move_what_any_of_them_may() -> None:
         AUFrames(np.arange(3.0), rows(column), columns=columns)
         for column, columns in ((SMILE, (SMILE,)), (BROW, (BROW,)), (BROW, None))
     )
-    assert AUFrames.joined([smile, brow]).columns == (BROW, SMILE)
-    assert AUFrames.joined([smile, unknown]).columns is None
-    assert AUFrames.joined([smile, unknown]).live == (BROW, SMILE)
+    assert AUFrames.concatenate([smile, brow]).columns == (BROW, SMILE)
+    assert AUFrames.concatenate([smile, unknown]).columns is None
+    assert AUFrames.concatenate([smile, unknown]).moving_columns == (BROW, SMILE)
 
 
 def test_what_moves_has_a_row_for_each_action_unit() -> None:
     frames = AUFrames(np.arange(3.0), rows(SMILE), rules())
     assert frames.moving.shape == (len(AU_NAMES()), 3)
-    np.testing.assert_array_equal(frames.moving.T, frames.asked)
+    np.testing.assert_array_equal(frames.moving.T, frames.before_rules)

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.group_reduce import Rounds
+from realizer.animation.group_reduce import GroupReduction
 
 
 @pytest.mark.parametrize("by", [np.add, np.maximum])
 @given(st.lists(st.integers(0, 9), max_size=30).map(sorted))
 def test_each_group_is_reduced_as_it_would_be_alone(by: np.ufunc, group: list[int]) -> None:
     rows = np.random.default_rng(len(group)).random((len(group), 3)).astype(np.float32)
-    rounds = Rounds.of(np.array(group, int))
+    rounds = GroupReduction.of(np.array(group, int))
     found = rounds.reduced(rows[rounds.order], by)
     assert sorted(rounds.groups.tolist()) == sorted(set(group))
     for number, row in zip(rounds.groups.tolist(), found, strict=True):
@@ -23,4 +23,4 @@ def test_each_group_is_reduced_as_it_would_be_alone(by: np.ufunc, group: list[in
 
 
 def test_no_rows_are_no_groups() -> None:
-    assert Rounds.of(np.zeros(0, int)).reduced(np.zeros((0, 4), np.float32), np.add).shape == (0, 4)
+    assert GroupReduction.of(np.zeros(0, int)).reduced(np.zeros((0, 4), np.float32), np.add).shape == (0, 4)

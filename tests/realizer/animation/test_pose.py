@@ -64,7 +64,7 @@ def test_both_kinds_of_faces_show_a_fap_that_is_held_as_it_is_set(
 ) -> None:
     held = np.zeros((1, 68), np.float32)
     held[0, number - 1] = part
-    clip = replace(frames({**face, FAPS[number - 1]: part * 50.0}), held=held)
+    clip = replace(frames({**face, FAPS[number - 1]: part * 50.0}), overridden=held)
     (units,) = poses(clip, (*FAPS, *sorted(taken)))
     # What the units of such a face move it by, and what is asked of it beside them.
     all_, others = (

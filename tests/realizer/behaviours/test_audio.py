@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.speech.espeak.voice import EspeakVoice, missing
-from realizer.speech.utterance import Say
+from realizer.speech.espeak.voice import EspeakVoice, install_hint
+from realizer.speech.utterance import SpeechRequest
 from tests.realizer.behaviours.conftest import wav
 
 
@@ -82,10 +82,10 @@ def test_its_volume_changes_while_it_sounds(play, media: Path) -> None:
 
 
 def test_a_speech_with_a_recording_moves_its_lips_and_its_syncs_with_it(play, media: Path) -> None:
-    if fix := missing():
+    if fix := install_hint():
         pytest.skip(fix)
     voice = EspeakVoice()
-    said = voice.say(Say("Mind the open map, please.", voice="en-us+m7"))
+    said = voice.say(SpeechRequest("Mind the open map, please.", voice="en-us+m7"))
     voice.close()
     (media / "said.wav").write_bytes(wav(said.pcm.tobytes(), rate=said.sample_rate))
     played = play(

@@ -19,7 +19,7 @@ from realizer.behaviours.kind import Fault, PlanningContext
 from realizer.behaviours.registry import KINDS, VOCABULARY
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
-from realizer.speech.utterance import Phoneme, Say, Utterance
+from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance
 from realizer.tables.lexemes import face_lexemes, head_lexemes
 
 EXT = 'xmlns:ext="http://www.bml-initiative.org/bml/coreextensions-1.0"'
@@ -112,9 +112,9 @@ def test_channels_start_at_rest_and_end_there_or_hold(element: str) -> None:
         assert channel.times[0] >= times[0]
         assert channel.times[-1] == times[-1]
         assert channel.values[0] == 0
-        assert channel.holds == (KINDS[node(element).tag].region is not None)
-        assert channel.values[-1] == 0 or channel.holds
-        assert (channel.layer is Layer.BASE) == channel.holds
+        assert channel.keeps_last == (KINDS[node(element).tag].region is not None)
+        assert channel.values[-1] == 0 or channel.keeps_last
+        assert (channel.layer is Layer.BASE) == channel.keeps_last
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -391,7 +391,7 @@ def spoken(duration: float, **marks: float) -> PlanningContext:
     return PlanningContext(utterances={"x": Utterance(duration, (), phonemes, marks)})
 
 
-def say(element: str, world: PlanningContext = NOWHERE) -> Say:
+def say(element: str, world: PlanningContext = NOWHERE) -> SpeechRequest:
     one = node(element)
     kind = KINDS[one.tag]
     assert kind.speech_request is not None
@@ -407,7 +407,7 @@ SSML = """<description priority="{}" type="application/ssml+xml"><speak xml:lang
 
 
 def test_text_becomes_ssml_with_its_syncs_as_marks() -> None:
-    assert say(SPEECH.format("")) == Say(
+    assert say(SPEECH.format("")) == SpeechRequest(
         'A &lt;b&gt; &amp; <mark name="m"/>c<mark name="n"/>', ("m", "n"), "en-US"
     )
     assert say(SPEECH.format(""), PlanningContext(language="fr-FR")).language == "fr-FR"

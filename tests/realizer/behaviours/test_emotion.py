@@ -29,7 +29,7 @@ def lexeme(name: str, scale: float = 1.0) -> dict[str, float]:
 def asked(played, time: float) -> dict[str, float]:
     """AU -> 0..1 before the rules of what a face shows together."""
     names = played.realization.to_json()["au"]["names"]
-    values = played.realization.aus.asked[round(time * 100)]
+    values = played.realization.aus.before_rules[round(time * 100)]
     return {name: round(float(v), 4) for name, v in zip(names, values, strict=True) if v > 1e-6}
 
 

@@ -79,7 +79,7 @@ def test_ones_own_expressions_are_played_by_both_elements(tmp_path) -> None:
     played = realize(f'<bml id="b">{body}</bml>', fps=100, expressions=tmp_path, idle=False)
     assert played.warnings == ()
     names = played.to_json()["au"]["names"]
-    shown = played.aus.asked[:, [names.index("12L"), names.index("2R"), names.index("12R")]]
+    shown = played.aus.before_rules[:, [names.index("12L"), names.index("2R"), names.index("12R")]]
     assert shown[40].tolist() == pytest.approx([0.6, 0.3, 0])
     assert shown[340].tolist() == pytest.approx([0.3, 0.15, 0])
     assert list(played.schedules[0]["e"].values()) == pytest.approx([0, 0.2, 0.7, 1.1])

@@ -28,7 +28,7 @@ def timeline(play, tmp_path: Path):
 
 def course(played, name: str) -> np.ndarray:
     names = played.realization.to_json()["au"]["names"]
-    return played.realization.aus.asked[:, names.index(name)]
+    return played.realization.aus.before_rules[:, names.index(name)]
 
 
 def test_an_expression_grows_out_of_the_one_before_without_a_neutral_face(timeline) -> None:

@@ -9,16 +9,16 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.cli import cli
-from realizer.speech.espeak.voice import EspeakVoice, missing
-from realizer.speech.utterance import Say
+from realizer.speech.espeak.voice import EspeakVoice, install_hint
+from realizer.speech.utterance import SpeechRequest
 from tests.realizer.behaviours.conftest import wav
 
-pytestmark = pytest.mark.skipif(bool(missing()), reason=str(missing()))
+pytestmark = pytest.mark.skipif(bool(install_hint()), reason=str(install_hint()))
 
 
 def test_words_are_written_with_their_times(tmp_path: Path) -> None:
     voice = EspeakVoice()
-    said = voice.say(Say("Guten Morgen, wie geht es Ihnen?", language="de", voice="de+m3"))
+    said = voice.say(SpeechRequest("Guten Morgen, wie geht es Ihnen?", language="de", voice="de+m3"))
     voice.close()
     audio = tmp_path / "a.wav"
     audio.write_bytes(wav(said.pcm.tobytes(), rate=said.sample_rate))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import realizer
 from bml_schema import Block, Expression, Speech, parse, write
 from realizer.knowledge.enrich import Enricher, template_of
-from realizer.speech.utterance import MOST_TEXT
+from realizer.speech.utterance import MAX_TEXT
 from realizer.tables.knowledge import knowledge
 
 TEXT = "Are you really sure? This is nonsense! There was a terrible accident. Yes. Go away!"
@@ -142,7 +142,7 @@ def test_doing_it_twice_adds_nothing(text: str) -> None:
     "text", ['Are you sure? What a horror, he said; "nonsense!" ' * 1000, "No! & yes. " * 2000, "x" * 30_000]
 )
 def test_a_long_text_becomes_several_documents_that_can_each_be_played(text: str) -> None:
-    blocks = list(Enricher().texts(text, MOST_TEXT))
+    blocks = list(Enricher().texts(text, MAX_TEXT))
     assert "".join(str(block["speech1"].text) for block in blocks) == text
     assert len({block.id for block in blocks}) == len(blocks) > 2
     assert [block.composition for block in blocks] == ["MERGE"] + ["APPEND"] * (len(blocks) - 1)
@@ -150,6 +150,6 @@ def test_a_long_text_becomes_several_documents_that_can_each_be_played(text: str
 
 
 def test_a_long_text_is_cut_before_a_sentence_and_a_short_one_stays_whole() -> None:
-    blocks = list(Enricher().texts('Are you sure? What a horror, he said; "nonsense!" ' * 1000, MOST_TEXT))
+    blocks = list(Enricher().texts('Are you sure? What a horror, he said; "nonsense!" ' * 1000, MAX_TEXT))
     assert all(str(block["speech1"].text).startswith(("Are", "What", '"')) for block in blocks)
-    assert [len(list(Enricher().texts(short, MOST_TEXT))) for short in ("Hi.", "no, " * 2500)] == [1, 1]
+    assert [len(list(Enricher().texts(short, MAX_TEXT))) for short in ("Hi.", "no, " * 2500)] == [1, 1]

@@ -19,7 +19,9 @@ HEAD = au(51)[0]
 
 
 def shift(begin: float, end: float, value: float, target=SMILE, region: str = "face") -> BaseShift:
-    channel = Channel(target, np.array([begin, end]), np.array([0.0, value]), layer=Layer.BASE, holds=True)
+    channel = Channel(
+        target, np.array([begin, end]), np.array([0.0, value]), layer=Layer.BASE, keeps_last=True
+    )
     return BaseShift.of(begin, end, region, (channel,))
 
 

@@ -11,7 +11,7 @@ from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.playback.speaking import open_voice, submit_with_speech, synthesize, without_stretch
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 TEXT = "This is said at its own pace."
 
@@ -20,11 +20,11 @@ class CountingVoice(SilentVoice):
     """A silent voice that counts its requests; a broken one refuses them."""
 
     def __init__(self, broken: bool = False) -> None:
-        self.requests: list[Say] = []
+        self.requests: list[SpeechRequest] = []
         self.broken = broken
         self.closed = False
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         self.requests.append(request)
         if self.broken:
             raise VoiceError("the voice is broken")

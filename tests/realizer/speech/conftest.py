@@ -14,7 +14,7 @@ from realizer.speech.hibari.voice import HibariVoice
 
 @pytest.fixture(autouse=True)
 def _skip_without_the_engine(request: pytest.FixtureRequest) -> None:
-    for marker, missing in (("espeak", espeak.missing), ("hibari", hibari.missing)):
+    for marker, missing in (("espeak", espeak.install_hint), ("hibari", hibari.install_hint)):
         if request.node.get_closest_marker(marker) and (fix := missing()):
             pytest.skip(fix)
 

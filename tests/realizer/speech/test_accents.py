@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from realizer.speech.accents import phrases
 from realizer.speech.registry import find_voice
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Phoneme, Say, Utterance, Word
+from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
 TEXT = "Good morning, I am really glad to see you. The door is on the left."
 
@@ -21,7 +21,7 @@ def word_at(utterance: Utterance, time: float) -> str:
 
 @pytest.mark.parametrize("voice", ["silent", "espeak"])
 def test_phrases_end_at_commas_and_full_stops(voice: str) -> None:
-    said = find_voice(voice).say(Say(TEXT))
+    said = find_voice(voice).say(SpeechRequest(TEXT))
     found = phrases(said)
     starts = [word_at(said, phrase.start + 0.02) for phrase in found]
     ends = [word_at(said, phrase.end - 0.03) for phrase in found]
@@ -31,14 +31,14 @@ def test_phrases_end_at_commas_and_full_stops(voice: str) -> None:
 
 @pytest.mark.parametrize("voice", ["silent", "espeak"])
 def test_accents_are_on_words_that_carry_meaning(voice: str) -> None:
-    said = find_voice(voice).say(Say(TEXT))
+    said = find_voice(voice).say(SpeechRequest(TEXT))
     words = {word_at(said, accent.time) for phrase in phrases(said) for accent in phrase.accents}
     assert words >= {"morning", "really", "left"}
     assert not words & {"I", "am", "to", "you", "The", "is", "on", "the"}
 
 
 def test_the_last_accent_of_each_phrase_is_its_nucleus() -> None:
-    said = SilentVoice().say(Say(TEXT))
+    said = SilentVoice().say(SpeechRequest(TEXT))
     for phrase in phrases(said):
         assert [accent.nuclear for accent in phrase.accents][:-1] == [False] * (len(phrase.accents) - 1)
         assert phrase.accents[-1].nuclear
@@ -74,12 +74,12 @@ def test_a_closed_stop_ends_no_phrase() -> None:
 
 @pytest.mark.parametrize("text", ["", "...", "   "])
 def test_where_nothing_is_said_there_are_no_phrases(text: str) -> None:
-    assert phrases(SilentVoice().say(Say(text))) == ()
+    assert phrases(SilentVoice().say(SpeechRequest(text))) == ()
 
 
 @given(st.lists(st.sampled_from(["cat", "window", ",", ".", "the", "of", "remember", "!"]), max_size=40))
 def test_phrases_follow_each_other_and_hold_their_accents(parts: list[str]) -> None:
-    said = SilentVoice().say(Say(" ".join(parts)))
+    said = SilentVoice().say(SpeechRequest(" ".join(parts)))
     end = 0.0
     for phrase in phrases(said):
         assert end <= phrase.start < phrase.end <= said.duration

@@ -21,7 +21,7 @@ from realizer.server.session.effects import Speak
 from realizer.speech import engine_process
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
-from realizer.speech.utterance import Say, Utterance, Voice
+from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 pytestmark = pytest.mark.xdist_group("voices")
 
@@ -156,10 +156,10 @@ def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> Non
     studio = Studio()
     alone = EspeakVoice(name.partition(":")[2] or None)
     try:
-        said = studio.speak(Speak(1, Say("een twee", voice=name)))
+        said = studio.speak(Speak(1, SpeechRequest("een twee", voice=name)))
         assert not isinstance(said, RealizerError)
         assert said.warnings == ()
-        assert said.phonemes == alone.say(Say("een twee")).phonemes
+        assert said.phonemes == alone.say(SpeechRequest("een twee")).phonemes
     finally:
         studio.close()
         alone.close()
@@ -181,20 +181,20 @@ def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
         return exchange(process, request)
 
     try:
-        first = studio.speak(Speak(1, Say("One two three.", voice=name)))
+        first = studio.speak(Speak(1, SpeechRequest("One two three.", voice=name)))
         engine = studio._voices[name]
         assert isinstance(engine, EspeakVoice | HibariVoice)
         pid = engine.pid
         assert pid is not None
         os.kill(pid, signal.SIGSTOP)  # so that it can never answer before it dies
-        order = Speak(2, Say("It is raining here today. " * 50, voice=name))
+        order = Speak(2, SpeechRequest("It is raining here today. " * 50, voice=name))
         asking = threading.Thread(target=lambda: answers.append(studio.speak(order)))
         monkeypatch.setattr(engine_process, "_exchange", announced)
         asking.start()
         assert begun.wait(30)
         os.kill(pid, signal.SIGKILL)
         asking.join()
-        again = studio.speak(Speak(3, Say("Four five six.", voice=name)))
+        again = studio.speak(Speak(3, SpeechRequest("Four five six.", voice=name)))
     finally:
         studio.close()
     assert not isinstance(first, RealizerError)
@@ -208,19 +208,19 @@ def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
 
 @pytest.mark.espeak
 def test_an_engine_that_is_killed_while_nobody_asks_costs_nothing(voice: EspeakVoice) -> None:
-    voice.say(Say("Before it died."))
+    voice.say(SpeechRequest("Before it died."))
     engine = voice._process._running
     assert engine is not None
     engine.process.kill()
     engine.process.wait()
-    assert voice.say(Say("After it died.")).duration > 0.5
+    assert voice.say(SpeechRequest("After it died.")).duration > 0.5
 
 
 def test_a_voice_that_fails_is_one_warning_and_the_others_play() -> None:
     class Broken:
         name = "broken"
 
-        def say(self, request: Say) -> Utterance:
+        def say(self, request: SpeechRequest) -> Utterance:
             raise VoiceError("it died")
 
         def close(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from realizer.speech.base_voice import BaseVoice
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 class Quiet(BaseVoice):
@@ -11,7 +11,7 @@ class Quiet(BaseVoice):
 
     name = "quiet"
 
-    def say(self, request: Say) -> Utterance:
+    def say(self, request: SpeechRequest) -> Utterance:
         return Utterance(0.0, (), (), {})
 
 

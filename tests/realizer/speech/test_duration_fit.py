@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realizer.speech.duration_fit import fitted, stretched
+from realizer.speech.duration_fit import speak_to_length, stretched
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import WARP, Say, Utterance
+from realizer.speech.utterance import WARP, SpeechRequest, Utterance
 
-SAY = Say('one two <mark name="m"/>three four five', ("m",))
+SAY = SpeechRequest('one two <mark name="m"/>three four five', ("m",))
 
 
 @pytest.mark.parametrize("ratio", [0.7, 0.95, 1.0, 1.3, 1.6])
 def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
     voice = SilentVoice()
     natural = voice.say(SAY)
-    made = fitted(voice, Say(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
+    made = speak_to_length(voice, SpeechRequest(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
     assert made.duration == pytest.approx(natural.duration * ratio)
     assert made.phonemes[-1].end == pytest.approx(made.duration)
     assert made.marks["m"] / made.duration == pytest.approx(natural.marks["m"] / natural.duration, abs=0.05)
@@ -27,7 +27,7 @@ def test_a_speech_lasts_exactly_as_long_as_it_is_asked_to(ratio: float) -> None:
 
 def test_without_a_length_it_is_the_voices_own() -> None:
     voice = SilentVoice()
-    assert fitted(voice, SAY).duration == voice.say(SAY).duration
+    assert speak_to_length(voice, SAY).duration == voice.say(SAY).duration
     assert voice.say(SAY).stretch[0] < 1 < voice.say(SAY).stretch[1]
 
 
@@ -39,7 +39,7 @@ def test_sound_and_times_of_a_real_voice_stretch_together(ratio: float) -> None:
     voice = find_voice("espeak")
     try:
         natural = voice.say(SAY)
-        made = fitted(voice, Say(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
+        made = speak_to_length(voice, SpeechRequest(SAY.ssml, SAY.marks, seconds=natural.duration * ratio))
         assert made.pcm is not None
         assert len(made.pcm) == round(made.duration * made.sample_rate)
         assert made.words[-1].end == pytest.approx(natural.words[-1].end * ratio, rel=0.1)
@@ -80,7 +80,7 @@ def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) 
             self.voice = find_voice("espeak")
             self.lengths: list[float] = []
 
-        def say(self, request: Say) -> Utterance:
+        def say(self, request: SpeechRequest) -> Utterance:
             said = self.voice.say(request)
             self.lengths.append(said.duration)
             return said
@@ -91,7 +91,7 @@ def test_a_voice_is_asked_until_hardly_anything_is_left_to_warp(seconds: float) 
     voice = Heard()
     try:
         text = "Hello, I am very pleased to meet you."
-        made = fitted(voice, Say(text, seconds=seconds))
+        made = speak_to_length(voice, SpeechRequest(text, seconds=seconds))
     finally:
         voice.close()
     assert made.duration == pytest.approx(seconds)
@@ -104,18 +104,18 @@ def test_a_voice_at_its_limit_is_not_asked_for_ever() -> None:
     class Rigid:
         name = "rigid"
 
-        def say(self, request: Say) -> Utterance:
+        def say(self, request: SpeechRequest) -> Utterance:
             asked.append(request.rate)
             return Utterance(1.0, (), (), {})
 
         def close(self) -> None:
             pass
 
-    assert fitted(Rigid(), Say("x", seconds=3.0)).duration == 3.0
+    assert speak_to_length(Rigid(), SpeechRequest("x", seconds=3.0)).duration == 3.0
     assert len(asked) == 2
 
 
 def test_what_was_joined_of_parts_is_one_when_it_is_stretched() -> None:
     made = SilentVoice().say(SAY)
-    whole = replace(made, parts=((0.0, made),))
-    assert stretched(whole, {"end": 1.1 * made.duration}).parts == ()
+    whole = replace(made, sections=((0.0, made),))
+    assert stretched(whole, {"end": 1.1 * made.duration}).sections == ()

@@ -7,7 +7,7 @@ from pathlib import Path
 from realizer.speech.engine_process import Engine
 from realizer.speech.engine_voice import EngineVoice
 from realizer.speech.ssml import Script
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 class Counting(EngineVoice):
@@ -15,28 +15,28 @@ class Counting(EngineVoice):
     worker = Engine("counting", Path("none.py"), lambda: None)
     asked = 0
 
-    def _synthesize(self, request: Say, script: Script) -> Utterance:
+    def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
         self.asked += 1
         return Utterance(1.0, (), (), {})
 
 
 def test_engine_voice_speaks_the_same_request_once() -> None:
     voice = Counting()
-    assert voice.say(Say("Hello")) is voice.say(Say("Hello"))
-    voice.say(Say("Bye"))
+    assert voice.say(SpeechRequest("Hello")) is voice.say(SpeechRequest("Hello"))
+    voice.say(SpeechRequest("Bye"))
     assert voice.asked == 2
 
 
 def test_engine_voice_says_nothing_without_its_engine() -> None:
     voice = Counting()
-    said = voice.say(Say('<mark name="m"/> ', marks=("m",)))
+    said = voice.say(SpeechRequest('<mark name="m"/> ', marks=("m",)))
     assert (said.duration, said.marks, voice.asked, voice.pid) == (0.0, {"m": 0.0}, 0, None)
     assert said.warnings
 
 
 def test_engine_voice_asks_for_a_break() -> None:
     voice = Counting()
-    voice.say(Say('<break time="1s"/>'))
+    voice.say(SpeechRequest('<break time="1s"/>'))
     assert voice.asked == 1
 
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.xdist_group("voices")
 
 def test_voices_are_listed_with_what_they_are() -> None:
     assert [voice.name for voice in voices()] == ["espeak", "hibari", "silent"]
-    assert all(voice.says for voice in voices())
+    assert all(voice.description for voice in voices())
 
 
 def test_a_voice_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -26,7 +26,7 @@ def test_a_voice_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.Mo
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "hibari" else real(name))
     listed = {voice.name: voice for voice in voices()}
     assert not listed["hibari"].available
-    assert "pip install 'bml-realizer[neural]'" in listed["hibari"].says
+    assert "pip install 'bml-realizer[neural]'" in listed["hibari"].description
     with pytest.raises(VoiceError, match=r"pip install 'bml-realizer\[neural\]'"):
         find_voice("hibari")
 
@@ -54,17 +54,21 @@ def test_every_voice_says_what_it_is_or_what_to_install() -> None:
     listed = {voice.name: voice for voice in voices()}
     assert {"espeak", "silent"} <= set(listed)
     assert listed["silent"].available
-    assert all(len(voice.says) > 20 for voice in listed.values())
+    assert all(len(voice.description) > 20 for voice in listed.values())
 
 
 def test_without_an_engine_the_voice_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.speech.espeak.voice.missing", lambda: "pip install 'bml-realizer[speech]'")
-    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: None)
+    monkeypatch.setattr(
+        "realizer.speech.espeak.voice.install_hint", lambda: "pip install 'bml-realizer[speech]'"
+    )
+    monkeypatch.setattr("realizer.speech.hibari.voice.install_hint", lambda: None)
     assert find_voice(None).name == "hibari"
-    monkeypatch.setattr("realizer.speech.hibari.voice.missing", lambda: "pip install 'bml-realizer[neural]'")
+    monkeypatch.setattr(
+        "realizer.speech.hibari.voice.install_hint", lambda: "pip install 'bml-realizer[neural]'"
+    )
     assert find_voice(None).name == "silent"
     assert not voices()[0].available
-    assert "pip install" in voices()[0].says
+    assert "pip install" in voices()[0].description
     with pytest.raises(VoiceError, match="pip install"):
         find_voice("espeak:nl")
 

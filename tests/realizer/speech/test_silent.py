@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.lips.lip_sync import lip_channels
-from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, units
+from realizer.speech.letter_to_sound import letters_to_phonemes, syllable_facts, vowel_units
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 
 COUNTED = {
     "en": "hello 2 banana 3 pleased 1 the 1 make 1 makes 1 table 2 tables 2 wanted 2 needed 2 houses 2 "
@@ -30,15 +30,15 @@ COUNTED = {
 def test_words_have_as_many_units_as_syllables(language: str) -> None:
     words = COUNTED[language].split()
     wrong = {
-        w: units(w, language)
+        w: vowel_units(w, language)
         for w, n in zip(words[::2], words[1::2], strict=True)
-        if units(w, language) != int(n)
+        if vowel_units(w, language) != int(n)
     }
     assert not wrong
 
 
 def test_words_last_their_units_and_punctuation_one() -> None:
-    said = SilentVoice().say(Say("Banana, dog."))
+    said = SilentVoice().say(SpeechRequest("Banana, dog."))
     unit = syllable_facts()["unit"]
     assert [(w.text, round((w.end - w.start) / unit)) for w in said.words] == [("Banana", 3), ("dog", 1)]
     assert said.words[1].start - said.words[0].end == pytest.approx(unit)
@@ -48,30 +48,32 @@ def test_words_last_their_units_and_punctuation_one() -> None:
 
 def test_marks_are_at_the_next_word_or_the_end() -> None:
     said = SilentVoice().say(
-        Say('<mark name="a"/>One, <mark name="b"/>two.<mark name="c"/>', ("a", "b", "c"))
+        SpeechRequest('<mark name="a"/>One, <mark name="b"/>two.<mark name="c"/>', ("a", "b", "c"))
     )
     assert said.marks == {"a": said.words[0].start, "b": said.words[1].start, "c": said.words[1].end}
 
 
 def test_breaks_and_prosody_take_their_time() -> None:
-    plain = SilentVoice().say(Say("one two")).duration
-    assert SilentVoice().say(Say('one <break time="700ms"/> two')).duration == pytest.approx(plain + 0.7)
-    slow = SilentVoice().say(Say('one <prosody rate="50%">two</prosody>'))
+    plain = SilentVoice().say(SpeechRequest("one two")).duration
+    assert SilentVoice().say(SpeechRequest('one <break time="700ms"/> two')).duration == pytest.approx(
+        plain + 0.7
+    )
+    slow = SilentVoice().say(SpeechRequest('one <prosody rate="50%">two</prosody>'))
     assert slow.words[1].end - slow.words[1].start == pytest.approx(0.4)
-    assert SilentVoice().say(Say('<sub alias="World Wide Web">WWW</sub>')).words[2].text == "Web"
+    assert SilentVoice().say(SpeechRequest('<sub alias="World Wide Web">WWW</sub>')).words[2].text == "Web"
 
 
 def test_rate_divides_time() -> None:
     spans = [
         (said.words[-1].end - said.words[0].start)
-        for said in (SilentVoice().say(Say("one, two banana", rate=rate)) for rate in (0.5, 1, 2))
+        for said in (SilentVoice().say(SpeechRequest("one, two banana", rate=rate)) for rate in (0.5, 1, 2))
     ]
     assert spans[0] == pytest.approx(2 * spans[1])
     assert spans[1] == pytest.approx(2 * spans[2])
 
 
 def test_digits_are_read_by_their_names() -> None:
-    assert units("104", "en") == 4
+    assert vowel_units("104", "en") == 4
     assert letters_to_phonemes("2", "fr") == letters_to_phonemes("deux", "fr")
 
 
@@ -90,14 +92,14 @@ def test_letters_become_phonemes(word: str, language: str, ipa: str) -> None:
 
 
 def test_an_empty_text_takes_no_time() -> None:
-    said = SilentVoice().say(Say('<mark name="m"/> '))
+    said = SilentVoice().say(SpeechRequest('<mark name="m"/> '))
     assert (said.duration, said.marks) == (0.0, {"m": 0.0})
     assert said.warnings
 
 
 @given(st.text(max_size=80), st.sampled_from(["en", "nl", "fr", "de", "es", "pl", "zh", "xx", ""]))
 def test_any_text_has_times_in_order(text: str, language: str) -> None:
-    said = SilentVoice().say(Say(text, language=language))
+    said = SilentVoice().say(SpeechRequest(text, language=language))
     edges = [said.phonemes[0].start, *(p.end for p in said.phonemes)] if said.phonemes else [0.0]
     assert edges == sorted(edges)
     assert edges[-1] == pytest.approx(said.duration)

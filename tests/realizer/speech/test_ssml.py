@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from realizer.core.errors import VoiceError
 from realizer.speech.espeak.document import write_document
-from realizer.speech.ssml import MOST_TEXT, Break, Mark, Tag, read_script
-from realizer.speech.utterance import Say
+from realizer.speech.ssml import MAX_TEXT, Break, Mark, Tag, read_script
+from realizer.speech.utterance import SpeechRequest
 
 
 def parts(ssml: str) -> tuple[object, ...]:
-    return read_script(Say(ssml)).parts
+    return read_script(SpeechRequest(ssml)).parts
 
 
 def test_blanks_are_one_and_marks_keep_their_place() -> None:
@@ -31,28 +31,28 @@ def test_breaks_have_seconds_and_a_limit() -> None:
 
 def test_only_elements_and_attributes_of_speech_are_kept() -> None:
     script = read_script(
-        Say('<prosody rate="fast" onclick="x">a</prosody><audio src="/etc/passwd">b</audio>')
+        SpeechRequest('<prosody rate="fast" onclick="x">a</prosody><audio src="/etc/passwd">b</audio>')
     )
     assert script.parts == (Tag("prosody", (("rate", "fast"),)), "a", Tag("prosody", None), "b")
     assert "passwd" not in write_document(script).text
 
 
 def test_a_bml_sync_is_a_mark() -> None:
-    assert read_script(Say('a <bml:sync id="x"/>b')).marks == ("x",)
+    assert read_script(SpeechRequest('a <bml:sync id="x"/>b')).marks == ("x",)
 
 
 def test_the_longest_text_is_still_taken() -> None:
-    assert read_script(Say("a" * MOST_TEXT)).text
+    assert read_script(SpeechRequest("a" * MAX_TEXT)).text
     with pytest.raises(VoiceError, match="split it"):
-        read_script(Say("a" * (MOST_TEXT + 1)))
+        read_script(SpeechRequest("a" * (MAX_TEXT + 1)))
 
 
 @given(st.text(max_size=200))
 def test_any_text_makes_a_script_that_can_be_written(text: str) -> None:
-    script = read_script(Say(text))
+    script = read_script(SpeechRequest(text))
     document = write_document(script)
     document.text.encode()
-    assert read_script(Say(document.text[7:-8])).text == script.text
+    assert read_script(SpeechRequest(document.text[7:-8])).text == script.text
 
 
 @given(
@@ -61,7 +61,7 @@ def test_any_text_makes_a_script_that_can_be_written(text: str) -> None:
     )
 )
 def test_any_jumble_of_markup_keeps_its_words(pieces: list[str]) -> None:
-    script = read_script(Say("".join(pieces)))
+    script = read_script(SpeechRequest("".join(pieces)))
     assert script.text.count("one") == pieces.count("one")
     # A name is that of one place: the first.
     assert script.marks == ("m",) * ('<mark name="m"/>' in pieces)

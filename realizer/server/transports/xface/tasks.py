@@ -192,7 +192,7 @@ class Desk:
         else:
             self._count += 1
             block = f"xface-{self.owner}-{self._count}"
-            document = document_of(self._clip.since(self._first), block)
+            document = document_of(self._clip.from_frame(self._first), block)
             self._playing = _Running(task, {block}, self._clip)
             self._moved = {}
             yield _held({})

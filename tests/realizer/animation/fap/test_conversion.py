@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import tables
-from realizer.animation.axis import AU_NAMES, axis, fap, presence
+from realizer.animation.axis import AU_NAMES, axis, fap, mask_channel
 from realizer.animation.fap.au_fap_mapping import FapMapping
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.frames import AUFrames
@@ -160,7 +160,7 @@ def test_columns_of_speech_and_presences_are_where_the_frames_look_for_them() ->
     clip = frames({"head_roll": 5.0, "lips": 0.5})
     assert clip.faps[0, 49] == 5
     assert fap(50).name == "head_roll"
-    assert clip.values[0, presence("lips").column] == 0.5
+    assert clip.values[0, mask_channel("lips").column] == 0.5
 
 
 @pytest.mark.parametrize(("inner", "middle", "side"), [(31, 33, "L"), (32, 34, "R")])

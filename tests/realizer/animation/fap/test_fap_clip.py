@@ -68,5 +68,5 @@ def test_what_is_no_rate_is_refused(fps: float) -> None:
 
 
 def test_what_is_left_of_a_clip_keeps_its_rate_and_its_visemes() -> None:
-    got = clip([1, 2, 3], 30).since(1)
+    got = clip([1, 2, 3], 30).from_frame(1)
     assert (got.fps, got.values[:, 2].tolist(), got.visemes[:, 0].tolist()) == (30, [2, 3], [1, 2])

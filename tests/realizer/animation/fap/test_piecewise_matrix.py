@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.animation.axis import AU_NAMES, au
-from realizer.animation.fap.piecewise_matrix import Demand
+from realizer.animation.fap.piecewise_matrix import PiecewiseMatrix
 from realizer.core.array_types import Float32
 from realizer.tables import AuToFap
 
@@ -18,8 +18,8 @@ def asked(rows: tuple[AuToFap, ...], fap: int) -> Float32:
     aus = np.zeros((len(AU_NAMES()), len(AT)), np.float32)
     aus[au(26)[0].column] = AT
     live = tuple(range(len(aus)))
-    asking = Demand.of(rows).among(live)
-    raised, lowered = asking.of(aus)
+    asking = PiecewiseMatrix.of(rows).among(live)
+    raised, lowered = asking.evaluate(aus)
     raised[: len(lowered)] -= lowered
     total = np.zeros((68, len(AT)), np.float32)
     total[asking.faps] = raised
@@ -37,7 +37,7 @@ def test_no_rows_ask_nothing() -> None:
 
 
 def test_the_mask_holds_what_rows_and_speech_may_use() -> None:
-    mask = Demand.of((AuToFap(9, "L", 63, 0.0, 1.0, 0.0, 30.0),)).mask
+    mask = PiecewiseMatrix.of((AuToFap(9, "L", 63, 0.0, 1.0, 0.0, 30.0),)).mask
     assert mask[62]
     assert mask[2]  # speech opens the jaw
     assert not mask[[0, 1, 30]].any()
@@ -45,8 +45,8 @@ def test_the_mask_holds_what_rows_and_speech_may_use() -> None:
 
 def test_what_goes_up_and_then_down_raises_and_lowers() -> None:
     rows = (AuToFap(26, "", 3, 0.0, 0.5, 0.0, 100.0), AuToFap(26, "", 3, 0.5, 1.0, 100.0, -100.0))
-    asking = Demand.of(rows).among((au(26)[0].column,))
-    raised, lowered = asking.of(np.array([AT], np.float32))
+    asking = PiecewiseMatrix.of(rows).among((au(26)[0].column,))
+    raised, lowered = asking.evaluate(np.array([AT], np.float32))
     assert asking.faps.tolist() == [2]
     assert raised[0] == pytest.approx([0, 20, 40, 60, 100, 20, 0, 0], abs=1e-3)
     assert lowered[0] == pytest.approx([0, 0, 0, 0, 0, 0, 60, 100], abs=1e-3)

@@ -59,7 +59,7 @@ def test_eyes_take_the_time_of_a_saccade_from_point_to_point() -> None:
     motion = idle_face(0, 60, 1).motion
     eyes = replace(motion, poses=np.zeros_like(motion.poses))  # a head that keeps still
     most = np.array([tables.by_number()[int(AU_NAMES()[column])].degrees for column in motion.columns[-4:]])
-    for start, lasts in zip(motion.jumps[3:50], motion.lasts[3:50], strict=True):
+    for start, lasts in zip(motion.jumps[3:50], motion.durations[3:50], strict=True):
         times = start + lasts * np.arange(-0.25, 1.26, 0.05)
         degrees = (eyes.at(times)[-4:] * most[:, None]).reshape(2, 2, -1)
         gaze = degrees[:, 1] - degrees[:, 0]

@@ -14,14 +14,14 @@ from realizer.animation.blend import blend
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.idle.motion import idle_face
-from realizer.animation.idle.prosody import Asked, Talk, phrase_ends, prosody_channels
+from realizer.animation.idle.prosody import KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.core.array_types import Float64
 from realizer.speech.accents import phrases, prosody_facts
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 SAID = SilentVoice().say(
-    Say(
+    SpeechRequest(
         "Good morning, I am really glad to see everybody here today. Whoever follows the river to the "
         "tower, will discover a little door, and nobody remembers where it was hidden before."
     )
@@ -32,12 +32,12 @@ LID = au(45, "LEFT")[0].column
 SEEDS = st.integers(0, 2**40)
 
 
-def talk(start: float = 0.0, until: float = FOREVER, said: Utterance = SAID) -> Talk:
-    return Talk(start, until, said)
+def talk(start: float = 0.0, until: float = FOREVER, said: Utterance = SAID) -> SpeechSpan:
+    return SpeechSpan(start, until, said)
 
 
 def shown(
-    talks: Sequence[Talk], seed: int, times: Float64, asked: Sequence[Asked] = ()
+    talks: Sequence[SpeechSpan], seed: int, times: Float64, asked: Sequence[KnownMotion] = ()
 ) -> dict[str, Float64]:
     """Degrees of the head (down positive) and of the eyes, and how far the brows are up."""
     channels = prosody_channels(talks, float(times[0]), float(times[-1]), seed, asked)
@@ -54,13 +54,13 @@ def shown(
     }
 
 
-def whole(seed: int, *, step: float = 0.01, asked: Sequence[Asked] = ()) -> dict[str, Float64]:
+def whole(seed: int, *, step: float = 0.01, asked: Sequence[KnownMotion] = ()) -> dict[str, Float64]:
     return shown([talk()], seed, np.arange(0.0, SAID.duration + 1.0, step), asked)
 
 
-def held(number: int, begin: float, end: float, known: float = 0.0, layer: Layer = Layer.HEAD) -> Asked:
+def held(number: int, begin: float, end: float, known: float = 0.0, layer: Layer = Layer.HEAD) -> KnownMotion:
     keys = np.array([begin, (begin + end) / 2, end])
-    return Asked(known, Channel(au(number)[0], keys, np.array([0.0, 0.5, 0.0]), layer=layer))
+    return KnownMotion(known, Channel(au(number)[0], keys, np.array([0.0, 0.5, 0.0]), layer=layer))
 
 
 @given(SEEDS, st.floats(0.0, 10_000.0))
@@ -140,7 +140,7 @@ def test_two_nods_keep_their_distance(seed: int) -> None:
 
 def test_a_nod_leaves_the_eyes_where_they_look() -> None:
     times = np.arange(0.0, 2.0, 0.01)
-    said = SilentVoice().say(Say("Hello everybody"))  # too short to look aside
+    said = SilentVoice().say(SpeechRequest("Hello everybody"))  # too short to look aside
     for seed in range(5):
         seen = shown([talk(said=said)], seed, times)
         np.testing.assert_allclose(seen["pitch"], -seen["head"], atol=0.01)
@@ -159,7 +159,7 @@ def test_who_speaks_looks_aside_for_some_of_the_time_and_back_at_the_end_of_each
 
 
 def test_a_greeting_is_said_to_the_others_face() -> None:
-    said = SilentVoice().say(Say("Good morning, everybody"))
+    said = SilentVoice().say(SpeechRequest("Good morning, everybody"))
     for seed in range(50):
         assert np.abs(shown([talk(said=said)], seed, np.arange(0, 3, 0.01))["yaw"]).max() == 0.0
 
@@ -176,7 +176,7 @@ def test_a_nod_of_a_document_is_not_nodded_into(seed: int, begin: float, length:
     assert np.abs(whole_at(times, seed, asked)["head"][inside]).max(initial=0.0) == 0.0
 
 
-def whole_at(times: Float64, seed: int, asked: Sequence[Asked]) -> dict[str, Float64]:
+def whole_at(times: Float64, seed: int, asked: Sequence[KnownMotion]) -> dict[str, Float64]:
     return shown([talk()], seed, times, asked)
 
 
@@ -188,16 +188,16 @@ def whole_at(times: Float64, seed: int, asked: Sequence[Asked]) -> dict[str, Flo
             (Channel(fap(number), np.array([0.0, 12.0]), np.array([90.0, 90.0]), layer=Layer.FAPS), "brows")
             for number in range(31, 39)
         ),
-        (Channel(au(1)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, holds=True), "brows"),
+        (Channel(au(1)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, keeps_last=True), "brows"),
         (Channel(au(61)[0], np.array([0.0, 12.0]), np.array([0.2, 0.2]), layer=Layer.GAZE), "yaw"),
-        (Channel(au(62)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, holds=True), "yaw"),
+        (Channel(au(62)[0], np.array([0.0]), np.array([0.2]), layer=Layer.BASE, keeps_last=True), "yaw"),
         (Channel(au(55)[0], np.array([0.0, 12.0]), np.array([0.2, 0.2]), layer=Layer.HEAD), "head"),
     ],
     ids=["frown", *(f"FAP {number}" for number in range(31, 39)), "mood", "gaze", "base gaze", "tilt"],
 )
 def test_what_a_document_moves_is_left_alone_and_only_that(channel: Channel, part: str) -> None:
     for seed in range(10):
-        alone, beside = whole(seed), whole(seed, asked=[Asked(0.0, channel)])
+        alone, beside = whole(seed), whole(seed, asked=[KnownMotion(0.0, channel)])
         assert np.abs(beside[part]).max() == 0.0
         for name in {"head", "brows", "yaw"} - {part}:
             np.testing.assert_array_equal(alone[name], beside[name])
@@ -205,8 +205,8 @@ def test_what_a_document_moves_is_left_alone_and_only_that(channel: Channel, par
 
 def test_a_smile_and_a_base_direction_of_the_head_are_in_nobodys_way() -> None:
     keys, values = np.array([0.0, 12.0]), np.array([0.5, 0.5])
-    asked = [Asked(0.0, Channel(au(12)[0], keys, values))]
-    asked.append(Asked(0.0, Channel(au(53)[0], keys, values, layer=Layer.BASE)))
+    asked = [KnownMotion(0.0, Channel(au(12)[0], keys, values))]
+    asked.append(KnownMotion(0.0, Channel(au(53)[0], keys, values, layer=Layer.BASE)))
     alone, beside = whole(1), whole(1, asked=asked)
     assert all(np.array_equal(alone[name], beside[name]) for name in alone)
 
@@ -231,7 +231,7 @@ def test_who_is_interrupted_keeps_still_soon_and_without_a_jump(seed: int, now: 
         assert np.abs(seen[name][times > now + 0.21]).max() < 1e-3
 
 
-def blinks(seed: int, until: float, talks: Sequence[Talk]) -> Float64:
+def blinks(seed: int, until: float, talks: Sequence[SpeechSpan]) -> Float64:
     return np.sort(idle_face(0.0, until, seed, phrase_ends(talks)).blinks.onsets)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, held, lips_taken
+from realizer.animation.lips.closures import BILABIAL, LABIODENTAL, closure_mask, lip_weight
 from realizer.animation.lips.dominance import key_times, track_of
 from realizer.animation.lips.visemes import coarticulation, sounds
 from realizer.core.array_types import Bool, Float64
@@ -30,14 +30,14 @@ def holds(*said: tuple[str, float]) -> tuple[Float64, Bool, Bool]:
     found = phonemes(*said)
     track, times = track_of(found), key_times(found)
     assert track is not None
-    return (times, *held(track, times))
+    return (times, *closure_mask(track, times))
 
 
 def taken(*said: tuple[str, float]) -> tuple[Float64, Float64]:
     found = phonemes(*said)
     track, times = track_of(found), key_times(found)
     assert track is not None
-    return times, lips_taken(track, times)
+    return times, lip_weight(track, times)
 
 
 def longest(times: Float64, mine: Bool) -> float:
@@ -109,7 +109,7 @@ def test_they_are_never_taken_by_jumps(said: list[tuple[str, float]]) -> None:
     track, times = track_of(found), key_times(found)
     if track is None:
         return
-    lips = lips_taken(track, times)
+    lips = lip_weight(track, times)
     assert lips.min() >= 0
     assert lips.max() <= 1
     least = coarticulation()["pauses"]["least"]

@@ -7,7 +7,7 @@ import pytest
 from bml_schema import parse
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.documents.pending_blocks import Preparation
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 from tests.realizer.server.conftest import spoken
 
 
@@ -20,7 +20,10 @@ def talking() -> Preparation:
     """A block "a" whose speech 1 is still to be spoken."""
     preparation = Preparation()
     preparation.add(
-        block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'), 0, {1: ("s", Say("Hi"))}, 0.0
+        block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'),
+        0,
+        {1: ("s", SpeechRequest("Hi"))},
+        0.0,
     )
     return preparation
 

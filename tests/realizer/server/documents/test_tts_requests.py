@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from bml_schema.feedback import PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.core.errors import VoiceError
 from realizer.server.documents.tts_requests import PATIENCE
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Say
+from realizer.speech.utterance import SpeechRequest
 from tests.realizer.server.conftest import RATE, Client, Driver
 
 SENTENCE = "Number {} is here, and it is late; nobody knows why we should have been there. "
@@ -36,7 +36,7 @@ def answer(driver: Driver, voice=None) -> bool:
         return False
     driver.answered = answered + 1
     order = driver.spoken[answered]
-    driver.say(order.id, fitted(voice or SilentVoice(), order.say))
+    driver.say(order.id, speak_to_length(voice or SilentVoice(), order.say))
     return True
 
 
@@ -105,7 +105,7 @@ def test_lips_move_in_every_part_and_do_not_jump_where_the_next_one_comes() -> N
     lasts = driver.session.player.speech()[0].utterance
     client = driver.run(lasts.duration + 1)
     mouth = np.array([f.values[3:5] for f in client.frames if f.stream == "fap"])
-    for start, part in lasts.parts:
+    for start, part in lasts.sections:
         own = mouth[round(start * 25) : round((start + part.duration) * 25)]
         assert np.abs(own).max() > 100
     one = Driver(idle=False, mute=True)
@@ -149,10 +149,10 @@ def test_a_part_that_comes_too_late_is_heard_when_it_comes() -> None:
     driver = Driver(mute=True)
     driver.send(BLOCK.format("b", "", TEXT, ""))
     answer(driver)
-    made = driver.session.player.speech()[0].utterance.parts[0][1].duration
+    made = driver.session.player.speech()[0].utterance.sections[0][1].duration
     driver.run(made + 2.0)
     answer(driver)
-    parts = driver.session.player.speech()[0].utterance.parts
+    parts = driver.session.player.speech()[0].utterance.sections
     assert parts[1][0] == pytest.approx(made + 2.05, abs=0.01)
 
 
@@ -184,7 +184,7 @@ def test_the_text_of_a_block_that_is_activated_later_is_whole() -> None:
 
 def test_a_text_that_has_to_last_longer_is_said_again_in_one(voice) -> None:
     text = "".join(SENTENCE.format(n) for n in range(4))
-    asked = 1.1 * voice.say(Say(text)).duration
+    asked = 1.1 * voice.say(SpeechRequest(text)).duration
     driver = Driver(mute=True)
     timed = f'<bml id="b"><speech id="s" start="0" end="{asked}"><text>{text}</text></speech></bml>'
     driver.send(timed)

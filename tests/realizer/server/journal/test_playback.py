@@ -16,7 +16,7 @@ from realizer.server.journal.playback import played
 from realizer.server.journal.recordings import FolderJournal, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 
 SETTINGS = Settings(voice="silent", seed=3)
@@ -47,7 +47,7 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
             session.receive(1, coming.pop(0)[1], now)
         while answers and answers[0][0] <= now:
             order = answers.pop(0)[1]
-            session.spoken(order.id, fitted(SilentVoice(), order.say), now)
+            session.spoken(order.id, speak_to_length(SilentVoice(), order.say), now)
         session.tick(now)
         for effect in session.outgoing():
             if isinstance(effect, Speak):
@@ -90,7 +90,7 @@ def test_a_record_that_broke_off_in_a_speech_ends_with_what_had_been_said(tmp_pa
         session.tick(now)
         for effect in session.outgoing():
             if isinstance(effect, Speak):
-                session.spoken(effect.id, fitted(SilentVoice(), effect.say), now)
+                session.spoken(effect.id, speak_to_length(SilentVoice(), effect.say), now)
     record.close()
     (path,) = tmp_path.glob("*.jsonl")
     realization, again = played(read_record(path))

@@ -21,7 +21,7 @@ from realizer.server.journal.playback import played
 from realizer.server.journal.recordings import FolderJournal, Record, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from tests.waking import wakes
 
@@ -73,7 +73,7 @@ def recorded(
             session.receive(1, coming.pop(0)[1], now)
         elif answers and answers[0][0] <= now:
             order = answers.pop(0)[1]
-            session.spoken(order.id, fitted(SilentVoice(), order.say), now)
+            session.spoken(order.id, speak_to_length(SilentVoice(), order.say), now)
         else:
             session.tick(now)
         for effect in session.outgoing():

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.animation.axis import axis
-from realizer.animation.channel import Channel, Gain, Joint, Layer
-from realizer.animation.idle.blinks import Fewer
+from realizer.animation.channel import Channel, Crossfade, Gain, Layer
+from realizer.animation.idle.blinks import BlinkReduction
 from realizer.playback.character import BaseShift, Character
 from realizer.scheduling.timing import Schedule
 from realizer.server.journal.serialization import character_of, plain_character, plain_schedule, schedule_of
@@ -27,17 +27,17 @@ def channels(draw: st.DrawFn) -> Channel:
     times = draw(TIMES)
     values = st.lists(NUMBER, min_size=len(times), max_size=len(times)).map(np.array)
     gains = draw(st.lists(st.builds(Gain, NUMBER, NUMBER, NUMBER, st.sampled_from(("smooth", "linear")))))
-    return draw(st.sampled_from((Channel, Fewer)))(
+    return draw(st.sampled_from((Channel, BlinkReduction)))(
         axis()[draw(st.sampled_from(sorted(axis())))],
         np.array(times),
         draw(values),
         curve=draw(st.sampled_from(("smooth", "linear"))),
         layer=draw(st.sampled_from(Layer)),
-        holds=draw(st.booleans()),
+        keeps_last=draw(st.booleans()),
         gains=tuple(gains),
         until=draw(NUMBER | st.just(math.inf)),
-        joint=draw(st.none() | st.builds(Joint, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER)),
-        there=draw(st.none() | values),
+        crossfade=draw(st.none() | st.builds(Crossfade, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER)),
+        weight=draw(st.none() | values),
         source=draw(NAMES),
     )
 
@@ -64,7 +64,7 @@ def same(one: object, other: object) -> bool:
     if isinstance(one, dict):
         assert isinstance(other, dict)
         return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
-    if isinstance(one, list | tuple) and not isinstance(one, Gain | Joint):
+    if isinstance(one, list | tuple) and not isinstance(one, Gain | Crossfade):
         assert isinstance(other, list | tuple)
         return len(one) == len(other) and all(map(same, one, other))
     return one == other

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from realizer.server.speech.long_text import PART, SHORT, Growing
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Phoneme, Recording, Say, Utterance, Word
+from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
 
 SENTENCES = [
     "When all of them had come to the house by the sea, they sat down and waited for him.",
@@ -32,7 +32,7 @@ def voice():
     voice.close()
 
 
-def grown(voice, say: Say) -> tuple[list[Say], list[Utterance]]:
+def grown(voice, say: SpeechRequest) -> tuple[list[SpeechRequest], list[Utterance]]:
     """The parts, and the utterance after each of them."""
     growing, parts, made = Growing(say), [], []
     while (part := growing.next()) is not None:
@@ -42,7 +42,7 @@ def grown(voice, say: Say) -> tuple[list[Say], list[Utterance]]:
 
 
 def test_the_first_part_is_a_clause_and_all_of_them_are_the_text() -> None:
-    parts, _ = grown(SilentVoice(), Say(TEXT, MARKS))
+    parts, _ = grown(SilentVoice(), SpeechRequest(TEXT, MARKS))
     assert parts[0].ssml == "When all of them had come to the house by the sea,"
     assert "".join(p.ssml for p in parts) == TEXT
     assert tuple(m for p in parts for m in p.marks) == MARKS
@@ -50,7 +50,7 @@ def test_the_first_part_is_a_clause_and_all_of_them_are_the_text() -> None:
 
 
 def test_what_is_said_in_another_manner_is_so_in_each_part(voice) -> None:
-    slow = Say(f'<prosody rate="slow">{TEXT}</prosody>', MARKS)
+    slow = SpeechRequest(f'<prosody rate="slow">{TEXT}</prosody>', MARKS)
     parts, made = grown(voice, slow)
     assert parts[0].ssml.count(" ") < 15
     assert len(parts) > 4
@@ -58,12 +58,14 @@ def test_what_is_said_in_another_manner_is_so_in_each_part(voice) -> None:
     assert [p.ssml.count("<prosody") - p.ssml.count("</prosody") for p in parts] == [0] * len(parts)
     assert made[-1].duration == pytest.approx(voice.say(slow).duration, rel=0.01)
     assert set(made[-1].marks) == set(MARKS)
-    twice = Say(f'<prosody rate="slow">{TEXT}</prosody> And <prosody rate="fast">{TEXT}</prosody>', MARKS)
+    twice = SpeechRequest(
+        f'<prosody rate="slow">{TEXT}</prosody> And <prosody rate="fast">{TEXT}</prosody>', MARKS
+    )
     assert all(p.ssml.count("<prosody") == p.ssml.count("</prosody") for p in grown(SilentVoice(), twice)[0])
 
 
 def test_what_is_made_does_not_change_when_more_comes(voice) -> None:
-    _, made = grown(voice, Say(TEXT, MARKS))
+    _, made = grown(voice, SpeechRequest(TEXT, MARKS))
     for before, after in pairwise(made):
         length = len(before.pcm)
         assert np.array_equal(after.pcm[:length], before.pcm)
@@ -71,15 +73,15 @@ def test_what_is_made_does_not_change_when_more_comes(voice) -> None:
         done = {m: t for m, t in before.marks.items() if t <= length / before.sample_rate - 0.001}
         assert {m: after.marks[m] for m in done} == done
     assert made[-1].duration == pytest.approx(len(made[-1].pcm) / made[-1].sample_rate)
-    assert [w.text for w in made[-1].words] == [w.text for w in voice.say(Say(TEXT, MARKS)).words]
+    assert [w.text for w in made[-1].words] == [w.text for w in voice.say(SpeechRequest(TEXT, MARKS)).words]
 
 
 def test_marks_are_exact_against_the_sound(voice) -> None:
     """Where a part stands in the sound of the whole, its own sound does, and its marks with it."""
-    parts, made = grown(voice, Say(TEXT, MARKS))
+    parts, made = grown(voice, SpeechRequest(TEXT, MARKS))
     whole = made[-1]
     assert set(whole.marks) == set(MARKS)
-    for part, (start, utterance) in zip(parts, whole.parts, strict=True):
+    for part, (start, utterance) in zip(parts, whole.sections, strict=True):
         first = start * whole.sample_rate
         assert first == pytest.approx(round(first), abs=1e-6), "to the sample"
         assert np.array_equal(whole.pcm[round(first) :][: len(utterance.pcm)], utterance.pcm)
@@ -89,21 +91,21 @@ def test_marks_are_exact_against_the_sound(voice) -> None:
 
 
 def test_the_seams_are_pauses_as_in_the_whole_and_do_not_click(voice) -> None:
-    said, (parts, made) = voice.say(Say(TEXT, MARKS)), grown(voice, Say(TEXT, MARKS))
+    said, (parts, made) = voice.say(SpeechRequest(TEXT, MARKS)), grown(voice, SpeechRequest(TEXT, MARKS))
     joined = made[-1]
     assert joined.duration == pytest.approx(said.duration, abs=0.02 * len(parts))
     late = np.array([b.start - a.start for a, b in zip(said.words, joined.words, strict=True)])
     assert np.abs(np.diff(late)).max() < 0.02, "no pause is longer or shorter by more"
     pcm = joined.pcm.astype(float)
     steps = np.abs(np.diff(pcm))
-    for start, _ in joined.parts[1:]:
+    for start, _ in joined.sections[1:]:
         at = round(start * joined.sample_rate)
         assert np.abs(pcm[at - 20 : at]).max() < 30, "it ends in silence"
         assert steps[at - 1] < 0.01 * steps.max(), "and begins softly"
 
 
 def test_the_end_and_the_marks_that_are_to_come_are_guessed(voice) -> None:
-    _, made = grown(voice, Say(TEXT, MARKS))
+    _, made = grown(voice, SpeechRequest(TEXT, MARKS))
     end = made[-1].duration
     assert [abs(u.duration / end - 1) < 0.25 for u in made] == [True] * len(made)
     assert abs(made[1].duration / end - 1) < 0.1
@@ -113,11 +115,11 @@ def test_the_end_and_the_marks_that_are_to_come_are_guessed(voice) -> None:
 
 
 def test_a_part_that_comes_late_leaves_silence_before_it(voice) -> None:
-    growing = Growing(Say(TEXT, MARKS))
+    growing = Growing(SpeechRequest(TEXT, MARKS))
     first = growing.take(voice.say(growing.next()))
     made = growing.made
     second = growing.take(voice.say(growing.next()), made + 1.0)
-    start = second.parts[1][0]
+    start = second.sections[1][0]
     assert start == pytest.approx(made + 1.0, abs=1e-3)
     between = second.pcm[len(first.pcm) : round(start * second.sample_rate)]
     assert len(between) == pytest.approx(second.sample_rate, abs=40)
@@ -126,7 +128,7 @@ def test_a_part_that_comes_late_leaves_silence_before_it(voice) -> None:
 
 
 def test_a_voice_that_fails_in_between_leaves_silence(voice) -> None:
-    growing = Growing(Say(TEXT))
+    growing = Growing(SpeechRequest(TEXT))
     growing.take(SilentVoice().say(growing.next()))
     made = growing.made
     loud = growing.take(voice.say(growing.next()))
@@ -136,7 +138,7 @@ def test_a_voice_that_fails_in_between_leaves_silence(voice) -> None:
 
 
 def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
-    growing = Growing(Say(TEXT))
+    growing = Growing(SpeechRequest(TEXT))
     growing.next()
     tone = np.full(800, 1000, np.int16)
     growing.take(Utterance(0.1, (Word(0, 0.1, "a"),), (Phoneme(0, 0.1, "a"),), {}, 8000, tone))
@@ -149,10 +151,10 @@ def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
 @pytest.mark.parametrize(
     ("say", "suits"),
     [
-        (Say("x" * SHORT), False),
-        (Say("x" * (SHORT + 1)), True),
-        (Say("x" * 1000, seconds=3.0), False),
-        (Say("x" * 1000, recording=Recording(8000, np.zeros(8, np.int16))), False),
+        (SpeechRequest("x" * SHORT), False),
+        (SpeechRequest("x" * (SHORT + 1)), True),
+        (SpeechRequest("x" * 1000, seconds=3.0), False),
+        (SpeechRequest("x" * 1000, recording=Recording(8000, np.zeros(8, np.int16))), False),
     ],
 )
 def test_only_long_texts_that_take_as_long_as_they_take_are_made_in_parts(say, suits) -> None:
@@ -165,19 +167,19 @@ def test_only_long_texts_that_take_as_long_as_they_take_are_made_in_parts(say, s
     )
 )
 def test_any_text_is_made_to_its_end(pieces) -> None:
-    say = Say("".join(pieces), ("m",))
+    say = SpeechRequest("".join(pieces), ("m",))
     parts, made = grown(SilentVoice(), say)
     assert "".join("".join(p.ssml for p in parts).split()) == "".join(say.ssml.split())
     if made:
-        assert made[-1].duration == pytest.approx(sum(u.duration for _, u in made[-1].parts))
-        assert replace(made[-1], parts=()).parts == ()
+        assert made[-1].duration == pytest.approx(sum(u.duration for _, u in made[-1].sections))
+        assert replace(made[-1], sections=()).sections == ()
 
 
 def test_what_is_said_louder_stays_louder_when_more_comes() -> None:
     class Loud(SilentVoice):
-        def say(self, request: Say) -> Utterance:
+        def say(self, request: SpeechRequest) -> Utterance:
             made = super().say(request)
             return replace(made, phonemes=tuple(replace(p, volume=2.0) for p in made.phonemes))
 
-    _, made = grown(Loud(), Say(TEXT, MARKS))
+    _, made = grown(Loud(), SpeechRequest(TEXT, MARKS))
     assert {p.volume for p in made[-1].phonemes} == {2.0}

@@ -24,7 +24,7 @@ from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.speech import speech_streams
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import RATE, Client, Driver
@@ -49,7 +49,7 @@ class Talker(Driver):
 
 def said(order: Speak) -> Utterance:
     if order.say.recording is not None:
-        return fitted(SilentVoice(), order.say)
+        return speak_to_length(SilentVoice(), order.say)
     silent = SilentVoice().say(order.say)
     part = EACH / (silent.duration or 1.0)
     ends = np.linspace(0, EACH, len(silent.words) + 1)

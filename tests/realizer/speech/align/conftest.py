@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realizer.speech.espeak.voice import EspeakVoice
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 TEXT = "The tall woman carried a basket of apples down the hill."
 WRONG = "Yesterday it rained all day; today the sun is shining."
@@ -36,11 +36,13 @@ def noisy(said: Utterance) -> Noisy:
 
 @pytest.fixture(scope="session")
 def sentence(voice: EspeakVoice) -> Noisy:
-    return noisy(voice.say(Say(TEXT, voice="en-us+m7")))
+    return noisy(voice.say(SpeechRequest(TEXT, voice="en-us+m7")))
 
 
 @pytest.fixture(scope="session")
 def zin(voice: EspeakVoice) -> Noisy:
     return noisy(
-        voice.say(Say("Mijn zus woont in een klein huis aan het water.", language="nl", voice="nl+m3"))
+        voice.say(
+            SpeechRequest("Mijn zus woont in een klein huis aan het water.", language="nl", voice="nl+m3")
+        )
     )

@@ -10,9 +10,9 @@ import pytest
 from realizer.core.errors import RealizerError
 from realizer.speech.align.aligner import align
 from realizer.speech.align.alignment import AlignError, Alignment
-from realizer.speech.align.sphinx import missing
+from realizer.speech.align.sphinx import install_hint
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import MOST_TEXT
+from realizer.speech.utterance import MAX_TEXT
 
 TEXT = "The tall woman carried a basket of apples down the hill."
 WRONG = "Yesterday it rained all day; today the sun is shining."
@@ -24,7 +24,7 @@ both = pytest.mark.parametrize(
         pytest.param("espeak", marks=pytest.mark.espeak),
         pytest.param(
             "pocketsphinx",
-            marks=[pytest.mark.espeak, pytest.mark.skipif(bool(missing()), reason=str(missing()))],
+            marks=[pytest.mark.espeak, pytest.mark.skipif(bool(install_hint()), reason=str(install_hint()))],
         ),
     ],
 )
@@ -117,9 +117,9 @@ def test_channels_rates_and_kinds_of_samples_do_not_matter(sentence, rate) -> No
 
 @pytest.mark.espeak
 def test_words_that_no_dictionary_has_are_said_as_espeak_says_them(voice) -> None:
-    from realizer.speech.utterance import Say
+    from realizer.speech.utterance import SpeechRequest
 
-    said = voice.say(Say("Zorblat gave 27 florbs to Quixley.", voice="en-us+f2"))
+    said = voice.say(SpeechRequest("Zorblat gave 27 florbs to Quixley.", voice="en-us+f2"))
     found = align(said.pcm, said.sample_rate, "Zorblat gave 27 florbs to Quixley.")
     assert np.median(errors(found, np.array([w.start for w in said.words]))) < 0.06
     assert found.confidence > 0.5
@@ -129,7 +129,7 @@ def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) 
     from realizer.speech.align import aligner, sphinx
 
     monkeypatch.setattr(aligner, "reference_voice", SilentVoice)
-    monkeypatch.setattr(sphinx, "missing", lambda: "not here")
+    monkeypatch.setattr(sphinx, "install_hint", lambda: "not here")
     times = np.arange(32_000) / 16_000
     tone = np.where((times > 0.5) & (times < 1.5), 0.3 * np.sin(2 * np.pi * 300 * times), 0.0)
     found = align(tone, 16_000, AFTER)
@@ -153,7 +153,7 @@ def test_without_any_aligner_the_words_are_spread_over_what_sounds(monkeypatch) 
         (np.ones(9000), 16_000, "", "text: wanted words"),
         (np.ones(9000), 16_000, " ...! ", "text: wanted words"),
         (np.ones(3200), 16_000, TEXT, "wanted about .* s for 11 words, got 0.20 s"),
-        (np.ones(9000), 16_000, "x" * (MOST_TEXT + 1), f"at most {MOST_TEXT} characters"),
+        (np.ones(9000), 16_000, "x" * (MAX_TEXT + 1), f"at most {MAX_TEXT} characters"),
     ],
 )
 def test_what_cannot_be_aligned_is_refused_in_words(pcm, rate, text, says) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.speech.align.dtw import Heard, States, matched, quiet, unlike, usual
+from realizer.speech.align.dtw import Observed, States, best_path, distance, quiet, usual
 
 LETTERS = np.eye(5) * 2
 
@@ -17,15 +17,15 @@ def states(word: str) -> States:
     return States(rows, pause, np.arange(len(word), dtype=float))
 
 
-def heard(word: str) -> Heard:
+def heard(word: str) -> Observed:
     """One frame a letter, "_" where it is silent."""
     rows = np.array([np.zeros(5) if letter == "_" else LETTERS["abcde".index(letter)] for letter in word])
     loud = np.array([0.0 if letter == "_" else 1.0 for letter in word])
-    return Heard(rows, quiet(loud, 0.1), 1.0)
+    return Observed(rows, quiet(loud, 0.1), 1.0)
 
 
 def way(frames: str, said: str, **band) -> str:
-    found, _ = matched(heard(frames), states(said), **band)
+    found, _ = best_path(heard(frames), states(said), **band)
     return "".join(said[k] for k in found)
 
 
@@ -45,18 +45,18 @@ def test_inside_a_word_there_is_no_pause() -> None:
 
 def test_in_a_band_the_same_way_is_found() -> None:
     frames, said = "__" + "aabbbcdde" * 20 + "__", "_" + "abcde_" * 20
-    whole, cost = matched(heard(frames), states(said))
-    banded, cost_banded = matched(heard(frames), states(said), whole, 6)
+    whole, cost = best_path(heard(frames), states(said))
+    banded, cost_banded = best_path(heard(frames), states(said), whole, 6)
     assert (whole == banded).all()
     assert cost_banded == pytest.approx(cost)
     diagonal = np.rint(np.linspace(0, len(said) - 1, len(frames))).astype(np.intp)
-    assert (matched(heard(frames), states(said), diagonal, 40)[0] == whole).all()
+    assert (best_path(heard(frames), states(said), diagonal, 40)[0] == whole).all()
 
 
 def test_the_way_only_goes_on_and_reaches_the_end() -> None:
     rng = np.random.default_rng(0)
-    noise = Heard(rng.normal(size=(80, 5)), quiet(rng.random(80), 0.1), 1.0)
-    found, cost = matched(noise, states("_" + "abcde_" * 9))
+    noise = Observed(rng.normal(size=(80, 5)), quiet(rng.random(80), 0.1), 1.0)
+    found, cost = best_path(noise, states("_" + "abcde_" * 9))
     assert (np.diff(found) >= 0).all()
     assert (np.diff(found) <= 3).all()
     assert found[-1] >= 53
@@ -64,5 +64,5 @@ def test_the_way_only_goes_on_and_reaches_the_end() -> None:
 
 
 def test_differences_are_root_mean_squares() -> None:
-    assert unlike(np.zeros((1, 4)), np.array([[2.0, 0, 0, 0], [1, 1, 1, 1]])).tolist() == [[1.0, 1.0]]
+    assert distance(np.zeros((1, 4)), np.array([[2.0, 0, 0, 0], [1, 1, 1, 1]])).tolist() == [[1.0, 1.0]]
     assert usual(np.zeros((3, 4)), np.ones((5, 4))) == 1.0

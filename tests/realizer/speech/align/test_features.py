@@ -24,10 +24,10 @@ def test_there_is_a_frame_for_each_hop_which_need_not_be_whole() -> None:
 
 def test_sound_is_told_from_silence_and_steady_noise_has_none() -> None:
     sound = np.concatenate([tone(400, 0.5, 1e-4), tone(400, 1.0), tone(400, 0.5, 1e-4)])
-    _, talks = f.sounding(f.loudness(f.energies(sound, 160)))
+    _, talks = f.voice_activity(f.loudness(f.energies(sound, 160)))
     assert 95 <= talks.sum() <= 110
     assert not talks[:45].any()
-    part, _ = f.sounding(np.zeros(50))
+    part, _ = f.voice_activity(np.zeros(50))
     assert part.max() == 0
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.speech.align.recording_marks import align_recording, recorded
-from realizer.speech.duration_fit import fitted
+from realizer.speech.align.recording_marks import align_recording, utterance_of_recording
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Recording, Say
+from realizer.speech.utterance import Recording, SpeechRequest
 
 MARKED = (
     '<mark name="a"/>The tall woman <mark name="b"/>carried a basket of apples '
@@ -18,7 +18,7 @@ MARKED = (
 
 @pytest.mark.espeak
 def test_marks_come_with_the_words_they_stand_before(sentence) -> None:
-    said = recorded(sentence.pcm, sentence.rate, Say(MARKED, ("a", "b", "c", "d")))
+    said = utterance_of_recording(sentence.pcm, sentence.rate, SpeechRequest(MARKED, ("a", "b", "c", "d")))
     starts = {word.text: word.start for word in said.words}
     assert said.marks["a"] == starts["The"]
     assert said.marks["b"] == starts["carried"]
@@ -31,16 +31,16 @@ def test_marks_come_with_the_words_they_stand_before(sentence) -> None:
 
 @pytest.mark.espeak
 def test_a_request_with_a_recording_asks_no_voice_and_stays_as_long_as_it_is(sentence) -> None:
-    request = Say(MARKED, ("a",), seconds=1.0, recording=Recording(sentence.rate, sentence.pcm))
-    said = fitted(SilentVoice(), request)
+    request = SpeechRequest(MARKED, ("a",), seconds=1.0, recording=Recording(sentence.rate, sentence.pcm))
+    said = speak_to_length(SilentVoice(), request)
     assert said.duration == len(sentence.pcm) / sentence.rate
     assert [word.text for word in said.words] == [word.text for word in sentence.said.words]
-    assert fitted(SilentVoice(), request) is said, "it is aligned once"
+    assert speak_to_length(SilentVoice(), request) is said, "it is aligned once"
 
 
 def test_a_recording_that_cannot_be_aligned_sounds_all_the_same() -> None:
     silence = Recording(8000, np.zeros(8000, np.int16))
-    said = align_recording(Say("Hello", recording=silence), silence)
+    said = align_recording(SpeechRequest("Hello", recording=silence), silence)
     assert said.pcm is silence.pcm
     assert (said.duration, said.words, said.phonemes) == (1.0, (), ())
     assert "lips do not move with the recording" in said.warnings[0]

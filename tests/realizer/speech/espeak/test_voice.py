@@ -20,11 +20,11 @@ from realizer.speech import engine_process
 from realizer.speech.cache import MOST
 from realizer.speech.engine_process import RUN
 from realizer.speech.espeak.voice import ENGINE, EspeakVoice, choose_voice
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 
 pytestmark = pytest.mark.espeak
 
-HELLO = Say('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))
+HELLO = SpeechRequest('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))
 
 
 def times(utterance: Utterance) -> tuple[object, ...]:
@@ -79,7 +79,7 @@ def test_pauses_are_silent_and_everything_else_is_not(voice: EspeakVoice) -> Non
 
 
 def test_a_closure_belongs_to_the_stop_that_it_closes(voice: EspeakVoice) -> None:
-    said = voice.say(Say("My happy puppy."))
+    said = voice.say(SpeechRequest("My happy puppy."))
     stops = [p for p in said.phonemes if p.ipa == "p"]
     assert said.pcm is not None
     assert len(stops) == 3
@@ -100,7 +100,7 @@ def test_a_closure_belongs_to_the_stop_that_it_closes(voice: EspeakVoice) -> Non
 )
 def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, text: str) -> None:
     marked = text.format(*(f'<mark name="{name}"/>' for name in "abcd"))
-    said = voice.say(Say(marked, tuple("abcd"), language))
+    said = voice.say(SpeechRequest(marked, tuple("abcd"), language))
     assert list(said.marks) == list("abcd")
     words = {word.start for word in said.words}
     assert set(said.marks.values()) <= words
@@ -109,7 +109,7 @@ def test_marks_at_sentence_starts_come_back(voice: EspeakVoice, language: str, t
 
 
 def test_words_that_the_dictionary_merges_come_apart(voice: EspeakVoice) -> None:
-    said = voice.say(Say("I am in the house, and it would have been the one of the best."))
+    said = voice.say(SpeechRequest("I am in the house, and it would have been the one of the best."))
     assert [w.text for w in said.words] == [
         *("I", "am", "in", "the", "house", "and", "it", "would"),
         *("have", "been", "the", "one", "of", "the", "best"),
@@ -132,7 +132,7 @@ def test_words_that_the_dictionary_merges_come_apart(voice: EspeakVoice) -> None
 def test_marks_inside_merged_words_stay_there(
     voice: EspeakVoice, language: str, text: str, word: str
 ) -> None:
-    said = voice.say(Say(text, ("m",), language))
+    said = voice.say(SpeechRequest(text, ("m",), language))
     assert said.marks["m"] == starts(said)[word] > 0.05
     assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes} | {w.end for w in said.words}
 
@@ -141,14 +141,14 @@ def test_marks_inside_merged_words_stay_there(
     "mark", ["<mark name='x'/>", '<bookmark mark="x"/>', '<s:mark name="x"/>', "<mark name='x'></mark>"]
 )
 def test_every_spelling_of_a_mark_is_a_mark(voice: EspeakVoice, mark: str) -> None:
-    said = voice.say(Say(f"one two {mark}three", ("x",)))
+    said = voice.say(SpeechRequest(f"one two {mark}three", ("x",)))
     assert said.marks == {"x": starts(said)["three"]}
     assert not said.warnings
 
 
 def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
     name = "a&quot;b'ü"
-    said = voice.say(Say(f'one <mark name="{name}"/>two', (name,)))
+    said = voice.say(SpeechRequest(f'one <mark name="{name}"/>two', (name,)))
     assert list(said.marks) == ["a\"b'ü"]
 
 
@@ -163,7 +163,7 @@ def test_marks_may_have_any_name(voice: EspeakVoice) -> None:
 def test_a_mark_is_at_its_word_and_not_before_the_little_pause_that_the_engine_makes(
     voice: EspeakVoice, language: str, text: str, word: str
 ) -> None:
-    said = voice.say(Say(text, ("m",), language))
+    said = voice.say(SpeechRequest(text, ("m",), language))
     assert said.marks["m"] == starts(said)[word]
     assert said.marks["m"] in {phoneme.start for phoneme in said.phonemes if phoneme.ipa}
 
@@ -184,7 +184,9 @@ def test_marks_of_five_languages_are_within_five_milliseconds_of_the_engines_own
 
 
 def test_a_mark_before_a_break_is_before_the_silence(voice: EspeakVoice) -> None:
-    said = voice.say(Say('one <mark name="a"/><break time="800ms"/><mark name="b"/>two', ("a", "b")))
+    said = voice.say(
+        SpeechRequest('one <mark name="a"/><break time="800ms"/><mark name="b"/>two', ("a", "b"))
+    )
     assert said.marks["a"] == pytest.approx(said.words[0].end, abs=0.05)
     assert said.marks["b"] == said.words[1].start > said.marks["a"] + 0.7
 
@@ -192,9 +194,9 @@ def test_a_mark_before_a_break_is_before_the_silence(voice: EspeakVoice) -> None
 def test_the_same_request_gives_the_same_samples_whatever_came_before() -> None:
     first, second = EspeakVoice(), EspeakVoice()
     try:
-        second.say(Say("Something quite different comes first.", language="nl"))
+        second.say(SpeechRequest("Something quite different comes first.", language="nl"))
         for k in range(5):
-            second.say(Say(f"Number {k}."))
+            second.say(SpeechRequest(f"Number {k}."))
         assert same(first.say(HELLO), second.say(HELLO))
     finally:
         first.close()
@@ -216,7 +218,7 @@ def test_without_fork_the_samples_are_the_same(voice: EspeakVoice) -> None:
     alone = EspeakVoice(options=("--no-fork",))
     try:
         assert same(alone.say(HELLO), voice.say(HELLO))
-        assert alone.say(Say("Again, I am."))  # each request its own process
+        assert alone.say(SpeechRequest("Again, I am."))  # each request its own process
         assert alone.pid is None
     finally:
         alone.close()
@@ -233,11 +235,11 @@ def test_a_known_request_does_not_reach_the_engine(voice: EspeakVoice) -> None:
 def test_only_so_many_utterances_are_kept() -> None:
     lone = EspeakVoice()
     try:
-        first = lone.say(Say("0"))
+        first = lone.say(SpeechRequest("0"))
         for k in range(1, MOST + 1):
-            lone.say(Say(str(k)))
-        assert lone.say(Say("0")) is not first
-        assert same(lone.say(Say("0")), first)
+            lone.say(SpeechRequest(str(k)))
+        assert lone.say(SpeechRequest("0")) is not first
+        assert same(lone.say(SpeechRequest("0")), first)
     finally:
         lone.close()
 
@@ -245,7 +247,7 @@ def test_only_so_many_utterances_are_kept() -> None:
 def test_many_threads_may_speak_at_once(voice: EspeakVoice) -> None:
     lone = EspeakVoice()
     said: dict[tuple[int, int], Utterance] = {}
-    texts = [Say(f"It is line {k}, I am sure.") for k in range(8)]
+    texts = [SpeechRequest(f"It is line {k}, I am sure.") for k in range(8)]
 
     def speak(thread: int) -> None:
         for k in range(8):
@@ -273,7 +275,7 @@ def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
         return exchange(process, request)
 
     try:
-        lone.say(Say("first"))
+        lone.say(SpeechRequest("first"))
         monkeypatch.setattr(engine_process, "_exchange", killed)
         with pytest.raises(VoiceError, match="starts it again"):
             lone.say(HELLO)
@@ -285,7 +287,7 @@ def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
 def test_a_hung_engine_is_replaced(voice: EspeakVoice) -> None:
     lone = EspeakVoice(limit=5.0)
     try:
-        lone.say(Say("first"))
+        lone.say(SpeechRequest("first"))
         lone._process._limit = 0.2
         assert lone.pid is not None
         os.kill(lone.pid, signal.SIGSTOP)
@@ -300,7 +302,7 @@ def test_a_hung_engine_is_replaced(voice: EspeakVoice) -> None:
 def test_a_closed_or_forgotten_voice_leaves_no_process() -> None:
     for close in (True, False):
         lone = EspeakVoice()
-        lone.say(Say("first"))
+        lone.say(SpeechRequest("first"))
         pid = lone.pid
         assert pid is not None
         if close:
@@ -338,7 +340,9 @@ def test_data_behind_a_long_path_are_found(tmp_path: Path, voice: EspeakVoice) -
     lone = EspeakVoice(options=("--data", str(data)))
     try:
         assert same(lone.say(HELLO), voice.say(HELLO))
-        assert same(lone.say(Say("hallo", language="nl")), voice.say(Say("hallo", language="nl")))
+        assert same(
+            lone.say(SpeechRequest("hallo", language="nl")), voice.say(SpeechRequest("hallo", language="nl"))
+        )
     finally:
         lone.close()
 
@@ -372,7 +376,7 @@ def test_data_that_are_not_there_are_an_error_with_words(tmp_path: Path) -> None
 )
 def test_language_tags_find_their_voice(voice: EspeakVoice, tag: str, engine: str) -> None:
     assert choose_voice(voice._process.hello(), None, tag) == (engine, ())
-    assert voice.say(Say("a", language=tag)).duration > 0
+    assert voice.say(SpeechRequest("a", language=tag)).duration > 0
 
 
 @pytest.mark.parametrize(
@@ -387,11 +391,11 @@ def test_language_tags_find_their_voice(voice: EspeakVoice, tag: str, engine: st
 )
 def test_voices_are_chosen_by_name_and_variant(voice: EspeakVoice, wanted: str, engine: str) -> None:
     assert choose_voice(voice._process.hello(), wanted, "de-DE") == (engine, ())
-    assert voice.say(Say("a", voice=wanted, language="de-DE")).duration > 0
+    assert voice.say(SpeechRequest("a", voice=wanted, language="de-DE")).duration > 0
 
 
 def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) -> None:
-    said = voice.say(Say("hello", language="xx-YY", voice="nobody+nothing"))
+    said = voice.say(SpeechRequest("hello", language="xx-YY", voice="nobody+nothing"))
     assert said.duration > 0.3
     assert [w.split(":")[0] for w in said.warnings] == [
         "espeak-ng has no voice 'nobody'",
@@ -401,7 +405,7 @@ def test_what_it_does_not_speak_is_said_and_spoken_anyway(voice: EspeakVoice) ->
 
 
 def test_language_flags_are_no_phonemes(voice: EspeakVoice) -> None:
-    said = voice.say(Say("c'est un weekend", language="fr"))
+    said = voice.say(SpeechRequest("c'est un weekend", language="fr"))
     assert not any("(" in phoneme.ipa for phoneme in said.phonemes)
 
 
@@ -416,7 +420,7 @@ def test_language_flags_are_no_phonemes(voice: EspeakVoice) -> None:
     ],
 )
 def test_phonemes_are_ipa_and_nothing_but_ipa(voice: EspeakVoice, language: str, text: str) -> None:
-    said = voice.say(Say(text, language=language))
+    said = voice.say(SpeechRequest(text, language=language))
     heard = "".join(phoneme.ipa for phoneme in said.phonemes)
     assert len(heard) > 10
     assert not set(heard) & set("()�\x00_ˈˌ͡"), heard
@@ -442,19 +446,19 @@ def test_rate_makes_speech_faster_within_what_the_engine_can(voice: EspeakVoice)
     ],
 )
 def test_bad_text_is_spoken_with_a_warning(voice: EspeakVoice, text: str, warning: str) -> None:
-    said = voice.say(Say(text))
+    said = voice.say(SpeechRequest(text))
     assert {"one", "two"} <= set(starts(said))
     assert any(warning in sentence for sentence in said.warnings)
 
 
 def test_marks_survive_wrong_ssml(voice: EspeakVoice) -> None:
-    said = voice.say(Say("one <mark name='a'/>two <b>three <mark name=\"c\">four", ("a", "c")))
+    said = voice.say(SpeechRequest("one <mark name='a'/>two <b>three <mark name=\"c\">four", ("a", "c")))
     assert said.marks == {"a": starts(said)["two"], "c": starts(said)["four"]}
 
 
 @pytest.mark.parametrize("text", ["", "   ", "😀", '<mark name="m"/>', "...", "\x00"])
 def test_an_empty_text_takes_no_time_and_is_said(voice: EspeakVoice, text: str) -> None:
-    said = voice.say(Say(text, ("m",)))
+    said = voice.say(SpeechRequest(text, ("m",)))
     assert said.duration == 0
     assert said.words == said.phonemes == ()
     assert all(time == 0 for time in said.marks.values())
@@ -463,13 +467,13 @@ def test_an_empty_text_takes_no_time_and_is_said(voice: EspeakVoice, text: str) 
 
 def test_a_text_of_200_kilobytes_is_refused_with_words(voice: EspeakVoice) -> None:
     with pytest.raises(VoiceError, match="at most 20000 characters, got 200000"):
-        voice.say(Say("word " * 40_000))
+        voice.say(SpeechRequest("word " * 40_000))
     assert voice.say(HELLO).duration > 2
 
 
 def test_a_long_text_is_spoken(voice: EspeakVoice) -> None:
     lone = EspeakVoice()
-    said = lone.say(Say("I am here, and it is late. " * 100 + '<mark name="end"/>', ("end",)))
+    said = lone.say(SpeechRequest("I am here, and it is late. " * 100 + '<mark name="end"/>', ("end",)))
     lone.close()
     assert len(said.words) == 700
     assert said.words[-1].end <= said.marks["end"] <= said.duration
@@ -477,7 +481,7 @@ def test_a_long_text_is_spoken(voice: EspeakVoice) -> None:
 
 
 def test_files_are_not_opened(voice: EspeakVoice, tmp_path: Path) -> None:
-    said = voice.say(Say(f'one <audio src="{tmp_path}/sound.wav">two</audio> three'))
+    said = voice.say(SpeechRequest(f'one <audio src="{tmp_path}/sound.wav">two</audio> three'))
     assert [w.text for w in said.words] == ["one", "two", "three"]
 
 
@@ -488,7 +492,7 @@ def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
         "el": "καλημέρα κόσμε", "th": "สวัสดี", "ko": "안녕하세요", "de": "Grüß Gott",
         "tr": "günaydın", "vi": "xin chào",
     }  # fmt: skip
-    said = voice.say(Say(texts[language], language=language))
+    said = voice.say(SpeechRequest(texts[language], language=language))
     assert said.words
     assert said.words[0].end > said.words[0].start
     assert sum(bool(p.ipa) for p in said.phonemes) > 3
@@ -501,8 +505,8 @@ def test_other_scripts_are_spoken(voice: EspeakVoice, language: str) -> None:
 )
 def test_the_sound_is_as_loud_as_the_lips_are_told(voice: EspeakVoice, volume: str, part: float) -> None:
     text = "Hello there my friend."
-    plain = voice.say(Say(text)).pcm
-    said = voice.say(Say(f'<prosody volume="{volume}">{text}</prosody>')).pcm
+    plain = voice.say(SpeechRequest(text)).pcm
+    said = voice.say(SpeechRequest(f'<prosody volume="{volume}">{text}</prosody>')).pcm
     assert plain is not None
     assert said is not None
     assert np.std(said) / np.std(plain) == pytest.approx(part, rel=0.05, abs=0.01)
@@ -514,7 +518,7 @@ def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
 
     def pitch(ssml: str) -> float:
         """Hz: the median over voiced stretches of 50 ms, by autocorrelation."""
-        pcm, heard = voice.say(Say(ssml)).pcm, []
+        pcm, heard = voice.say(SpeechRequest(ssml)).pcm, []
         assert pcm is not None
         for at in range(0, len(pcm) - 1102, 551):
             window = pcm[at : at + 1102].astype(float)
@@ -531,7 +535,7 @@ def test_semitones_are_semitones(voice: EspeakVoice, semitones: int) -> None:
 def test_a_mark_before_a_full_stop_is_the_end_of_its_word_and_no_dot_is_said(
     voice: EspeakVoice, end: str
 ) -> None:
-    plain, said = voice.say(Say("Hello there.")), voice.say(Say(f"Hello {end}"))
+    plain, said = voice.say(SpeechRequest("Hello there.")), voice.say(SpeechRequest(f"Hello {end}"))
     assert [p.ipa for p in said.phonemes] == [p.ipa for p in plain.phonemes]
     assert said.marks["m"] == pytest.approx(plain.words[-1].end, abs=0.01)
-    assert voice.say(Say('It is 3<mark name="m"/>.5.')).words[-1].text != "3."
+    assert voice.say(SpeechRequest('It is 3<mark name="m"/>.5.')).words[-1].text != "3."

@@ -14,22 +14,22 @@ import pytest
 
 from realizer.core.errors import VoiceError
 from realizer.speech import engine_process
-from realizer.speech.duration_fit import fitted
-from realizer.speech.hibari.text import Run, runs
-from realizer.speech.hibari.times import Lengths, places, sounds
+from realizer.speech.duration_fit import speak_to_length
+from realizer.speech.hibari.text import ProsodyRun, runs
+from realizer.speech.hibari.times import Lengths, sounds, word_spans
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.hibari.worker import LONGEST, split
 from realizer.speech.registry import find_voice
 from realizer.speech.ssml import read_script
 from realizer.speech.ssml_prosody import Prosody
-from realizer.speech.utterance import Say, Utterance
+from realizer.speech.utterance import SpeechRequest, Utterance
 from realizer.tables.phonemes import phoneme_features
 
 pytestmark = pytest.mark.xdist_group("voices")
 
 hibari = pytest.mark.hibari
 
-HELLO = Say('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))
+HELLO = SpeechRequest('Hello, I am <mark name="s1"/>very pleased to <mark name="s2"/>meet you.', ("s1", "s2"))
 
 
 def starts(utterance: Utterance) -> dict[str, float]:
@@ -72,7 +72,7 @@ def test_marks_are_where_their_word_is_heard(neural: HibariVoice) -> None:
     said = neural.say(HELLO)
     assert said.marks == {"s1": starts(said)["very"], "s2": starts(said)["meet"]}
     # Against the sound: after a break of silence the marked word is the first thing that is heard.
-    said = neural.say(Say('One. <break time="700ms"/><mark name="m"/>Bob.', ("m",)))
+    said = neural.say(SpeechRequest('One. <break time="700ms"/><mark name="m"/>Bob.', ("m",)))
     assert said.pcm is not None
     at = round(said.marks["m"] * said.sample_rate)
     before = np.flatnonzero(np.abs(said.pcm[:at].astype(int)) > 300)
@@ -83,7 +83,7 @@ def test_marks_are_where_their_word_is_heard(neural: HibariVoice) -> None:
 
 @hibari
 def test_vowels_sound_and_the_pauses_between_sentences_are_silent(neural: HibariVoice) -> None:
-    said = neural.say(Say("Yes, I know. Papa is here! Now we go."))
+    said = neural.say(SpeechRequest("Yes, I know. Papa is here! Now we go."))
     pauses = [p for p in said.phonemes if not p.ipa and p.end - p.start > 0.3]
     assert len(pauses) == 3, "between the sentences, and at the end"
     assert all(level(said, p.start + 0.05, p.end - 0.1) < 20 for p in pauses)
@@ -95,7 +95,7 @@ def test_vowels_sound_and_the_pauses_between_sentences_are_silent(neural: Hibari
 @hibari
 def test_every_phoneme_is_one_that_has_a_lip_shape(neural: HibariVoice) -> None:
     text = "Judge church, boy, how are you? The thing is measured: she sings of butter, oh, air and ice; yes."
-    said = neural.say(Say(text))
+    said = neural.say(SpeechRequest(text))
     assert {"dʒ", "tʃ", "ɔɪ", "aʊ", "oʊ", "aɪ", "ð", "θ", "ʒ", "ʃ", "ŋ"} <= {p.ipa for p in said.phonemes}
     letters = {letter for p in said.phonemes for letter in p.ipa.replace("ː", "")}
     assert letters <= {letter for known in phoneme_features() for letter in known}
@@ -116,7 +116,7 @@ def test_every_phoneme_is_one_that_has_a_lip_shape(neural: HibariVoice) -> None:
     ],
 )
 def test_marks_stand_before_their_word_however_it_is_read(neural: HibariVoice, text: str, word: str) -> None:
-    said = neural.say(Say(text, ("m",)))
+    said = neural.say(SpeechRequest(text, ("m",)))
     assert said.marks == {"m": starts(said)[word]}
     first = next(w for w in said.words if w.text == word)
     assert first.end - first.start > 0.08
@@ -126,7 +126,7 @@ def test_marks_stand_before_their_word_however_it_is_read(neural: HibariVoice, t
 
 @hibari
 def test_numbers_take_the_time_of_all_their_words(neural: HibariVoice) -> None:
-    said = neural.say(Say("They paid 1,250,431 euros."))
+    said = neural.say(SpeechRequest("They paid 1,250,431 euros."))
     number = next(w for w in said.words if w.text.startswith("1"))
     inside = [p.ipa for p in said.phonemes if number.start <= p.start < number.end]
     assert number.end - number.start > 1.5
@@ -137,28 +137,29 @@ def test_numbers_take_the_time_of_all_their_words(neural: HibariVoice) -> None:
 def test_a_break_lasts_as_long_as_it_says_and_marks_stand_on_their_side_of_it(neural: HibariVoice) -> None:
     text = '{}one <mark name="a"/>{}<mark name="b"/>two'
     short, long = (
-        neural.say(Say(text.format("", f'<break time="{time}ms"/>'), ("a", "b"))) for time in (300, 1300)
+        neural.say(SpeechRequest(text.format("", f'<break time="{time}ms"/>'), ("a", "b")))
+        for time in (300, 1300)
     )
     assert long.duration - short.duration == pytest.approx(1.0, abs=1e-4)
     assert long.marks["a"] == long.words[0].end
     assert long.marks["b"] == long.words[1].start > long.marks["a"] + 1.3
     assert level(long, long.marks["a"] + 0.1, long.marks["a"] + 1.2) < 10
-    alone = neural.say(Say('<break time="400ms"/>'))
+    alone = neural.say(SpeechRequest('<break time="400ms"/>'))
     assert (alone.duration, alone.words) == (0.4, ())
 
 
 @hibari
 def test_prosody_changes_rate_pitch_and_loudness_of_its_words_only(neural: HibariVoice) -> None:
-    plain = neural.say(Say("one more banana here"))
-    slow = neural.say(Say('one more <prosody rate="60%">banana</prosody> here'))
+    plain = neural.say(SpeechRequest("one more banana here"))
+    slow = neural.say(SpeechRequest('one more <prosody rate="60%">banana</prosody> here'))
     spans = [{w.text: w.end - w.start for w in said.words} for said in (plain, slow)]
     assert spans[1]["banana"] > 1.3 * spans[0]["banana"]
     assert spans[1]["one"] < 1.3 * spans[0]["one"]
     assert tiles(slow)
-    soft = neural.say(Say('<prosody volume="-12dB">one more banana here</prosody>'))
+    soft = neural.say(SpeechRequest('<prosody volume="-12dB">one more banana here</prosody>'))
     assert soft.duration == plain.duration
     assert level(soft, 0, 9) == pytest.approx(level(plain, 0, 9) / 4, rel=0.02)
-    high = neural.say(Say('<prosody pitch="+25%">one more banana here</prosody>'))
+    high = neural.say(SpeechRequest('<prosody pitch="+25%">one more banana here</prosody>'))
     assert pitch(high) == pytest.approx(1.25 * pitch(plain), rel=0.08)
 
 
@@ -190,7 +191,7 @@ def test_rate_makes_speech_faster_within_what_the_voice_can(neural: HibariVoice)
 @pytest.mark.parametrize("ratio", [0.75, 0.97, 1.0, 1.3, 1.6])
 def test_it_lasts_as_long_as_the_schedule_asks(neural: HibariVoice, ratio: float) -> None:
     natural = neural.say(HELLO)
-    made = fitted(neural, replace(HELLO, seconds=natural.duration * ratio))
+    made = speak_to_length(neural, replace(HELLO, seconds=natural.duration * ratio))
     assert made.duration == pytest.approx(natural.duration * ratio)
     assert made.marks["s2"] == starts(made)["meet"]
 
@@ -199,7 +200,7 @@ def test_it_lasts_as_long_as_the_schedule_asks(neural: HibariVoice, ratio: float
 def test_the_same_request_gives_the_same_samples_whatever_came_before(neural: HibariVoice) -> None:
     lone = HibariVoice()
     try:
-        lone.say(Say("Something quite different comes first."))
+        lone.say(SpeechRequest("Something quite different comes first."))
         assert same(lone.say(HELLO), neural.say(HELLO))
     finally:
         lone.close()
@@ -207,7 +208,7 @@ def test_the_same_request_gives_the_same_samples_whatever_came_before(neural: Hi
 
 @hibari
 def test_many_threads_may_speak_at_once(neural: HibariVoice) -> None:
-    texts = [Say(f"It is line {k}. I am sure of {k}.") for k in range(3)]
+    texts = [SpeechRequest(f"It is line {k}. I am sure of {k}.") for k in range(3)]
     said: dict[tuple[int, int], Utterance] = {}
     lone = HibariVoice()
 
@@ -238,7 +239,7 @@ def test_an_engine_killed_under_a_text_fails_that_one_and_no_more(
         return exchange(process, request)
 
     try:
-        lone.say(Say("first"))
+        lone.say(SpeechRequest("first"))
         monkeypatch.setattr(engine_process, "_exchange", killed)
         with pytest.raises(VoiceError, match=r"hibari ended .* starts it again"):
             lone.say(HELLO)
@@ -279,7 +280,7 @@ def test_a_model_that_does_not_tell_its_durations_has_times_by_rule_and_says_so(
     ],
 )
 def test_bad_text_is_spoken_with_a_warning(neural: HibariVoice, text: str, warning: str) -> None:
-    said = neural.say(Say(text))
+    said = neural.say(SpeechRequest(text))
     assert {"one", "two"} <= set(starts(said))
     assert [sentence for sentence in said.warnings if warning in sentence]
     assert len(said.warnings) == 1
@@ -289,7 +290,7 @@ def test_bad_text_is_spoken_with_a_warning(neural: HibariVoice, text: str, warni
 @hibari
 @pytest.mark.parametrize("text", ["", "   ", "😀", '<mark name="m"/>', "...", "\x00", "你好"])
 def test_a_text_without_a_word_takes_no_time_and_is_said(neural: HibariVoice, text: str) -> None:
-    said = neural.say(Say(text, ("m",)))
+    said = neural.say(SpeechRequest(text, ("m",)))
     assert said.duration == 0
     assert said.phonemes == ()
     assert [sentence for sentence in said.warnings if "nothing" in sentence]
@@ -297,15 +298,15 @@ def test_a_text_without_a_word_takes_no_time_and_is_said(neural: HibariVoice, te
 
 @hibari
 def test_another_language_is_read_as_english_with_a_warning(neural: HibariVoice) -> None:
-    assert neural.say(Say("one two", language="en_GB")).warnings == ()
-    said = neural.say(Say("een twee", language="nl-NL"))
+    assert neural.say(SpeechRequest("one two", language="en_GB")).warnings == ()
+    said = neural.say(SpeechRequest("een twee", language="nl-NL"))
     assert said.duration > 0.5
     assert said.warnings == ("hibari speaks English only: 'nl-NL' is read as English",)
 
 
 @hibari
 def test_brackets_are_no_notation(neural: HibariVoice) -> None:
-    said = neural.say(Say("one [two](/hˈi/) three"))
+    said = neural.say(SpeechRequest("one [two](/hˈi/) three"))
     assert [w.text for w in said.words] == ["one", "two", "hˈi", "three"]
     assert starts(said)["three"] > starts(said)["two"] + 0.2
 
@@ -313,14 +314,14 @@ def test_brackets_are_no_notation(neural: HibariVoice) -> None:
 @hibari
 def test_a_long_text_is_spoken_a_sentence_at_a_time(neural: HibariVoice) -> None:
     said = neural.say(
-        Say("I am here, and it is late. " * 12 + "word " * 150 + '<mark name="end"/>', ("end",))
+        SpeechRequest("I am here, and it is late. " * 12 + "word " * 150 + '<mark name="end"/>', ("end",))
     )
     assert len(said.words) == 12 * 7 + 150
     assert all(a.end <= b.start for a, b in zip(said.words, said.words[1:], strict=False))
     assert said.words[-1].end == said.marks["end"] < said.duration
     assert min(w.end - w.start for w in said.words) > 0.05
     with pytest.raises(VoiceError, match="at most 20000 characters"):
-        neural.say(Say("word " * 40_000))
+        neural.say(SpeechRequest("word " * 40_000))
 
 
 @hibari
@@ -339,7 +340,7 @@ def test_runs_end_at_breaks_and_where_the_manner_changes() -> None:
     ssml = (
         'a <mark name="m"/>b <break time="1s"/>c <prosody rate="slow"> d</prosody> <sub alias="e f">x</sub>.'
     )
-    found, marks = runs(read_script(Say(ssml)))
+    found, marks = runs(read_script(SpeechRequest(ssml)))
     assert [(r.text.strip(), r.words, r.prosody.rate, r.pause) for r in found] == [
         ("a b", ("a", "b"), 1.0, 0.0),
         ("c", ("c",), 1.0, 1.0),
@@ -347,7 +348,9 @@ def test_runs_end_at_breaks_and_where_the_manner_changes() -> None:
         ("e f.", ("e", "f"), 1.0, 0.0),
     ]
     assert [(m.name, m.word, m.paused) for m in marks] == [("m", 1, False)]
-    assert runs(read_script(Say('a<break time="1s"/>')))[0][-1] == Run("", (), Prosody(), 1.0)
+    assert runs(read_script(SpeechRequest('a<break time="1s"/>')))[0][-1] == ProsodyRun(
+        "", (), Prosody(), 1.0
+    )
 
 
 def test_stress_belongs_to_its_vowel_and_a_blank_to_the_sound_before() -> None:
@@ -373,7 +376,7 @@ def test_words_that_are_written_out_share_their_sounds() -> None:
         asked.append(words)
         return [tuple(alone[word]) for word in words]  # type: ignore[attr-defined]
 
-    found = places(["at", "7", "pm", "now"], tokens, heard, spoken)
+    found = word_spans(["at", "7", "pm", "now"], tokens, heard, spoken)
     assert ["".join(s.ipa for s in heard[a:b]) for a, b in found] == ["æt", "sɛvən", "piɛm", "naʊ"]
     assert asked == [["at", "7", "pm"]]
 

@@ -7,19 +7,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from realizer.speech.duration_fit import fitted
+from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import Phoneme, Recording, Say, Word
+from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Word
 
 RATE = 16000
 SOUND = np.rint(8000 * np.sin(np.arange(2 * RATE) * 0.1)).astype(np.int16)
-TEXT = Say('One <mark name="m"/>two, three', ("m",))
+TEXT = SpeechRequest('One <mark name="m"/>two, three', ("m",))
 WORDS = (Word(0.2, 0.5, "One"), Word(1.0, 1.3, "two,"), Word(1.3, 1.8, "three"))
 
 
-def said(request: Say = TEXT, **told):
+def said(request: SpeechRequest = TEXT, **told):
     recording = Recording(RATE, SOUND, **told)
-    return fitted(SilentVoice(), Say(request.ssml, request.marks, recording=recording))
+    return speak_to_length(SilentVoice(), SpeechRequest(request.ssml, request.marks, recording=recording))
 
 
 def test_a_mark_stands_where_its_word_was_told_to_begin() -> None:
@@ -57,11 +57,11 @@ def test_phonemes_are_taken_as_they_are_and_the_rest_is_silence() -> None:
 
 
 def test_without_text_and_times_the_mouth_opens_by_loudness() -> None:
-    utterance = said(Say(""))
+    utterance = said(SpeechRequest(""))
     assert {p.ipa for p in utterance.phonemes} == {"a"}
     assert utterance.words == ()
 
 
 def test_without_times_the_text_is_looked_for_in_the_sound() -> None:
-    utterance = said(Say("One two three"))
+    utterance = said(SpeechRequest("One two three"))
     assert [w.text for w in utterance.words] == ["One", "two", "three"]
