@@ -27,7 +27,7 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.core.array_types import UInt8
 from realizer.core.options import PlayOptions
 from realizer.face.fap_mapping import mapping_of
-from realizer.face.load import takes
+from realizer.face.load import input_names
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import open_voice, submit_with_speech
@@ -61,7 +61,7 @@ def play(documents: Documents, options: PlayOptions, voice: Voice | str | None =
     """Play documents from 0 s to the end of the last block, without a clock."""
     mapping = mapping_of(options.face, options.mapping)
     player = Player(
-        options, history=math.inf, face_inputs=lambda _: takes(options.face, deformer=options.deformer)
+        options, history=math.inf, face_inputs=lambda _: input_names(options.face, deformer=options.deformer)
     )
     schedules, refused = plan(documents, player, voice)
     feedback = player.due(math.inf)

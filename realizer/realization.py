@@ -131,9 +131,9 @@ class Realization:
         Raises:
             FaceError: no such face, or its folder is damaged.
         """
-        from realizer.face.load import takes
+        from realizer.face.load import input_names
 
-        return poses(self.aus, takes(self.face_name, deformer=self.deformer), self.mapping)
+        return poses(self.aus, input_names(self.face_name, deformer=self.deformer), self.mapping)
 
     @cached_property
     def faces(self) -> list[tuple[int, Realization]]:

@@ -77,7 +77,7 @@ def seen(face: str, shown: str) -> Seen:
     )
     times = played.aus.times
     keep = (times > START) & (times < START + phonemes()[-1].end)
-    vertices = mouth.vertices(poses(played.aus, mouth.face.takes)[keep])
+    vertices = mouth.vertices(poses(played.aus, mouth.face.inputs)[keep])
     return Seen(times[keep], mouth.gap(vertices), mouth.bite(vertices), mouth.path(vertices))
 
 

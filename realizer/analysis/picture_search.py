@@ -16,7 +16,7 @@ from realizer.core.array_types import Bool, Float32, UInt8
 from realizer.core.errors import RealizerError
 from realizer.expressions.expression import Expression
 from realizer.face.fap_mapping import mapping_of
-from realizer.face.load import list_faces, takes
+from realizer.face.load import input_names, list_faces
 from realizer.render import Renderer
 from realizer.render.light import presets
 
@@ -126,7 +126,7 @@ def _neutral(name: str, light: str, size: tuple[int, int]) -> tuple[Float32, Boo
 def _drawn(name: str, light: str, size: tuple[int, int], rows: Float32) -> list[tuple[Float32, Bool]]:
     """Each pose: brightness (h, w) 0..1, and where the head is."""
     frames = AUFrames(np.arange(len(rows), dtype=np.float64), rows)
-    takings = poses(frames, takes(name), mapping_of(name))
+    takings = poses(frames, input_names(name), mapping_of(name))
     fine = size[0] * FINE, size[1] * FINE
     with Renderer(name, fine, "front", light=light, background="transparent") as renderer:
         pictures = [_resized(picture, size) for picture in renderer.frames(takings)]

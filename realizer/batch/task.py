@@ -21,7 +21,8 @@ ENGINES = ("av", "espeakng-loader", "hibari-tts", "numpy", "pillow")
 
 @dataclass(frozen=True, kw_only=True)
 class Options(PlayOptions):
-    """How all documents of a batch are played and drawn, as `Drawing` takes it; `formats` are suffixes."""
+    """How all documents of a batch are played and drawn, as `RenderSettings` takes it; `formats` are
+    suffixes."""
 
     formats: tuple[str, ...]
     voice: str

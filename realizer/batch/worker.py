@@ -11,7 +11,7 @@ from typing import Any
 
 from realizer.batch.task import Options, Task, fingerprint
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import play
 from realizer.render import Renderer
@@ -88,7 +88,7 @@ class Worker:
         self.options = options
         self._speaker = _Speaker(options.voice)
         self._renderers: dict[tuple[tuple[int, int], bool], Renderer] = {}
-        self._drawings: dict[str, Drawing] = {}
+        self._drawings: dict[str, RenderSettings] = {}
 
     def perform(self, task: Task) -> Outcome:
         """Never raises for what is wrong with the document, or while it is played: then the row says so."""
@@ -133,12 +133,12 @@ class Worker:
         for renderer in self._renderers.values():
             renderer.close()
 
-    def _drawing(self, suffix: str) -> Drawing:
+    def _drawing(self, suffix: str) -> RenderSettings:
         """How that output is drawn, by a process that stays."""
         if suffix not in self._drawings:
             o = self.options
-            drawing = Drawing(o.size, o.camera, light=o.light, background=o.background)
-            draws = OUTPUTS[suffix].draws
+            drawing = RenderSettings(o.size, o.camera, light=o.light, background=o.background)
+            draws = OUTPUTS[suffix].picture_size
             if draws is not None:
                 size, alpha = draws(drawing)
                 if (size, alpha) not in self._renderers:
@@ -151,7 +151,7 @@ class Worker:
                         alpha=alpha,
                         deformer=o.deformer,
                     )
-                drawing = replace(drawing, begun=self._renderers[size, alpha])
+                drawing = replace(drawing, renderer=self._renderers[size, alpha])
             self._drawings[suffix] = drawing
         return self._drawings[suffix]
 

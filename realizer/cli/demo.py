@@ -40,7 +40,7 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
     from realizer.cli.options import tell_silence
     from realizer.core.errors import RealizerError
     from realizer.offline import realize
-    from realizer.outputs.output import Drawing
+    from realizer.outputs.output import RenderSettings
     from realizer.outputs.registry import output_for
 
     appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
@@ -49,7 +49,7 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
     for path in (FRAMES, FILM):
         click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
         try:
-            output_for(path).write(realization, path, Drawing())
+            output_for(path).write(realization, path, RenderSettings())
         except RealizerError as error:
             click.echo(f"realizer: {path} was left out: {error}", err=True)
 

@@ -24,10 +24,10 @@ def doctor() -> int:
 
 
 def _pictures() -> Iterator[Finding]:
-    from realizer.render.drawing_process import asked
+    from realizer.render.drawing_process import available_backend
 
     says = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
-    way, fix = asked()
+    way, fix = available_backend()
     yield fix is None, "pictures", fix or says[way]
 
 
@@ -58,7 +58,7 @@ def _faces() -> Iterator[Finding]:
         yield False, "faces", "no face folder was found; reinstall bml-realizer"
     for face in found:
         faults = check_face(face.name)
-        yield not faults, "face", f"{face.name}: {faults[0] if faults else face.says}"
+        yield not faults, "face", f"{face.name}: {faults[0] if faults else face.description}"
 
 
 def _page() -> Iterator[Finding]:

@@ -167,11 +167,11 @@ def _draw(found: Sequence[Expression], notes: Sequence[str], path: Path, face: s
     from realizer.animation.pose import poses
     from realizer.cli.sheet_poses import Series, frames, of_expressions
     from realizer.face.fap_mapping import mapping_of
-    from realizer.face.load import takes
+    from realizer.face.load import input_names
     from realizer.render import Renderer
     from realizer.render.contact_sheet import sheet
 
-    rows = poses(frames([Series("", of_expressions(found))]), takes(face), mapping_of(face))
+    rows = poses(frames([Series("", of_expressions(found))]), input_names(face), mapping_of(face))
     with Renderer(face, (220, 220), "close") as renderer:
         pictures = renderer.draw(rows)
     Image.fromarray(sheet(list(pictures), [one.name for one in found], [(note,) for note in notes])).save(

@@ -31,7 +31,7 @@ def list_() -> None:
 
     found = list_faces()
     for face in found:
-        click.echo(f"{face.name:<12} {face.says}  [{face.licence}]")
+        click.echo(f"{face.name:<12} {face.description}  [{face.licence}]")
     for name in face_folders().keys() - {face.name for face in found}:
         click.echo(f"{name}: cannot be read; run realizer faces check {name}", err=True)
 

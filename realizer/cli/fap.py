@@ -85,7 +85,7 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
     """
     from realizer.behaviours.fap_visemes import expand_compound
     from realizer.core.atomic_files import write_text
-    from realizer.outputs.fap_clip_files import ENCODINGS, limited
+    from realizer.outputs.fap_clip_files import ENCODINGS, clip_to_range
 
     suffix = Path(output).suffix.lower()
     if suffix not in ENCODINGS:
@@ -97,7 +97,7 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
         clip = expand_compound(clip)
     clip = clip if fps is None else clip.resampled(fps)
     if suffix == ".fap":
-        clip = limited(clip)
+        clip = clip_to_range(clip)
     _tell(context, file, clip)
     name = clip.name or Path(output).stem
     try:

@@ -54,7 +54,7 @@ def fit(
     from realizer.face.load import folder_of, load_face
     from realizer.facebuild.au.fit import fit_models, table, table_text
     from realizer.facebuild.au.fit_limits import runaways
-    from realizer.facebuild.au.measure import read_measured, read_shapes, write_shapes
+    from realizer.facebuild.au.measure import read_measurements, read_shapes, write_shapes
 
     if measurements and data:
         raise click.UsageError("wanted --from or --data, got both")
@@ -66,7 +66,7 @@ def fit(
 
         measured = measure_shapes(face, folder, data)
     elif measurements:
-        measured, source = read_measured(measurements), f"measured landmarks, {measurements.name}"
+        measured, source = read_measurements(measurements), f"measured landmarks, {measurements.name}"
     elif (folder / SHAPES).is_file():
         measured = read_shapes(folder / SHAPES)
     else:

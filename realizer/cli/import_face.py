@@ -58,10 +58,10 @@ def check(names: tuple[str, ...]) -> int:
 def _head_faults(head: Path) -> tuple[str, ...]:
     """Why a head cannot be imported; else says what an import finds."""
     from realizer.core.errors import FaceError
-    from realizer.facebuild.arkit.importer import look_at
+    from realizer.facebuild.arkit.importer import inspect_head
 
     try:
-        for line in look_at(head).lines:
+        for line in inspect_head(head).lines:
             click.echo(line)
     except FaceError as error:
         return (str(error),)

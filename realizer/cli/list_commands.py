@@ -29,7 +29,7 @@ def outputs() -> None:
     for suffix, output in sorted(found.items()):
         fixes = [fix for fix in map(_missing, output.needs) if fix is not None]
         mark = f"  (missing: {'; '.join(fixes)})" if fixes else ""
-        click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.says}{mark}")
+        click.echo(f"{suffix:<{width}}  {output.media_type:<{kinds}}  {output.description}{mark}")
 
 
 @cache

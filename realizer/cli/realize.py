@@ -96,7 +96,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
     Args:
         asked: the options by their names.
     """
-    from realizer.outputs.output import Drawing
+    from realizer.outputs.output import RenderSettings
     from realizer.outputs.registry import output_for
 
     output, strict = asked["output"], asked["strict"]
@@ -107,7 +107,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="-o") from None
     chosen = options.play_settings(asked)
-    drawing = Drawing(**{name: asked[name] for name in DRAWN})
+    drawing = RenderSettings(**{name: asked[name] for name in DRAWN})
     if writer is not None and writer.suffix in PICTURES:
         options.check_camera(chosen.face, drawing.camera)
     one = writer is not None and writer.suffix == ".png" and drawing.at is not None
@@ -144,7 +144,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
                 raise
             raise click.UsageError(f"{output}: {error.strerror or error}") from None
         first, *others = (name or "the unnamed character" for name in realization.characters)
-        if others and not writer.everybody:
+        if others and not writer.all_characters:
             left = ", ".join(others)
             words = f"{output}: shows {first}, not {left}: it has room for the face of one character"
             click.echo(words, err=True)

@@ -41,7 +41,7 @@ def replay(
     film of it, as they were live. Everything is done at its own time, without a clock: what went wrong once
     goes wrong again, so a record is the best report of a fault.
     """
-    from realizer.outputs.output import Drawing
+    from realizer.outputs.output import RenderSettings
     from realizer.outputs.registry import output_for
     from realizer.server.journal import JournalError
     from realizer.server.journal.playback import played, told
@@ -65,7 +65,7 @@ def replay(
         raise click.ClickException(str(error)) from None
     if writer.suffix in PICTURES:
         options.check_camera(realization.face_name, camera)
-    drawing = Drawing(size=size, camera=camera, at=at, light=light, background=background)
+    drawing = RenderSettings(size=size, camera=camera, at=at, light=light, background=background)
     drawing = writer.begin(drawing, realization.face_name, realization.deformer)
     try:
         writer.write(realization, Path(output), drawing)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from realizer.animation.fap.au_fap_mapping import FapMapping
     from realizer.cli.sheet_poses import Series
-    from realizer.outputs.output import Drawing
+    from realizer.outputs.output import RenderSettings
     from realizer.render.contact_sheet import Cell
 
 SCALE = (260, 16)  # pixels of the colour scale
@@ -87,7 +87,7 @@ def sheet(
 
     from realizer.cli import sheet_poses
     from realizer.face.fap_mapping import mapping_of
-    from realizer.outputs.output import Drawing
+    from realizer.outputs.output import RenderSettings
     from realizer.render.contact_sheet import Group, album
 
     if output.suffix != ".png":
@@ -105,7 +105,7 @@ def sheet(
         series += sheet_poses.of_aus(intensity)
     if emotions:
         series += sheet_poses.of_emotions()
-    drawing = Drawing(size, light=light, background=background)
+    drawing = RenderSettings(size, light=light, background=background)
     count = sum(len(part.poses) for part in series)
     with _progress(count * len(cameras), context.obj["quiet"]) as step:
         groups = [
@@ -125,7 +125,7 @@ def _cells(
     mapping: FapMapping,
     series: list[Series],
     cameras: tuple[str, ...],
-    drawing: Drawing,
+    drawing: RenderSettings,
     step: Callable[[int], None],
 ) -> Iterator[tuple[Series, list[Cell]]]:
     """Each series with its cells; the first pose of all is the neutral one."""
@@ -133,7 +133,7 @@ def _cells(
 
     from realizer.animation.pose import poses as poses_of
     from realizer.cli import sheet_poses
-    from realizer.face.load import takes
+    from realizer.face.load import input_names
     from realizer.render import Renderer
     from realizer.render.contact_sheet import Cell
     from realizer.render.difference_image import difference, faint, flatten
@@ -144,7 +144,7 @@ def _cells(
     if drawing.background:
         behind = np.frombuffer(bytes.fromhex(drawing.background[1:]), np.uint8)
     every = [pose for part in series for pose in part.poses]
-    rows = poses_of(sheet_poses.frames(series), takes(name, deformer=deformer), mapping)
+    rows = poses_of(sheet_poses.frames(series), input_names(name, deformer=deformer), mapping)
     shown: list[list[Any]] = [[] for _ in every]
     for camera in cameras:
         neutral = below = None

@@ -46,7 +46,7 @@ def contours_of(points: Mapping[str, Float32], fapu: Fapu) -> Contours:
     return Contours(inside, outside, np.array(most, np.float32))
 
 
-def together(contours: Contours, rows: Float32) -> Float32:
+def couple_lips(contours: Contours, rows: Float32) -> Float32:
     """The rows with what one contour drags of the other.
 
     A lip is one body: where one contour would leave the other by more than the lip gives way, the one that

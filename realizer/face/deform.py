@@ -10,13 +10,13 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.au.deformer import moves_of
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS, TONGUE_COS, TONGUE_SIN
-from realizer.face.contours import together
+from realizer.face.contours import couple_lips
 from realizer.face.model import Face
 
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)  # columns
 LIDS = slice(18, 22)  # columns: upper left and right, lower left and right
 CHUNK = 16  # frames at once, so that they fit a cache
-MOST_TURN = 0.42  # rad, 24 degrees
+MAX_TURN = 0.42  # rad, 24 degrees
 # Rotated by these, the parts are driven apart from the product. Eyeballs too, but they have no rows in it;
 # eyes that are no balls have rows, and no vertices that turn.
 DRIVEN = [OPEN_JAW, TONGUE_ROLL, 47, 48, 49]
@@ -39,7 +39,7 @@ def deform(face: Face, poses: Any) -> Float32:
     Raises:
         ValueError: another shape, or values that are not finite.
     """
-    rows = whole(poses, face.takes)
+    rows = complete_poses(poses, face.inputs)
     if not np.isfinite(rows).all():
         raise ValueError("poses: wanted finite values, got NaN or infinity")
     basis, units = face.basis, moves_of(face)
@@ -68,17 +68,17 @@ def deform(face: Face, poses: Any) -> Float32:
     return out
 
 
-def whole(poses: Any, takes: tuple[str, ...]) -> Float32:
+def complete_poses(poses: Any, inputs: tuple[str, ...]) -> Float32:
     """(n, len(takes)) float32, with nothing added to FAPs that come alone.
 
     Raises:
         ValueError: another shape.
     """
     rows = np.ascontiguousarray(poses, np.float32)
-    if rows.ndim != 2 or rows.shape[1] not in (FAPS, len(takes)):
-        also = f" or (n, {len(takes)})" if len(takes) != FAPS else ""
+    if rows.ndim != 2 or rows.shape[1] not in (FAPS, len(inputs)):
+        also = f" or (n, {len(inputs)})" if len(inputs) != FAPS else ""
         raise ValueError(f"poses: wanted (n, {FAPS}){also}, got {rows.shape}")
-    return np.pad(rows, ((0, 0), (0, len(takes) - rows.shape[1])))
+    return np.pad(rows, ((0, 0), (0, len(inputs) - rows.shape[1])))
 
 
 def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
@@ -91,7 +91,7 @@ def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
     opening = np.asarray(opening, np.float64)
     # y' = y cos a - z sin a, so y - y' = opening is one sine of a shifted angle.
     length, rest = float(np.hypot(y, z)), float(np.arctan2(y, z))
-    turned = np.minimum(np.arcsin(np.clip((opening - y) / length, -1, 1)) + rest, MOST_TURN)
+    turned = np.minimum(np.arcsin(np.clip((opening - y) / length, -1, 1)) + rest, MAX_TURN)
     reached = y - (y * np.cos(turned) - z * np.sin(turned))
     # The neutral face stays still to the last bit.
     return np.where(opening == 0, 0, turned), np.where(opening == 0, 0, opening - reached)
@@ -100,7 +100,7 @@ def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
 def _weights(basis: Any, rows: Float32) -> Float32:
     """Return the factors (n, 73) of the rows of the basis."""
     weights = np.zeros((len(rows), ROWS), np.float32)
-    weights[:, 2:FAPS] = together(basis["contours"], rows)[:, 2:]
+    weights[:, 2:FAPS] = couple_lips(basis["contours"], rows)[:, 2:]
     weights[:, DRIVEN] = 0
     jaw, slid = jaw_pose(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
     weights[:, JAW_COS], weights[:, JAW_SIN] = 1 - np.cos(jaw), np.sin(jaw)

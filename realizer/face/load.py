@@ -55,7 +55,7 @@ class FaceInfo:
     path: Path
     source: str
     licence: str
-    says: str
+    description: str
 
 
 def load_face(
@@ -73,18 +73,18 @@ def load_face(
     Raises:
         FaceError: no such face, or an unusable folder; the text says which file and what to change.
     """
-    folder, chosen = folder_of(name, directory), _asked(deformer)
+    folder, chosen = folder_of(name, directory), _deformer_override(deformer)
     try:
         return load_folder(folder, chosen)
     except FaceError as error:
         raise FaceError(f"{error}; run realizer faces check {folder.name}") from None
 
 
-def takes(
+def input_names(
     name: str = "default", directory: Path | str | None = None, deformer: str | None = None
 ) -> tuple[str, ...]:
-    """`Face.takes` of the face of that name, without loading it. Arguments and errors as `load_face`."""
-    return _taken(_model(folder_of(name, directory), _asked(deformer)))
+    """`Face.inputs` of the face of that name, without loading it. Arguments and errors as `load_face`."""
+    return _model_inputs(_model(folder_of(name, directory), _deformer_override(deformer)))
 
 
 def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
@@ -149,16 +149,16 @@ def read_head(folder: Path) -> dict[str, Any]:
         raise FaceError(f"{path}: {error}") from None
     for key in ("name", "source", "licence"):
         if not isinstance(head.get(key), str):
-            raise FaceError(f'{path}: wanted {key} = "...", got {_told(head, key)}')
+            raise FaceError(f'{path}: wanted {key} = "...", got {_head_text(head, key)}')
     for key, wanted in {"parts": "[parts]", "cameras": "tables [cameras.NAME]"}.items():
         if not isinstance(head.get(key, None if key == "parts" else {}), dict):
-            raise FaceError(f"{path}: wanted {wanted}, got {_told(head, key)}")
+            raise FaceError(f"{path}: wanted {wanted}, got {_head_text(head, key)}")
     if not isinstance(head.get("says", ""), str):
-        raise FaceError(f'{path}: wanted says = "...", got {_told(head, "says")}')
+        raise FaceError(f'{path}: wanted says = "...", got {_head_text(head, "says")}')
     return head
 
 
-def _told(head: dict[str, Any], key: str) -> str:
+def _head_text(head: dict[str, Any], key: str) -> str:
     return repr(head[key]) if key in head else "none"
 
 
@@ -171,7 +171,7 @@ def _places(directory: Path | str | None) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _asked(deformer: str | None) -> str | None:
+def _deformer_override(deformer: str | None) -> str | None:
     """Return the deformer that overrides face.toml, or None."""
     chosen = deformer or os.environ.get(DEFORMER) or None
     if chosen not in (None, *DEFORMERS):
@@ -211,7 +211,7 @@ def _model(folder: Path, deformer: str | None) -> Model | None:
     return replace(model, units={au: unit for au, unit in model.units.items() if au in drawn})
 
 
-def _taken(model: Model | None) -> tuple[str, ...]:
+def _model_inputs(model: Model | None) -> tuple[str, ...]:
     names = tuple(row.name for row in faps())
     if model is None:
         return names
@@ -251,7 +251,7 @@ def load_folder(folder: Path, deformer: str | None) -> Face:
         fapu=fapu,
         basis=basis_from(folder / "fields.npz", vertices, places, parts, fapu),
         cameras=head.get("cameras", {}),
-        takes=_taken(model),
+        inputs=_model_inputs(model),
         model=model,
     )
 

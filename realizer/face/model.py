@@ -51,7 +51,7 @@ class Face:
         fapu: measured from the feature points.
         basis: what `face.deform` needs (displacement fields, rigid parts), made when the face is built.
         cameras: extra camera presets by name.
-        takes: the columns of a pose, a row from which `face.deform` makes vertices: the 68 FAPs,
+        inputs: the columns of a pose, a row from which `face.deform` makes vertices: the 68 FAPs,
             then the inputs of the model (`au.columns`).
         model: the action units that are moved by functions of the place; None: FAPs move all there is.
     """
@@ -70,7 +70,7 @@ class Face:
     fapu: Fapu
     basis: Mapping[str, Any]
     cameras: Mapping[str, Any] = field(default_factory=dict)
-    takes: tuple[str, ...] = field(default_factory=lambda: tuple(row.name for row in faps()))
+    inputs: tuple[str, ...] = field(default_factory=lambda: tuple(row.name for row in faps()))
     model: Model | None = None
 
     @property

@@ -14,7 +14,7 @@ TURN = 0.25  # least cosine between a triangle before and after
 FLAT = 0.06  # least area of a triangle, in squares of its longest edge
 
 
-def thinned(vertices: Float64, triangles: Int32, tolerance: Float64) -> tuple[Any, Int32]:
+def decimate(vertices: Float64, triangles: Int32, tolerance: Float64) -> tuple[Any, Int32]:
     """Edges pulled together into one end, the least missed first (quadrics: Garland & Heckbert 1997).
 
     Args:

@@ -9,10 +9,10 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS
-from realizer.face.contours import CONTOURS, Contours, contours_of, together
+from realizer.face.contours import CONTOURS, Contours, contours_of, couple_lips
 from realizer.face.deform import jaw_pose
 from realizer.face.model import Fapu
-from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, borne, company
+from realizer.facebuild.mpeg4.fap_limits import OPEN_JAW, ROLLED, accompanying_faps, required_range
 from realizer.tables import faps
 
 ROUNDS = 60
@@ -26,7 +26,7 @@ LIPS = frozenset({*range(4, 14), *range(51, 61), 16, 17})
 JAW = (JAW_COS + 1, JAW_SIN + 1, JAW_DROP + 1)
 
 
-def turned(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
+def flipped_triangles(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
     """(m,) which triangles face away from where they faced at rest: turned past the angle of this cosine."""
     before, after = _ups(rest[triangles]), _ups(now[triangles])
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
@@ -34,7 +34,7 @@ def turned(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -
     return away
 
 
-def untangled(
+def soften_flips(
     fields: Float64,
     at: Float64,
     triangles: Int32,
@@ -55,7 +55,7 @@ def untangled(
     for _ in range(ROUNDS):
         bad = np.zeros(len(triangles), bool)
         for amounts, along, cosine in plays:
-            bad |= turned(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
+            bad |= flipped_triangles(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
         if not bad.any():
             break
         # A triangle that moves as one cannot turn over.
@@ -113,13 +113,13 @@ def without_flips(
                 metres = _metres(values, fapu, chin)
                 along = np.tensordot(metres[np.array(rest) - 1], fixed_fields, 1)
                 plays.append((metres[np.array(mended) - 1], along, cosine))
-            soft = untangled(
+            soft = soften_flips(
                 np.stack([out[n][here] for n in mended]),
                 at[here], local.reshape(near.shape), plays, np.flatnonzero(fixed[here]).tolist(),
             )  # fmt: skip
             for number, field in zip(mended, soft, strict=True):
                 out[number][here] = field
-        out = even(out, twin)
+        out = symmetrize(out, twin)
     return out
 
 
@@ -141,11 +141,11 @@ def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, f
     for number in numbers:
         for sign in (1, -1) if table[number - 1].least < 0 else (1,):
             asked = np.zeros((3, FAPS), np.float32)
-            asked[:2, number - 1] = sign * borne(number, sign)
+            asked[:2, number - 1] = sign * required_range(number, sign)
             asked[1, partner.get(number, number) - 1] = asked[0, number - 1]
-            for fap, value in company(number, sign).items():
+            for fap, value in accompanying_faps(number, sign).items():
                 asked[2, fap - 1] = value
-            alone, paired, accompanied = together(contours, asked)
+            alone, paired, accompanied = couple_lips(contours, asked)
             out += [(alone, 0.0), (paired, 0.0), (accompanied, ROLLED)]
     return out
 
@@ -160,7 +160,7 @@ def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
     return out
 
 
-def even(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]:
+def symmetrize(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]:
     """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
     table, flip = faps(), np.array([-1.0, 1.0, 1.0])
     out = {}

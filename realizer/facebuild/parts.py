@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.facebuild.submesh import Patch
+from realizer.facebuild.submesh import Submesh
 
 
 @dataclass(eq=False)
@@ -23,7 +23,7 @@ class Part:
     """
 
     name: str
-    patch: Patch | None
+    patch: Submesh | None
     vertices: Float64
     triangles: Int32
     colours: Float64
@@ -31,9 +31,9 @@ class Part:
     occlusion: Float64 | None = None
     fields: dict[int, Float64] = field(default_factory=dict)
 
-    def picked(self, index: Any, triangles: Int32) -> Part:
+    def subset(self, index: Any, triangles: Int32) -> Part:
         """The part with these of its vertices only, (k,) indices, and other triangles over them."""
-        patch = self.patch and Patch(self.patch.mix[index], self.patch.offset[index], triangles)
+        patch = self.patch and Submesh(self.patch.mix[index], self.patch.offset[index], triangles)
         light = None if self.occlusion is None else self.occlusion[index]
         fields = {number: moves[index] for number, moves in self.fields.items()}
         return Part(

@@ -12,7 +12,7 @@ from realizer.core.array_types import Float64, Int32
 
 
 @dataclass(frozen=True, eq=False)
-class Patch:
+class Submesh:
     """A piece of surface.
 
     Attributes:
@@ -26,7 +26,7 @@ class Patch:
     triangles: Int32
 
     @classmethod
-    def of_quads(cls, quads: Int32, n_base: int) -> Patch:
+    def of_quads(cls, quads: Int32, n_base: int) -> Submesh:
         """The patch of some quads of the base mesh; quads with three corners have the last repeated."""
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         triangles = triangles[(triangles[:, 0] != triangles[:, 2]) & (triangles[:, 1] != triangles[:, 2])]
@@ -41,21 +41,21 @@ class Patch:
         """(n, 3) metres."""
         return np.asarray(self.mix @ base) + self.offset
 
-    def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Patch:
+    def mixed(self, mix: sp.csr_matrix, triangles: Any) -> Submesh:
         """Return the patch whose vertices are mixes of this one's."""
-        return Patch((mix @ self.mix).tocsr(), np.asarray(mix @ self.offset), triangles.astype(np.int32))
+        return Submesh((mix @ self.mix).tocsr(), np.asarray(mix @ self.offset), triangles.astype(np.int32))
 
-    def kept(self, keep: Any) -> Patch:
+    def with_triangles(self, keep: Any) -> Submesh:
         """Return the triangles that are kept (m,), with the vertices that they use."""
         used, inverse = np.unique(self.triangles[keep], return_inverse=True)
         pick = sp.eye_array(len(self), format="csr")[used]
         return self.mixed(sp.csr_matrix(pick), inverse.reshape(-1, 3))
 
-    def moved(self, offset: Float64) -> Patch:
+    def moved(self, offset: Float64) -> Submesh:
         """The patch with `offset` (n, 3) added."""
         return replace(self, offset=self.offset + offset)
 
-    def clipped(self, height: Float64) -> tuple[Patch, sp.csr_matrix]:
+    def clipped(self, height: Float64) -> tuple[Submesh, sp.csr_matrix]:
         """Return the surface where `height` (n,) is above zero, cut along its zeros, and its mixes."""
         # A cut very close to a vertex would leave slivers: move it through the vertex.
         height = np.where(np.abs(height) < 1e-6, 1e-6, height)
@@ -96,7 +96,7 @@ class Patch:
         mix = mix[used]
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
-    def threaded(self, loops: list[list[int]]) -> Patch:
+    def threaded(self, loops: list[list[int]]) -> Submesh:
         """A vertex more on every edge of closed loops of vertices, on a smooth curve through them.
 
         Four points make each (Dyn, Levin and Gregory 1987); loops that share a vertex or an edge do not go.
@@ -129,7 +129,7 @@ class Patch:
         )
         return self.mixed(mix, np.array(triangles))
 
-    def subdivided(self, flat: bool = False) -> tuple[Patch, sp.csr_matrix]:
+    def subdivided(self, flat: bool = False) -> tuple[Submesh, sp.csr_matrix]:
         """Every triangle in four by Loop's rules (Warren's weights), and how it was mixed.
 
         Args:

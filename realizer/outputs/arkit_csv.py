@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES, ArkitFrames, arkit
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -49,7 +49,7 @@ def encode_arkit_csv(frames: ArkitFrames, fps: float) -> str:
     return buffer.getvalue()
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_arkit_csv(arkit(realization.aus, realization.mapping), realization.fps).encode()
 
 

@@ -7,7 +7,7 @@ import io
 from typing import TYPE_CHECKING
 
 from realizer.animation.axis import AU_NAMES
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 from realizer.tables import faps
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def encode_csv(realization: Realization) -> str:
     return buffer.getvalue()
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_csv(realization).encode()
 
 

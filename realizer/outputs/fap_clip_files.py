@@ -42,7 +42,7 @@ def read_clip(content: bytes) -> FAPClip:
     return read_fap(content)
 
 
-def limited(clip: FAPClip) -> FAPClip:
+def clip_to_range(clip: FAPClip) -> FAPClip:
     """The clip within the range of the standard; each FAP that went beyond it is one more of `notes`."""
     rows = faps()
     values = np.clip(clip.values, [row.least for row in rows], [row.most for row in rows]).astype(np.int32)
@@ -197,7 +197,7 @@ def _whole(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
 
 # suffix -> the text of a clip.
 ENCODINGS: dict[str, Callable[[FAPClip], str]] = {
-    ".fap": lambda clip: fap_text.encode(limited(clip)),
+    ".fap": lambda clip: fap_text.encode(clip_to_range(clip)),
     ".csv": _to_csv,
     ".json": _to_json,
 }

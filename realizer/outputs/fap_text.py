@@ -13,7 +13,7 @@ import numpy as np
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.lips.viseme_weights import fap_1
 from realizer.core.array_types import Int32
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -57,7 +57,7 @@ def _small() -> Any:
     return np.array([str(number) for number in range(-SMALL, SMALL + 1)], object)
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     """The first character's frames. The name in the header is the first block's id.
 
     Where visemes are asked for, FAP 1 says what is spoken beside the FAPs that show it.

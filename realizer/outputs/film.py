@@ -18,7 +18,7 @@ from realizer.core.array_types import Int16, UInt8
 from realizer.core.atomic_files import replacing
 from realizer.core.errors import RealizerError
 from realizer.outputs.captions import Track, captions
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
@@ -184,18 +184,18 @@ def _sound(av: Any, pcm: Int16, rate: int, first: int) -> Any:
     return frame
 
 
-def write_film(realization: Realization, path: Path, drawing: Drawing) -> None:
+def write_film(realization: Realization, path: Path, drawing: RenderSettings) -> None:
     """Draw and encode side by side: the drawing process is a batch ahead."""
     _av()  # before the drawing starts
     form = FORMATS[Path(path).suffix.lower()]
-    size, _ = _draws(drawing)
+    size, _ = _picture_size(drawing)
     count = realization.frames
     with replacing(path) as draft, closing(drawing.pictures(realization, size, range(count))) as pictures:
         sound, lines = realization.sound(RATE), captions(realization)
         encode_film(draft, form, pictures, count, realization.fps, sound, lines=lines)
 
 
-def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
+def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
     width, height = drawing.size
     return (width + width % 2, height + height % 2), False  # 4:2:0 wants even
 
@@ -208,14 +208,23 @@ def _av() -> Any:
     return av
 
 
-def _output(suffix: str, media_type: str, says: str) -> Output:
-    def encode(realization: Realization, drawing: Drawing) -> bytes:
+def _output(suffix: str, media_type: str, description: str) -> Output:
+    def encode(realization: Realization, drawing: RenderSettings) -> bytes:
         with TemporaryDirectory(prefix="realizer-") as folder:  # FFmpeg goes back to the front of a film
             path = Path(folder) / f"film{suffix}"
             write_film(realization, path, drawing)
             return path.read_bytes()
 
-    return Output(suffix, media_type, says, encode, ("render", "film"), _draws, save=write_film, reader="av")
+    return Output(
+        suffix,
+        media_type,
+        description,
+        encode,
+        ("render", "film"),
+        _picture_size,
+        save=write_film,
+        reader="av",
+    )
 
 
 MP4 = _output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC")

@@ -9,8 +9,8 @@ import numpy as np
 from realizer.core.array_types import Float32
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
-from realizer.outputs.morph_targets import morphs
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.morph_targets import make_morph_targets
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
@@ -31,7 +31,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
     Args:
         poses: (n, len(face.takes)), `Realization.poses`.
     """
-    made = morphs(face, poses)
+    made = make_morph_targets(face, poses)
     file = GlbFile()
     pivot = face.basis["head_pivot"]
     nodes: list[dict[str, Any]] = [
@@ -78,7 +78,7 @@ def encode_glb(face: Face, poses: Float32, fps: float) -> bytes:
     )
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_glb(realization.face, realization.poses, realization.fps)
 
 

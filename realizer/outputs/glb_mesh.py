@@ -13,7 +13,7 @@ from realizer.face.surface import normals
 
 if TYPE_CHECKING:
     from realizer.face.model import Face
-    from realizer.outputs.morph_targets import Morphs
+    from realizer.outputs.morph_targets import MorphTargets
 
 BENT = 0.01  # what a target turns a normal less, nobody sees: half a degree
 
@@ -44,7 +44,7 @@ def rigid_mesh(
     return {"name": name, "primitives": [primitive]}
 
 
-def morphing_mesh(file: GlbFile, face: Face, mine: Bool, material: int, made: Morphs) -> dict[str, Any]:
+def morphing_mesh(file: GlbFile, face: Face, mine: Bool, material: int, made: MorphTargets) -> dict[str, Any]:
     """The same with the targets, by their names, and two joints: 0 stays, 1 is the head."""
     mesh = rigid_mesh(file, face, mine, face.name, material)
     (primitive,) = mesh["primitives"]

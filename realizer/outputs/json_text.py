@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -21,10 +21,10 @@ def encode_json(realization: Realization) -> str:
     return text + "\n"
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_json(realization).encode()
 
 
 JSON = Output(
-    ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", _encode, everybody=True
+    ".json", "application/json", "schedule, FAPs, AUs, feedback and warnings", _encode, all_characters=True
 )

@@ -25,7 +25,7 @@ FIRST = 256  # frames, all over the performance, that are looked at first
 
 
 @dataclass(frozen=True, eq=False)
-class Morphs:
+class MorphTargets:
     """What poses of a face are made of, up to a tenth of a millimetre.
 
     Attributes:
@@ -47,7 +47,7 @@ class Morphs:
     thrust: Float32
 
 
-def morphs(face: Face, poses: Float32) -> Morphs:
+def make_morph_targets(face: Face, poses: Float32) -> MorphTargets:
     """Targets of what is used, and of what they do not make when they come together.
 
     Each column that the poses use is a target: what it alone does at its strongest. What remains (the jaw
@@ -60,7 +60,7 @@ def morphs(face: Face, poses: Float32) -> Morphs:
     from realizer.face.deform import deform
 
     still = poses.copy()
-    columns = {name: k for k, name in enumerate(face.takes)}
+    columns = {name: k for k, name in enumerate(face.inputs)}
     head = still[:, _columns(columns, HEAD)] * np.float32(ANGLE_UNIT)
     still[:, _columns(columns, HEAD)] = 0
     eyes, thrust = np.zeros((len(poses), 2, 2), np.float32), np.zeros((len(poses), 2), np.float32)
@@ -93,7 +93,7 @@ def morphs(face: Face, poses: Float32) -> Morphs:
     more, ways, shares = _one_way(shares, [f"correction {k + 1}" for k in range(len(found))])
     moves = np.concatenate([targets, ways @ found]).reshape(-1, len(face.vertices), 3)
     moves[np.abs(moves).max(axis=2) < SEEN] = 0
-    return Morphs(
+    return MorphTargets(
         (*names, *more),
         moves.astype(np.float32),
         np.concatenate([weights, shares], axis=1).astype(np.float32),
@@ -123,7 +123,7 @@ def _used(
     face: Face, still: Float32, moved: Callable[[Float32], Float64]
 ) -> tuple[list[str], Float64, Float64]:
     """Names, (k, 3 n_vertices) moves and (n, k) weights of the columns that alone move anything."""
-    names, alone, weights = _one_way(still, face.takes)
+    names, alone, weights = _one_way(still, face.inputs)
     moves = moved(alone.astype(np.float32)) if names else np.empty((0, 3 * len(face.vertices)))
     kept = np.flatnonzero(np.abs(moves).max(axis=1, initial=0) > SEEN)
     return [names[k] for k in kept], moves[kept], weights[:, kept]

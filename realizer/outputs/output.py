@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class RenderSettings:
     """How it is drawn or written: what `realize --size --camera --at --light --background --visemes` say."""
 
     size: tuple[int, int] = (512, 512)  # width, height
@@ -26,7 +26,7 @@ class Drawing:
     light: str | None = None  # a preset; None: as `realizer.render.Renderer` takes it, as is
     background: str | None = None  # "#rrggbb", or of one picture "transparent"
     visemes: bool = False  # whether a .fap file has FAP 1 beside the FAPs of the lips
-    begun: Renderer | None = None  # what draws, where `Output.begin` started it
+    renderer: Renderer | None = None  # what draws, where `Output.begin` started it
 
     def pictures(
         self, realization: Realization, size: tuple[int, int], frames: Sequence[int]
@@ -47,11 +47,11 @@ class Drawing:
                     continue
                 if part.face_name not in renderers:
                     renderers[part.face_name] = stack.enter_context(
-                        self.renderer(realization, size, face=part.face_name)
+                        self.make_renderer(realization, size, face=part.face_name)
                     )
                 yield from pictures(part, renderers[part.face_name], rows)
 
-    def renderer(
+    def make_renderer(
         self,
         realization: Realization,
         size: tuple[int, int],
@@ -65,11 +65,11 @@ class Drawing:
             face: one that it has for a time; None: its own.
         """
         own = face in (None, realization.face_name)
-        if own and self.begun is not None and self.begun.size == size:
-            return self.begun
-        return self.renderer_of(face or realization.face_name, realization.deformer, size, alpha=alpha)
+        if own and self.renderer is not None and self.renderer.size == size:
+            return self.renderer
+        return self.make_renderer_for(face or realization.face_name, realization.deformer, size, alpha=alpha)
 
-    def renderer_of(
+    def make_renderer_for(
         self, face: str, deformer: str | None, size: tuple[int, int], *, alpha: bool = False
     ) -> Renderer:
         """What draws that face, moved by that deformer; nothing has started yet."""
@@ -93,41 +93,42 @@ class Output:
     Attributes:
         suffix: ".fap"; the name in `realizer outputs` is the suffix without its dot.
         media_type: such as "video/mp4".
-        says: one line for `realizer outputs`.
+        description: one line for `realizer outputs`.
         encode: (realization, drawing) -> the content of the file.
         needs: the extras to install; () if it always works.
-        draws: width and height of its pictures, and whether they may be transparent; None: there are none.
-        everybody: whether it holds what all characters do; others hold the face of the first.
+        picture_size: width and height of its pictures, and whether they may be transparent; None: there are
+            none.
+        all_characters: whether it holds what all characters do; others hold the face of the first.
         save: (realization, path, drawing) -> None, of what may be too long to be held: writes it bit by bit.
         reader: the program of others that reads it in the tests; "" if there is none.
     """
 
     suffix: str
     media_type: str
-    says: str
-    encode: Callable[[Realization, Drawing], bytes]
+    description: str
+    encode: Callable[[Realization, RenderSettings], bytes]
     needs: tuple[str, ...] = ()
-    draws: Callable[[Drawing], tuple[tuple[int, int], bool]] | None = None
-    everybody: bool = False
-    save: Callable[[Realization, Path, Drawing], None] | None = None
+    picture_size: Callable[[RenderSettings], tuple[tuple[int, int], bool]] | None = None
+    all_characters: bool = False
+    save: Callable[[Realization, Path, RenderSettings], None] | None = None
     reader: str = ""
 
-    def write(self, realization: Realization, path: Path, drawing: Drawing) -> None:
+    def write(self, realization: Realization, path: Path, drawing: RenderSettings) -> None:
         """Write the file, whole or not at all; `path` may be any place that can be written."""
         if self.save is not None:
             self.save(realization, path, drawing)
         else:
             write_bytes(path, self.encode(realization, drawing))
 
-    def begin(self, drawing: Drawing, face: str, deformer: str | None = None) -> Drawing:
+    def begin(self, drawing: RenderSettings, face: str, deformer: str | None = None) -> RenderSettings:
         """The drawing to hand to `write`; what draws starts now, and gets ready while the rest is planned.
 
         Raises:
             RenderError: `drawing.background` is none.
         """
-        if self.draws is None:
+        if self.picture_size is None:
             return drawing
-        size, alpha = self.draws(drawing)
-        renderer = drawing.renderer_of(face, deformer, size, alpha=alpha)
+        size, alpha = self.picture_size(drawing)
+        renderer = drawing.make_renderer_for(face, deformer, size, alpha=alpha)
         renderer.start()
-        return replace(drawing, begun=renderer)
+        return replace(drawing, renderer=renderer)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from realizer.core.array_types import Float32, UInt8
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -69,15 +69,15 @@ def encode_png(pixels: UInt8) -> bytes:
     return buffer.getvalue()
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     """With `drawing.at` the picture of that instant; otherwise the sheet, its pictures at half the size."""
     from realizer.render.contact_sheet import sheet
 
-    size, alpha = _draws(drawing)
+    size, alpha = _picture_size(drawing)
     if drawing.at is not None:
         now = drawing.at * realization.fps
         first, part = next(pair for pair in reversed(realization.faces) if pair[0] <= max(now, 0))
-        with drawing.renderer(realization, size, alpha=alpha, face=part.face_name) as renderer:
+        with drawing.make_renderer(realization, size, alpha=alpha, face=part.face_name) as renderer:
             (picture,) = renderer.draw(row_at(part, drawing.at - first / realization.fps)[None])
         return encode_png(picture)
     shown = moments(realization)
@@ -86,7 +86,7 @@ def _encode(realization: Realization, drawing: Drawing) -> bytes:
     return encode_png(sheet(list(pictures), titles, [moment.points for moment in shown]))
 
 
-def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
+def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
     width, height = drawing.size
     if drawing.at is not None:
         return (width, height), True
@@ -112,6 +112,6 @@ PNG = Output(
     "a contact sheet over time, or one instant",
     _encode,
     ("render",),
-    _draws,
+    _picture_size,
     reader="PIL",
 )

@@ -25,12 +25,12 @@ class Span:
 
 def words(speaking: ScheduledSpeech) -> Iterator[Span]:
     """The words of one utterance, in order, as far as it sounds."""
-    return _heard(speaking, ((word, word.text) for word in speaking.utterance.words))
+    return _audible(speaking, ((word, word.text) for word in speaking.utterance.words))
 
 
 def phonemes(speaking: ScheduledSpeech) -> Iterator[Span]:
     """Its phonemes, as they are written in IPA; pauses are left out."""
-    return _heard(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
+    return _audible(speaking, ((phoneme, phoneme.ipa) for phoneme in speaking.utterance.phonemes))
 
 
 def points(realization: Realization) -> tuple[tuple[float, str], ...]:
@@ -44,7 +44,7 @@ def points(realization: Realization) -> tuple[tuple[float, str], ...]:
     return tuple(sorted(found))
 
 
-def _heard(speaking: ScheduledSpeech, told: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
+def _audible(speaking: ScheduledSpeech, told: Iterator[tuple[Word | Phoneme, str]]) -> Iterator[Span]:
     for part, text in told:
         start = speaking.start + part.start
         end = min(speaking.start + part.end, speaking.until)

@@ -14,7 +14,7 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.lips.viseme_weights import oculus_visemes
 from realizer.animation.lips.visemes import sounds
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def encode_talkinghead(realization: Realization) -> str:
     return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_talkinghead(realization).encode()
 
 

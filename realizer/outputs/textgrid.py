@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 from realizer.outputs.speech_spans import Span
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def encode_textgrid(realization: Realization) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_textgrid(realization).encode()
 
 
@@ -108,6 +108,6 @@ TEXTGRID = Output(
     "text/x-textgrid",
     "words, phonemes and sync points for Praat",
     _encode,
-    everybody=True,
+    all_characters=True,
     reader="praatio",
 )

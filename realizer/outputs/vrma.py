@@ -13,7 +13,7 @@ from realizer.animation.axis import AU_NAMES, au
 from realizer.core.array_types import Float32, Float64
 from realizer.face.glb_file import GlbFile
 from realizer.outputs.glb import quaternions
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 from realizer.tables import read_toml, text_of
 from realizer.tables.lexemes import face_lexemes
 
@@ -85,7 +85,7 @@ def expressions(realization: Realization) -> dict[str, Float32]:
     return {name: np.clip(weights, 0, 1).astype(np.float32) for name, weights in found.items()}
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_vrma(realization)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -42,7 +42,7 @@ def encode_vtt(realization: Realization) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_vtt(realization).encode()
 
 
@@ -69,6 +69,6 @@ VTT = Output(
     "text/vtt",
     "words, phonemes and sync points as WebVTT cues",
     _encode,
-    everybody=True,
+    all_characters=True,
     reader="webvtt",
 )

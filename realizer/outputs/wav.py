@@ -7,7 +7,7 @@ import wave
 from typing import TYPE_CHECKING
 
 from realizer.core.array_types import Int16
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -26,8 +26,10 @@ def encode_wav(pcm: Int16, rate: int) -> bytes:
     return buffer.getvalue()
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     return encode_wav(realization.sound(RATE), RATE)
 
 
-WAV = Output(".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", _encode, everybody=True, reader="wave")
+WAV = Output(
+    ".wav", "audio/wav", "the sound, 16 bit mono, 22,050 Hz", _encode, all_characters=True, reader="wave"
+)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from realizer.core.array_types import UInt8
-from realizer.outputs.output import Drawing, Output
+from realizer.outputs.output import Output, RenderSettings
 
 if TYPE_CHECKING:
     from realizer.realization import Realization
@@ -52,17 +52,17 @@ def encode_webp(pictures: Iterable[UInt8], starts: Sequence[float], end: float) 
     return b"RIFF" + struct.pack("<I", len(body)) + body
 
 
-def _encode(realization: Realization, drawing: Drawing) -> bytes:
+def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     """Every frame, or at higher rates every second, third, ...: at most 25 pictures a second."""
     step = math.ceil(realization.fps / PACE)
     frames = range(0, realization.frames, step)
     starts = [frame / realization.fps for frame in frames]
-    size, _ = _draws(drawing)
+    size, _ = _picture_size(drawing)
     with closing(drawing.pictures(realization, size, frames)) as pictures:
         return encode_webp(pictures, starts, starts[-1] + step / realization.fps)
 
 
-def _draws(drawing: Drawing) -> tuple[tuple[int, int], bool]:
+def _picture_size(drawing: RenderSettings) -> tuple[tuple[int, int], bool]:
     return drawing.size, False
 
 
@@ -75,5 +75,5 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 
 WEBP = Output(
-    ".webp", "image/webp", "animated picture without sound", _encode, ("render",), _draws, reader="PIL"
+    ".webp", "image/webp", "animated picture without sound", _encode, ("render",), _picture_size, reader="PIL"
 )

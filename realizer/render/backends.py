@@ -12,7 +12,7 @@ from realizer.face.model import Face
 from realizer.render.cameras import Camera
 from realizer.render.light import Light
 
-WAYS = ("auto", "gl", "onboard")
+BACKENDS = ("auto", "gl", "onboard")
 # Files that Linux shows where a graphics card may be used. Without one, OpenGL is drawn by the processor too,
 # half as fast as we do.
 CARDS = ("dri/renderD*", "nvidia[0-9]*", "dxg")
@@ -34,21 +34,21 @@ def open_canvas(
     camera: Camera,
     light: Light,
     background: str | None = None,
-    way: str = "auto",
+    backend: str = "auto",
 ) -> tuple[str, Drawer]:
     """The way that was taken, and its canvas.
 
     Args:
         background: as `realizer.render.backdrop.backdrop` takes it.
-        way: one of WAYS; "auto" selects the faster one here, or the other if that is missing.
+        backend: one of WAYS; "auto" selects the faster one here, or the other if that is missing.
 
     Raises:
         RenderError: no such way, or it is missing here; the text says what to install.
     """
-    if way not in WAYS:
-        raise RenderError(f"drawing: wanted one of {', '.join(WAYS)}, got {way!r}")
+    if backend not in BACKENDS:
+        raise RenderError(f"drawing: wanted one of {', '.join(BACKENDS)}, got {backend!r}")
     faults = []
-    for name in _order(Path("/dev")) if way == "auto" else (way,):
+    for name in _order(Path("/dev")) if backend == "auto" else (backend,):
         try:
             return name, OPENERS[name](face, size, camera, light, background)
         except RenderError as error:
@@ -62,23 +62,23 @@ def _order(devices: Path) -> tuple[str, ...]:
 
 
 def _gl(face: Face, size: tuple[int, int], camera: Camera, light: Light, background: str | None) -> Drawer:
-    from realizer.render.opengl import Canvas
+    from realizer.render.opengl import OpenGLCanvas
 
-    return Canvas(face, size, camera, light, background)
+    return OpenGLCanvas(face, size, camera, light, background)
 
 
-def _onboard(
+def _software(
     face: Face, size: tuple[int, int], camera: Camera, light: Light, background: str | None
 ) -> Drawer:
     from realizer.render.raster import ready
-    from realizer.render.software import OnboardCanvas
+    from realizer.render.software import SoftwareCanvas
 
     if fault := ready():
         raise RenderError(fault)
-    return OnboardCanvas(face, size, camera, light, background)
+    return SoftwareCanvas(face, size, camera, light, background)
 
 
 OPENERS: Mapping[str, Callable[[Face, tuple[int, int], Camera, Light, str | None], Drawer]] = {
     "gl": _gl,
-    "onboard": _onboard,
+    "onboard": _software,
 }

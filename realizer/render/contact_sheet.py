@@ -63,13 +63,13 @@ def sheet(
     return _page([Group("", cells, columns)], form, columns, None)
 
 
-def album(groups: Sequence[Group], legend: UInt8 | None = None, says: str = "") -> UInt8:
+def album(groups: Sequence[Group], legend: UInt8 | None = None, caption: str = "") -> UInt8:
     """(h, w, 3) uint8: each group's heading and below it its cells in rows; an even number of columns.
 
     Args:
         groups: their cells all have as many pictures, of one size; at least one cell.
-        legend: (h, w, 3) picture at the top right, beside `says`.
-        says: the description of the sheet, in the line at the top.
+        legend: (h, w, 3) picture at the top right, beside `caption`.
+        caption: the description of the sheet, in the line at the top.
 
     Raises:
         ValueError: no cells.
@@ -77,7 +77,7 @@ def album(groups: Sequence[Group], legend: UInt8 | None = None, says: str = "") 
     form = _Form([cell for group in groups for cell in group.cells])
     columns = max(2, 2 * round(WIDE / (form.width + GAP) / 2))
     most = max(min(group.columns or columns, len(group.cells)) for group in groups)
-    return _page(groups, form, min(columns, max(2, most)), (says, legend))
+    return _page(groups, form, min(columns, max(2, most)), (caption, legend))
 
 
 def columns_for(count: int, width: int, height: int) -> int:

@@ -22,7 +22,7 @@ DRAW = "REALIZER_DRAW"  # the variable that names a way of drawing
 PATIENCE = 60.0  # s; the longest answer, a first start that compiles, takes about 10
 
 
-class Child:
+class DrawingProcess:
     """One drawing process; it opens its canvas while its owner continues."""
 
     def __init__(self, order: Open) -> None:
@@ -81,7 +81,7 @@ class Child:
         except (EOFError, OSError):
             raise self._died() from None
         if isinstance(answer, Failed):
-            raise RenderError(answer.says)
+            raise RenderError(answer.message)
         return answer
 
     def end(self) -> None:
@@ -113,16 +113,16 @@ def _end(
     memory.unlink(missing_ok=True)
 
 
-def available(way: str | None = None) -> str | None:
+def available(backend: str | None = None) -> str | None:
     """Return None if pictures can be drawn that way, or a sentence that says what to install."""
-    return asked(way)[1]
+    return available_backend(backend)[1]
 
 
 @cache
-def asked(way: str | None = None) -> tuple[str, str | None]:
+def available_backend(backend: str | None = None) -> tuple[str, str | None]:
     """Return the way pictures are drawn here, and None; or "" and what to install. Cached."""
     done = subprocess.run(
-        [*_command(), "--check", way or os.environ.get(DRAW) or "auto"],
+        [*_command(), "--check", backend or os.environ.get(DRAW) or "auto"],
         env=_environment(),
         capture_output=True,
         text=True,

@@ -15,7 +15,7 @@ ROUND = 10  # corners
 LIFT = 1.004  # of the eye's radius: above its surface, below the lids
 
 
-class Glints:
+class EyeHighlights:
     """A cap of `ROUND` triangles on each eye, white; the eye turns under it, closed lids hide it.
 
     Eyes have too few vertices to shade anything so small.

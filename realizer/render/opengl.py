@@ -13,13 +13,13 @@ from realizer.face.model import Face
 from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera
 from realizer.render.light import Light
-from realizer.render.shaded_mesh import Figure
+from realizer.render.shaded_mesh import ShadedMesh
 
 NO_LIBRARY = "pictures need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures need OpenGL: install Debian packages libegl1 and libgl1"
 
 
-class Canvas:
+class OpenGLCanvas:
     """A head on the graphics card (or its stand-in in software), drawn again and again.
 
     Belongs to the thread that made it, as its GL context does; one at a time in a process. Light is worked
@@ -41,7 +41,7 @@ class Canvas:
         """
         pyrender = _pyrender()
         self.size = size
-        self._figure = Figure(face, camera, light)
+        self._figure = ShadedMesh(face, camera, light)
         self._backdrop = backdrop(size, light, background)
         self._channels = channels(background)
         vertices = self._figure.points

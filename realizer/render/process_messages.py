@@ -25,7 +25,7 @@ class Open:
     memory: str
     slots: int
     light: str | None
-    way: str
+    backend: str
     background: str | None
     deformer: str | None = None
 
@@ -51,7 +51,7 @@ class Encode:
 class Failed:
     """The answer to any message that went wrong; the process ends after it."""
 
-    says: str
+    message: str
 
 
 Message = Open | Draw | Encode

@@ -14,7 +14,7 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RenderError
 from realizer.face.model import Face
-from realizer.render.drawing_process import DRAW, Child
+from realizer.render.drawing_process import DRAW, DrawingProcess
 
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it
@@ -37,7 +37,7 @@ class Renderer:
         light: str | None = None,
         background: str | None = None,
         alpha: bool = False,
-        way: str | None = None,
+        backend: str | None = None,
         deformer: str | None = None,
     ) -> None:
         """Nothing starts yet.
@@ -49,7 +49,7 @@ class Renderer:
             light: a preset; None selects REALIZER_LIGHT, then "portrait".
             background: "#rrggbb" or "transparent"; None selects REALIZER_BACKGROUND, then the light's own.
             alpha: the caller takes pictures of four channels, should REALIZER_BACKGROUND say "transparent".
-            way: "gl", "onboard" or "auto"; None selects REALIZER_DRAW, then "auto".
+            backend: "gl", "onboard" or "auto"; None selects REALIZER_DRAW, then "auto".
             deformer: of a face that is given by name, "mpeg4" or "au"; None is its own default.
         """
         width, height = size
@@ -57,10 +57,10 @@ class Renderer:
             raise ValueError(f"size: wanted 1..8192 pixels each way, got {width}x{height}")
         self.face, self.size, self.camera, self.deformer = face, size, camera, deformer
         self.light, self._background, self._alpha = light, background, alpha
-        self.way = way or os.environ.get(DRAW) or "auto"
+        self.backend = backend or os.environ.get(DRAW) or "auto"
         self._half = max(1, min(HALF, HALF_BYTES // (width * height * 4)))
         self._lock = threading.Lock()
-        self._process: Child | None = None
+        self._process: DrawingProcess | None = None
 
     def start(self) -> None:
         """Start the process before there is anything to draw; its errors are raised by the first picture.
@@ -75,7 +75,7 @@ class Renderer:
         """(n, h, w, 3) uint8, (n, h, w, 4) where transparent, row 0 at the top, of (n, k) poses.
 
         Args:
-            poses: as `face.deform` takes them: a column for each of `Face.takes`, or (n, 68) FAPs alone.
+            poses: as `face.deform` takes them: a column for each of `Face.inputs`, or (n, 68) FAPs alone.
 
         Raises:
             ValueError: another shape.
@@ -174,7 +174,7 @@ class Renderer:
     ) -> None:
         self.close()
 
-    def _started(self) -> Child:
+    def _started(self) -> DrawingProcess:
         if self._process is None:
             from realizer.render.backdrop import channels
             from realizer.render.process_messages import Open, Pixels
@@ -183,12 +183,20 @@ class Renderer:
             behind = self.background
             path = Pixels.create(slots, self.size, channels(behind))
             order = Open(
-                self.face, self.size, self.camera, path, slots, self.light, self.way, behind, self.deformer
+                self.face,
+                self.size,
+                self.camera,
+                path,
+                slots,
+                self.light,
+                self.backend,
+                behind,
+                self.deformer,
             )
-            self._process = Child(order)
+            self._process = DrawingProcess(order)
         return self._process
 
-    def _ready(self) -> Child:
+    def _ready(self) -> DrawingProcess:
         process = self._started()
         try:
             process.open()
@@ -203,12 +211,14 @@ class Renderer:
             self._process = None
 
     def _rows(self, poses: Any) -> Float32:
-        from realizer.face.deform import whole
+        from realizer.face.deform import complete_poses
 
-        return whole(poses, self._takes)
+        return complete_poses(poses, self._inputs)
 
     @cached_property
-    def _takes(self) -> tuple[str, ...]:
-        from realizer.face.load import takes
+    def _inputs(self) -> tuple[str, ...]:
+        from realizer.face.load import input_names
 
-        return takes(self.face, deformer=self.deformer) if isinstance(self.face, str) else self.face.takes
+        return (
+            input_names(self.face, deformer=self.deformer) if isinstance(self.face, str) else self.face.inputs
+        )

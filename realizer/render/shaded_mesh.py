@@ -7,12 +7,12 @@ import numpy as np
 from realizer.core.array_types import Float32, Int32
 from realizer.face.model import Face
 from realizer.render.cameras import Camera
-from realizer.render.eye_highlights import Glints
+from realizer.render.eye_highlights import EyeHighlights
 from realizer.render.light import Light, Shader
 from realizer.render.wrinkles import Wrinkles
 
 
-class Figure:
+class ShadedMesh:
     """The head and the renderer's additions, lit: all backends draw the same triangles.
 
     Attributes:
@@ -22,7 +22,7 @@ class Figure:
     """
 
     def __init__(self, face: Face, camera: Camera, light: Light) -> None:
-        self._glints = Glints(face, light, camera.towards)
+        self._glints = EyeHighlights(face, light, camera.towards)
         self._wrinkles = Wrinkles(face)
         self._shader = Shader(light, face.colours, face.occlusion, face.gloss, camera.towards)
         count = len(face.vertices)

@@ -10,10 +10,10 @@ from realizer.render.backdrop import backdrop, channels, over
 from realizer.render.cameras import Camera
 from realizer.render.light import Light
 from realizer.render.raster import Raster
-from realizer.render.shaded_mesh import Figure
+from realizer.render.shaded_mesh import ShadedMesh
 
 
-class OnboardCanvas:
+class SoftwareCanvas:
     """A head drawn by the processor: the same points, colours, camera and backdrop as by OpenGL."""
 
     def __init__(
@@ -34,7 +34,7 @@ class OnboardCanvas:
         """
         self.size = size
         self._camera = camera
-        self._figure = Figure(face, camera, light)
+        self._figure = ShadedMesh(face, camera, light)
         self._backdrop = backdrop(size, light, background)
         self._channels = channels(background)
         self._raster = Raster(size, smooth=smooth)

@@ -8,7 +8,7 @@ from realizer.core.array_types import Float64, Int32
 from realizer.face.model import Face
 
 
-def on_skin(
+def locate_on_skin(
     face: Face, places: Float64, right: Float64, towards: Float64, longest: float
 ) -> tuple[Int32, Float64] | None:
     """The triangle of skin at each place and the share of each corner: (n, 3) vertices, (n, 3) weights.

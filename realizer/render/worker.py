@@ -25,7 +25,7 @@ BATCH = 16  # frames deformed in one call: enough to spread its fixed cost, few 
 FASTEST: Mapping[str, Mapping[str, int]] = {"jpeg": {}, "png": {"compress_level": 1}, "webp": {"method": 0}}
 
 
-class Artist:
+class FaceDrawer:
     """A face, a canvas, and the memory that pictures go to."""
 
     def __init__(self, order: Open) -> None:
@@ -36,13 +36,13 @@ class Artist:
             self.face = load_face(order.face, deformer=order.deformer)
         else:
             self.face = order.face
-        self.way, self.canvas = open_canvas(
+        self.backend, self.canvas = open_canvas(
             self.face,
             order.size,
             camera_for(self.face, order.camera),
             preset(order.light),
             order.background,
-            order.way,
+            order.backend,
         )
 
     def draw(self, rows: Float32, first: int) -> int:
@@ -88,11 +88,11 @@ def encode(pixels: UInt8, form: str, quality: int) -> bytes:
     return buffer.getvalue()
 
 
-def answer(artist: Artist | None, message: Message) -> tuple[Artist, int | bytes | str]:
+def answer(artist: FaceDrawer | None, message: Message) -> tuple[FaceDrawer, int | bytes | str]:
     """Carry out a message."""
     if isinstance(message, Open):
-        artist = Artist(message)
-        return artist, artist.way
+        artist = FaceDrawer(message)
+        return artist, artist.backend
     if artist is None:
         raise RealizerError(f"wanted Open first, got {type(message).__name__}")
     if isinstance(message, Draw):
@@ -102,7 +102,7 @@ def answer(artist: Artist | None, message: Message) -> tuple[Artist, int | bytes
 
 def serve(orders: Connection, answers: Connection) -> None:
     """Answer messages until the owner hangs up or dies, or something fails."""
-    artist: Artist | None = None
+    artist: FaceDrawer | None = None
     owner = os.getppid()
     while True:
         # A child of the owner may have inherited the pipe and keep it open: check the parent's id, too.
@@ -124,14 +124,14 @@ def serve(orders: Connection, answers: Connection) -> None:
         answers.send(result)
 
 
-def check(way: str) -> int:
+def check(backend: str) -> int:
     """Draw one triangle; print the chosen way, or return 3 and print what is missing."""
     from realizer.core.errors import RenderError
     from realizer.render.probe_triangle import triangle
 
     face = triangle()
     try:
-        taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), way=way)
+        taken, canvas = open_canvas(face, (16, 16), camera_for(face), preset(), backend=backend)
         canvas.draw(face.vertices, np.zeros_like(face.vertices))
         canvas.close()
     except RenderError as error:

@@ -15,7 +15,7 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.model import Face
-from realizer.render.surface_points import on_skin
+from realizer.render.surface_points import locate_on_skin
 
 STEP = 0.03  # of ES0, along a furrow
 LIFT = 0.006  # of ES0, above the skin: 0.4 mm, or the strip sinks where the skin is curved
@@ -167,7 +167,7 @@ def _strip(face: Face, line: dict[str, Any], drives: dict[str, Any], side: int, 
     if (across[:, 1].mean() > 0) if level else (side * across[:, 0].mean() > 0):
         across = -across
     spread = path[:, None] + across[:, None] * (ACROSS * line["width"] * size)[None, :, None]
-    found = on_skin(face, spread.reshape(-1, 2), right, towards, COARSE * size)
+    found = locate_on_skin(face, spread.reshape(-1, 2), right, towards, COARSE * size)
     if found is None:
         return None
     ends = [drives[name] for name in line["drives"]]

@@ -30,7 +30,7 @@ from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer.facebuild.au.fit import table, table_text
-from realizer.facebuild.au.measure import Measured, read_shapes
+from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
 
 SHOWN = (1, 4, 6, 9, 10, 12, 15, 18, 27, 43)
 HERS = 0.120
@@ -72,7 +72,9 @@ def front(face: Face) -> tuple[np.ndarray, np.ndarray]:
     return at, triangles[((at[:, 2] > -0.05) & (at[:, 1] > -0.12))[triangles].all(axis=1)].astype(np.intp)
 
 
-def meshes(face: Face, model: Model, measured: Mapping[int, Measured]) -> list[tuple[np.ndarray, np.ndarray]]:
+def meshes(
+    face: Face, model: Model, measured: Mapping[int, UnitMeasurement]
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """The same model on meshes of another topology (her figure 4.3), each with its errors printed.
 
     At the vertices: to what was measured there. Between them: what a triangle's corners make of the places
@@ -89,11 +91,11 @@ def meshes(face: Face, model: Model, measured: Mapping[int, Measured]) -> list[t
         here, between = [], []
         for one in measured.values():
             moves = model.displacement(one.au, coarse)
-            far = np.linalg.norm(one.moves[one.seen], axis=1).max()
+            far = np.linalg.norm(one.moves[one.visible], axis=1).max()
             places = {tuple(place): k for k, place in enumerate(one.at.tolist())}
             pairs = [(k, places[tuple(p)]) for k, p in enumerate(coarse.tolist()) if tuple(p) in places]
             mine, theirs = np.array(pairs).T
-            counts = one.seen[theirs] & (np.linalg.norm(one.moves[theirs], axis=1) > 0.01 * far)
+            counts = one.visible[theirs] & (np.linalg.norm(one.moves[theirs], axis=1) > 0.01 * far)
             miss = moves[mine[counts]] - one.moves[theirs[counts]]
             here.append(np.linalg.norm(miss, axis=1).mean() / far)
             goes = model.displacement(one.au, at[fine])
@@ -156,7 +158,7 @@ def cost(face: Face, other: Face) -> None:
     ]
     spent = {}
     for kind, one in (("mpeg4", other), ("au", face)):
-        rows = poses(frames(shown), one.takes)
+        rows = poses(frames(shown), one.inputs)
         for name, count, times in (("a frame of 250", 250, 7), ("a frame alone", 1, 60)):
             deform(one, rows[:count])
             took = []
@@ -194,7 +196,7 @@ def main() -> None:
     if chosen.pictures:
         clip = frames([{number: 1.0} for number in SHOWN])
         views = ("front", "three-quarter")
-        both = [deform(one, poses(clip, one.takes)) for one in (other, face)]
+        both = [deform(one, poses(clip, one.inputs)) for one in (other, face)]
         Image.fromarray(pictures(face, views, lambda: both)).save(chosen.pictures)
         print(f"{chosen.pictures}: AUs {SHOWN}; FAPs above, model below; {', '.join(views)}")
     if chosen.meshes:

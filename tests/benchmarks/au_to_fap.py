@@ -28,7 +28,7 @@ from realizer.face.au.units import units
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
-from realizer.facebuild.au.measure import Measured, read_shapes
+from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
 from realizer.facebuild.au.shapes import measure_shapes
 from realizer.tables import faps
 
@@ -67,17 +67,17 @@ class Skin:
     part: npt.NDArray[np.str_]
 
     @classmethod
-    def of(cls, face: Face, shape: Measured) -> Skin:
+    def of(cls, face: Face, shape: UnitMeasurement) -> Skin:
         from scipy.spatial import cKDTree
 
         first, last = face.parts["skin"]
         skin = face.vertices[first:last]
         off, nearest = (np.asarray(found) for found in cKDTree(skin).query(shape.at))
-        marks = np.flatnonzero(shape.seen & (off < 1e-5))
+        marks = np.flatnonzero(shape.visible & (off < 1e-5))
         nearest = nearest[marks]
-        if len(marks) < ON_SKIN * shape.seen.sum():
+        if len(marks) < ON_SKIN * shape.visible.sum():
             raise SystemExit(
-                f"{face.name}: {1 - len(marks) / shape.seen.sum():.0%} of its shapes lie off its skin; "
+                f"{face.name}: {1 - len(marks) / shape.visible.sum():.0%} of its shapes lie off its skin; "
                 "measure them by --data"
             )
         names = [(part, name) for part, points in PARTS.items() for name in points]
@@ -138,7 +138,7 @@ def where(skin: Skin, wanted: Float64, got: Float64) -> str:
     return f"{said}; {WAYS[int(ways.argmax())]} {ways.max():.0%}"
 
 
-def shapes_of(face: Face, data: Path | None) -> dict[int, Measured]:
+def shapes_of(face: Face, data: Path | None) -> dict[int, UnitMeasurement]:
     """A face's shapes as its folder holds them, or measured."""
     folder = folder_of(face.name)
     if data is None:

@@ -10,7 +10,7 @@ Blocks of cross-linked behaviours (nod, shake, smile, brows, gaze, emotion), eac
     together  all of these
     stretch   the longest of what nobody can interrupt: reading, or planning to taking in
 
-Medians over many documents of a session that goes on, in milliseconds; then the least of `together`, which
+Medians over many documents of a session that goes on, in milliseconds; then the least of `couple_lips`, which
 other work on the machine disturbs less. `noise` is how much longer than usual the slowest twentieth took of
 the runs of one piece of work that does nothing else, between the documents. `growth` is the exponent of the
 time in the number of behaviours, from 6 to 60: 1 is linear. Measures only; nothing asserts a time.

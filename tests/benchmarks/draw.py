@@ -24,12 +24,12 @@ from realizer.face.load import load_face
 from realizer.face.surface import normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
 from realizer.render import Renderer, available
-from realizer.render.backends import WAYS
+from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
 from realizer.render.light import Shader, preset
-from realizer.render.opengl import Canvas
-from realizer.render.shaded_mesh import Figure
-from realizer.render.software import OnboardCanvas
+from realizer.render.opengl import OpenGLCanvas
+from realizer.render.shaded_mesh import ShadedMesh
+from realizer.render.software import SoftwareCanvas
 from realizer.render.worker import encode
 
 # Spoken by the silent voice in about ten seconds.
@@ -56,7 +56,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--face", default="default")
     options.add_argument("--size", default="512x512")
-    options.add_argument("--way", default="auto", choices=WAYS)
+    options.add_argument("--way", default="auto", choices=BACKENDS)
     options.add_argument("--frames", type=int, default=60)
     chosen = options.parse_args()
     width, height = (int(n) for n in chosen.size.split("x"))
@@ -80,15 +80,15 @@ def main() -> None:
     line("normals, likewise", median(lambda: normals(face, vertices), 20) / 16)
     line("deform and normals, one frame alone", median(lambda: normals(face, deform(face, rows[:1])), 40))
     line("shade", median(lambda: shader(ups[0]), 100))
-    figure = Figure(face, camera, preset())
+    figure = ShadedMesh(face, camera, preset())
     line("shade, with furrows and glints", median(lambda: figure.pose(vertices[4], ups[4]), 60))
     for smooth in (True, False):
-        own = OnboardCanvas(face, size, camera, preset(), smooth=smooth)
+        own = SoftwareCanvas(face, size, camera, preset(), smooth=smooth)
         name = "four samples" if smooth else "one sample"
         line(f"by the processor, {name} a pixel", median(lambda own=own: own.draw(vertices[0], ups[0]), 60))
     picture = own.draw(vertices[0], ups[0])
     if (missing := available("gl")) is None:
-        canvas = Canvas(face, size, camera, preset())
+        canvas = OpenGLCanvas(face, size, camera, preset())
         line("by OpenGL, four samples a pixel", median(lambda: canvas.draw(vertices[0], ups[0]), 60))
         canvas.close()
     else:
@@ -96,7 +96,7 @@ def main() -> None:
     for form in ("jpeg", "png", "webp"):
         line(f"written as {form}", median(lambda form=form: encode(picture, form, 85), 20))
 
-    with Renderer(chosen.face, size, way=chosen.way) as renderer:
+    with Renderer(chosen.face, size, backend=chosen.way) as renderer:
         line("Renderer.encoded, JPEG of one row, all of it", median(lambda: renderer.encoded(rows[0]), 40))
         each = median(lambda: renderer.draw(rows), 3) / len(rows)
         line("Renderer.draw, a frame of a long call", each)

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer.facebuild.mpeg4.build import copy_with_zones
-from realizer.facebuild.mpeg4.fap_scores import PEERS, Truth, face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import PEERS, FapScore, mean_score, score_faps
 from realizer.tables import read_csv
 
 BY_EYE = Path(__file__).with_name("fap_scores_by_eye.csv")
@@ -30,7 +30,7 @@ class Seen:
     seen: str
 
 
-def by_eye(name: str, truths: tuple[Truth, ...]) -> str:
+def by_eye(name: str, truths: tuple[FapScore, ...]) -> str:
     """The mean of what was looked at, weighted as the rules' is; what nobody looked at does not count."""
     rows = read_csv(BY_EYE.read_text("utf-8"), Seen, BY_EYE.name)
     scores = {(row.fap, row.direction): row.score for row in rows if row.face == name}
@@ -47,12 +47,12 @@ def zones_line(name: str) -> str:
     """The same mesh moved by zones of influence alone, as a head without shapes would be."""
     with TemporaryDirectory() as folder:
         copy_with_zones(folder_of(name), Path(folder) / name)
-        truths = face_truth(load_face(name, Path(folder)))
+        truths = score_faps(load_face(name, Path(folder)))
     perfect = sum(truth.score == 3 for truth in truths)
     return f"{name + ', by zones':30}{mean_score(truths):6.2f}   (rules; {perfect} of {len(truths)} at 3)"
 
 
-def line(truth: Truth) -> str:
+def line(truth: FapScore) -> str:
     shares = "".join(f"{100 * value:9.2f}" for value in truth.faults)
     sign = "+" if truth.sign > 0 else "-"
     return f"{truth.fap:3} {sign} {truth.name:22}{truth.usual:8.0f}{shares}{truth.weight:4}{truth.score:7}"
@@ -67,7 +67,7 @@ def main() -> None:
     for name in chosen.face:
         face = load_face(name)
         began = time.perf_counter()
-        truths = face_truth(face)
+        truths = score_faps(face)
         spent = time.perf_counter() - began
         print(f"{name}: {len(truths)} displacements of {len(face.vertices)} vertices in {spent:.1f} s")
         print(

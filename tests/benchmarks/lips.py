@@ -163,7 +163,7 @@ def measure(voice: Voice, mouth: Mouth, shown: str, language: str, text: str, sc
     said = played.speeches[0]
     times = played.aus.times
     keep = times < said.start + said.utterance.duration + 0.2
-    times, rows = times[keep], poses(played.aus, mouth.face.takes)[keep]
+    times, rows = times[keep], poses(played.aus, mouth.face.inputs)[keep]
     vertices = mouth.vertices(rows)
     gap, bite, path = mouth.gap(vertices), mouth.bite(vertices), mouth.path(vertices)
     phases = round(FRAME / STEP)

@@ -62,7 +62,7 @@ def pictures(name: str) -> list[Image.Image]:
         for (number, side), value in face_lexemes()[lexeme].aus.items():
             row[[target.column for target in au(number, side)]] = value
     frames = AUFrames(np.arange(len(NAMES), dtype=np.float64), values, rules())
-    shown = poses(frames, load_face(name).takes, mapping_of(name))
+    shown = poses(frames, load_face(name).inputs, mapping_of(name))
     with Renderer(name, (SIZE, SIZE), "front") as renderer:
         return [Image.fromarray(np.asarray(image)[..., :3]) for image in renderer.draw(shown)]
 

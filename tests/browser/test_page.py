@@ -120,14 +120,14 @@ def still(light: str, aus: dict[int, float]):  # type: ignore[no-untyped-def]
     from realizer.animation.axis import au, axis
     from realizer.animation.frames import AUFrames
     from realizer.animation.pose import poses
-    from realizer.face.load import takes
+    from realizer.face.load import input_names
     from realizer.render import Renderer
 
     row = np.zeros((1, len(axis())), np.float32)
     for number, amount in aus.items():
         row[0, [target.column for target in au(number)]] = amount
     with Renderer("default", (STILL, STILL), light=light) as renderer:
-        (picture,) = renderer.draw(poses(AUFrames(np.zeros(1), row), takes("default")))
+        (picture,) = renderer.draw(poses(AUFrames(np.zeros(1), row), input_names("default")))
     return picture.astype(float)
 
 

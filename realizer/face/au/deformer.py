@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64
-from realizer.face.au.mixers import OPENING, opened
+from realizer.face.au.mixers import OPENING, limit_opening
 from realizer.face.au.model import Model, rotation
 from realizer.face.au.mouth import shares
-from realizer.face.au.skin_binding import grown, skin
+from realizer.face.au.skin_binding import attached_parts, skin
 from realizer.face.au.successive_mixer import LEAST, Succession
 from realizer.face.au.units import units
 from realizer.face.basis import FAPS, JAW_SIN
@@ -110,7 +110,7 @@ class Moves:
         Full intensity is `ActionUnit.strength`, because some units were measured at mild intensity.
         """
         shown = np.stack([pose[:, read].max(axis=1) for read in self._read], axis=1) * self._strengths
-        shown[:, self._opening] = opened(self._gaps, shown[:, self._opening].T).T
+        shown[:, self._opening] = limit_opening(self._gaps, shown[:, self._opening].T).T
         return shown
 
     def closed(self, shown: Float32) -> Float32:
@@ -187,7 +187,7 @@ def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Fl
     for row, (au, side) in zip(moves, names, strict=True):
         row[mine] = model.displacement(au, at[mine], side, upper[mine])
     # Brows and lashes go with the skin that they grow on: off it, functions of the place differ.
-    for first, last, corners, share in grown(face):
+    for first, last, corners, share in attached_parts(face):
         moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
     moves[np.abs(moves).max(axis=2) < LEAST] = 0
     return moves

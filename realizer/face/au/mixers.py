@@ -48,7 +48,7 @@ def successive(
     return np.asarray(at)
 
 
-def opened(gaps: Any, values: Any) -> Any:
+def limit_opening(gaps: Any, values: Any) -> Any:
     """Return the share of each unit at which the mouth opens as far as the widest one alone opens it.
 
     A stretched mouth is a dropped jaw and parted lips already (27@26, 27@25, 26@25 in her appendix C): added
@@ -84,7 +84,7 @@ def mix(model: Model, at: Float64, values: Mapping[int, float], thing: Thing = "
     known = units()
     moved = at
     wide = [au for au in OPENING if au in model.units and au in values]
-    amounts = opened(np.array([model.gap(au) for au in wide]), np.array([[values[au]] for au in wide]))
+    amounts = limit_opening(np.array([model.gap(au) for au in wide]), np.array([[values[au]] for au in wide]))
     values = {**values, **{au: float(amount[0]) for au, amount in zip(wide, amounts, strict=True)}}
     if thing == "face":
         moved = additive(model, at, {au: value for au, value in values.items() if au in model.units})

@@ -24,12 +24,12 @@ def skin(face: Face) -> Bool:
     return mine
 
 
-def grown(face: Face) -> list[tuple[int, int, Int32, Float64]]:
-    """The parts that grow on the skin: first and last vertex, and what `roots` says of them."""
-    return [(*face.parts[part], *roots(face, part)) for part in GROWN if part in face.parts]
+def attached_parts(face: Face) -> list[tuple[int, int, Int32, Float64]]:
+    """The parts that grow on the skin: first and last vertex, and what `skin_roots` says of them."""
+    return [(*face.parts[part], *skin_roots(face, part)) for part in GROWN if part in face.parts]
 
 
-def roots(face: Face, part: str) -> tuple[Int32, Float64]:
+def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
     """Three vertices of skin for each vertex of the part, (n, 3), and their shares, (n, 3).
 
     What stands off, such as a lash's tip, follows the nearest vertex of the part that is on the skin.

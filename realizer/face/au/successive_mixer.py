@@ -9,7 +9,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.face.au.model import Model, half
 from realizer.face.au.mouth import shares
-from realizer.face.au.skin_binding import grown, skin
+from realizer.face.au.skin_binding import attached_parts, skin
 from realizer.face.model import Face
 
 LEAST = 1e-5  # m; smaller movements of a unit are ignored
@@ -30,7 +30,7 @@ class Succession:
         self._mine = np.flatnonzero(skin(face))
         self._at = face.vertices[self._mine].astype(np.float64)
         self._upper = shares(face, model.mouth)[self._mine]
-        self._roots = grown(face)
+        self._roots = attached_parts(face)
         self._still: dict[int, tuple[Float64, float]] = {}
 
     def __call__(self, values: Mapping[int, tuple[float, float]]) -> Float64:

@@ -9,12 +9,12 @@ from realizer.face.au.mouth import fit_mouth, shares
 from realizer.face.au.units import units
 from realizer.face.model import Face
 from realizer.facebuild.arkit.mesh_merge import Surface
-from realizer.facebuild.au.measure import Measured
+from realizer.facebuild.au.measure import UnitMeasurement
 
 OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 
 
-def measured_units(face: Face, surface: Surface) -> dict[int, Measured]:
+def measure_units(face: Face, surface: Surface) -> dict[int, UnitMeasurement]:
     """Each displacement unit that the shapes make, on the left half of the skin.
 
     Raises:
@@ -29,7 +29,7 @@ def measured_units(face: Face, surface: Surface) -> dict[int, Measured]:
     for unit in units().values():
         move = _mixed(surface, unit.mixture) if unit.kind == "displacement" else None
         if move is not None and move[first:last][half].any():
-            out[unit.au] = Measured(unit.au, skin[half], move[first:last][half], seen, upper)
+            out[unit.au] = UnitMeasurement(unit.au, skin[half], move[first:last][half], seen, upper)
     return out
 
 

@@ -38,7 +38,7 @@ WORDS = {1: "Left", -1: "Right"}
 BINS = 24  # places across an eye
 
 
-class Grown:
+class ShapedSkin:
     """The skin with its shapes, and where the feature points sit on it.
 
     Args:
@@ -96,7 +96,7 @@ class Grown:
         return field / along
 
 
-def shape_fields(grown: Grown) -> dict[int, Float64]:
+def shape_fields(grown: ShapedSkin) -> dict[int, Float64]:
     """FAP -> (n, 3) field on the skin, of every FAP that the head's shapes serve."""
     found = _brows(grown) | _cheeks(grown) | _lids(grown) | _chin(grown) | _pushed(grown)
     found |= _corners(grown, found)
@@ -104,7 +104,7 @@ def shape_fields(grown: Grown) -> dict[int, Float64]:
     return {fap: field for fap, field in found.items() if field is not None}
 
 
-def _upper_lip(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+def _upper_lip(grown: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
     """The upper lip's FAPs from the shape that bares the upper teeth."""
     move = grown.move("mouthUpperUpLeft", "mouthUpperUpRight")
     if move is None:
@@ -115,7 +115,7 @@ def _upper_lip(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Fl
     return _line(grown, UPPER, move, near)
 
 
-def _lower_lip(grown: Grown) -> dict[int, Float64 | None]:
+def _lower_lip(grown: ShapedSkin) -> dict[int, Float64 | None]:
     """Return the fields of the lower lip: its share of an opening mouth; the rest belongs to FAP 3."""
     move = grown.move("jawOpen")
     if move is None:
@@ -124,7 +124,7 @@ def _lower_lip(grown: Grown) -> dict[int, Float64 | None]:
 
 
 def _line(
-    grown: Grown, line: Mapping[int, tuple[str, int, int]], move: Float64, near: Float64
+    grown: ShapedSkin, line: Mapping[int, tuple[str, int, int]], move: Float64, near: Float64
 ) -> dict[int, Float64 | None]:
     """A shape parted among the points of a lip."""
     mouth, height = grown.mouth, np.zeros((2, 5))
@@ -146,7 +146,7 @@ def _line(
     }
 
 
-def _corners(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
+def _corners(grown: ShapedSkin, made: Mapping[int, Float64 | None]) -> dict[int, Float64 | None]:
     """The corners' FAPs: a smile and a stretch, mixed so that the corner goes straight up or straight out."""
     out: dict[int, Float64 | None] = {}
     for side, rows in CORNERS.items():
@@ -171,7 +171,7 @@ def _corners(grown: Grown, made: Mapping[int, Float64 | None]) -> dict[int, Floa
     return out
 
 
-def _pushed(grown: Grown) -> dict[int, Float64 | None]:
+def _pushed(grown: ShapedSkin) -> dict[int, Float64 | None]:
     """FAPs 16 and 17: how far a funnel brings each lip forwards."""
     move = grown.move("mouthFunnel")
     if move is None:
@@ -182,7 +182,7 @@ def _pushed(grown: Grown) -> dict[int, Float64 | None]:
     return {16: grown.exact(16, ahead * (1 - upper)), 17: grown.exact(17, ahead * upper)}
 
 
-def _calm(grown: Grown) -> Float64:
+def _calm(grown: ShapedSkin) -> Float64:
     """(n, 1) 0 on the lids' edges, which follow no brow and no cheek, 1 elsewhere."""
     shut = np.zeros(len(grown.skin))
     for word in WORDS.values():
@@ -193,7 +193,7 @@ def _calm(grown: Grown) -> Float64:
     return np.asarray(1 - smooth(shut, 0.08, 0.6))[:, None]
 
 
-def _brows(grown: Grown) -> dict[int, Float64 | None]:
+def _brows(grown: ShapedSkin) -> dict[int, Float64 | None]:
     move = grown.move("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
     if move is None:
         return {}
@@ -218,7 +218,7 @@ def _brows(grown: Grown) -> dict[int, Float64 | None]:
     return out
 
 
-def _cheeks(grown: Grown) -> dict[int, Float64 | None]:
+def _cheeks(grown: ShapedSkin) -> dict[int, Float64 | None]:
     out: dict[int, Float64 | None] = {}
     free = np.asarray(smooth(grown.mouth.away, 0.0, 0.012))[:, None]
     puff = grown.move("cheekPuff")
@@ -233,7 +233,7 @@ def _cheeks(grown: Grown) -> dict[int, Float64 | None]:
     return out
 
 
-def _chin(grown: Grown) -> dict[int, Float64 | None]:
+def _chin(grown: ShapedSkin) -> dict[int, Float64 | None]:
     """FAP 18 from the shrug of the lower lip, without the lip."""
     move = grown.move("mouthShrugLower")
     if move is None:
@@ -242,7 +242,7 @@ def _chin(grown: Grown) -> dict[int, Float64 | None]:
     return {18: grown.exact(18, grown.smoothed(move * free[:, None], 1))}
 
 
-def _lids(grown: Grown) -> dict[int, Float64 | None]:
+def _lids(grown: ShapedSkin) -> dict[int, Float64 | None]:
     """Return FAPs 19 to 22 from the blink; both lids together close the opening at every place."""
     out: dict[int, Float64 | None] = {}
     for side, top, bottom in ((1, 19, 21), (-1, 20, 22)):

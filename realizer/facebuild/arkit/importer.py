@@ -14,14 +14,14 @@ from realizer.core.errors import FaceError
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, pack, unpack
 from realizer.face.features import Point, write_features
 from realizer.face.load import load_face
-from realizer.facebuild.arkit.au_measurements import measured_units
-from realizer.facebuild.arkit.fields import Grown, shape_fields
+from realizer.facebuild.arkit.au_measurements import measure_units
+from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.jaw import drag_of, joint_of
-from realizer.facebuild.arkit.mesh_merge import Surface, cut, joined
+from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.mouth_coordinates import mouth_of
-from realizer.facebuild.arkit.orientation import pose_of, stood
-from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_of, behind, sort_parts
+from realizer.facebuild.arkit.orientation import oriented, pose_of
+from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_behind, ball_of, sort_parts
 from realizer.facebuild.arkit.points import points_of
 from realizer.facebuild.arkit.scene import read_pieces
 from realizer.facebuild.au.measure import write_shapes
@@ -74,7 +74,7 @@ class _Head:
     report: Report
 
 
-def look_at(path: Path) -> Report:
+def inspect_head(path: Path) -> Report:
     """Return what `import_head` would report, without writing anything.
 
     Raises:
@@ -104,7 +104,7 @@ def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
     found = (*report.found, f"{len(made)} FAPs move by its shapes, the others by zones", *words)
     unsure = report.unsure
     try:
-        measured = measured_units(load_face(folder.name, folder.parent), surface)
+        measured = measure_units(load_face(folder.name, folder.parent), surface)
     except FaceError as error:
         measured, unsure = {}, (*unsure, f"no shapes for the model of action units: {error}")
     if measured:
@@ -134,21 +134,21 @@ def _read(path: Path) -> _Head:
             f"{', '.join(guesses)}{' ...' if len(own) > 12 else ''}; rename them"
         )
     try:
-        surface = joined(pieces)
+        surface = merge_pieces(pieces)
         bad = np.flatnonzero(~np.isfinite(surface.vertices).all(axis=1))
         if len(bad) or not all(np.isfinite(move).all() for move in surface.moves.values()):
             raise FaceError("wanted finite places and moves, got NaN or infinity; export the head again")
         pose = pose_of(surface)
-        surface = stood(surface, pose)
+        surface = oriented(surface, pose)
         surface = cut(surface, surface.vertices[:, 1] - FLOOR)
         surface = cut(surface, ASIDE - np.abs(surface.vertices[:, 0]))
         parts = sort_parts(surface)
     except FaceError as error:
         raise FaceError(f"{path}: {error}") from None
-    surface = surface.chosen(np.concatenate(list(parts.parts.values())))
+    surface = surface.subset(np.concatenate(list(parts.parts.values())))
     ends = np.cumsum([0] + [len(index) for index in parts.parts.values()])
     ranges = {name: (int(ends[k]), int(ends[k + 1])) for k, name in enumerate(parts.parts)}
-    fit = behind if parts.painted else ball_of
+    fit = ball_behind if parts.painted else ball_of
     balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
     surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
     found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.words, *parts.words]
@@ -234,14 +234,14 @@ def _write_fields(
     with np.load(folder / "fields.npz") as file:
         stored: dict[str, Any] = {name: file[name] for name in file.files}
     rows = unpack(stored, len(at))
-    grown = _grown(surface, ranges, points, rows)
+    grown = _shaped_skin(surface, ranges, points, rows)
     made = shape_fields(grown)
     words = _jaw(grown, surface, ranges, rows, stored, points, made)
     for fap, field in made.items():
-        rows[fap] = _dressed(at, ranges, field, rows[fap])
+        rows[fap] = _with_brows(at, ranges, field, rows[fap])
     if head.painted:
-        rows |= _looks(surface, ranges)
-    fit = behind if head.painted else ball_of
+        rows |= _gaze_rows(surface, ranges)
+    fit = ball_behind if head.painted else ball_of
     eyes = [fit(at[slice(*ranges[part])]) for part in ("left_eye", "right_eye")]
     lid, lid_eye, lid_radius = sliding(rows, at, ranges, eyes)
     if head.painted:
@@ -262,11 +262,11 @@ def _write_fields(
     return tuple(sorted(made)), words
 
 
-def _grown(
+def _shaped_skin(
     surface: Surface, ranges: dict[str, tuple[int, int]], points: dict[str, Point], rows: dict[int, Float64]
-) -> Grown:
+) -> ShapedSkin:
     at, (first, last) = surface.vertices, ranges["skin"]
-    skin = surface.chosen(np.arange(first, last))
+    skin = surface.subset(np.arange(first, last))
     places = {name: point.place for name, point in points.items()}
     sides = split_sides(at, surface.triangles, places, (first, last))
     upper = sides["upper_lip"] - first
@@ -277,11 +277,11 @@ def _grown(
     mouth = mouth_of(skin.vertices, skin.triangles, places, upper)
     vertex = {name: point.vertex - first for name, point in points.items() if first <= point.vertex < last}
     zones = {fap: field[first:last] for fap, field in rows.items()}
-    return Grown(skin.vertices, skin.triangles, skin.moves, places, vertex, mouth, lids, zones)
+    return ShapedSkin(skin.vertices, skin.triangles, skin.moves, places, vertex, mouth, lids, zones)
 
 
 def _jaw(
-    grown: Grown, surface: Surface, ranges: dict[str, tuple[int, int]], rows: dict[int, Float64],
+    grown: ShapedSkin, surface: Surface, ranges: dict[str, tuple[int, int]], rows: dict[int, Float64],
     stored: dict[str, Any], points: dict[str, Point], made: dict[int, Float64],
 ) -> tuple[str, ...]:  # fmt: skip
     """Rows of the opening, thrust and shift of the jaw where the head has shapes for them."""
@@ -305,7 +305,7 @@ def _jaw(
         for part in ("lower_teeth", "tongue"):
             if part in ranges:
                 opens[slice(*ranges[part])] = 1
-        opens = _dressed(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
+        opens = _with_brows(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
         arm = surface.vertices - pivot
         for row, way in (
             (JAW_COS, np.stack([0 * arm[:, 0], -arm[:, 1], -arm[:, 2]], 1)),
@@ -325,7 +325,7 @@ def _jaw(
     return words
 
 
-def _dressed(at: Float64, ranges: dict[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
+def _with_brows(at: Float64, ranges: dict[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
     """Return a row with a field on the skin; brows and lashes follow it, other parts keep their own."""
     from scipy.spatial import cKDTree
 
@@ -342,14 +342,14 @@ def _dressed(at: Float64, ranges: dict[str, tuple[int, int]], field: Float64, ro
     return out
 
 
-def _looks(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int, Float64]:
+def _gaze_rows(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int, Float64]:
     """Rows of FAPs 23 to 26, metres a radian, of eyes that are no balls: the shapes that look about."""
     rows = {}
     for part, word, yaw, pitch, left in (
         ("left_eye", "Left", 23, 25, "Out"), ("right_eye", "Right", 24, 26, "In"),
     ):  # fmt: skip
         right = "In" if left == "Out" else "Out"
-        _, radius = behind(surface.vertices[slice(*ranges[part])])
+        _, radius = ball_behind(surface.vertices[slice(*ranges[part])])
         for fap, one, other in ((yaw, left, right), (pitch, "Down", "Up")):
             move = (surface.move(f"eyeLook{one}{word}") - surface.move(f"eyeLook{other}{word}")) / 2
             size = float(np.linalg.norm(move, axis=1).max())

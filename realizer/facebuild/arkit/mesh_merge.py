@@ -39,7 +39,7 @@ class Surface:
         """Return the displacement (n, 3) of a shape, or zeros if the head lacks it."""
         return self.moves.get(name, np.zeros_like(self.vertices))
 
-    def chosen(self, vertices: Any) -> Surface:
+    def subset(self, vertices: Any) -> Surface:
         """The surface of some vertices, in the order given, and the triangles that they alone make."""
         index = np.asarray(vertices)
         place = np.full(len(self.vertices), -1)
@@ -56,7 +56,7 @@ class Surface:
         )
 
 
-def joined(pieces: Sequence[Piece]) -> Surface:
+def merge_pieces(pieces: Sequence[Piece]) -> Surface:
     """The pieces as one surface; pieces that one looks through are left out."""
     pieces = [piece for piece in pieces if not piece.glass]
     counts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
@@ -104,7 +104,7 @@ def _welded(surface: Surface) -> Surface:
         moves={name: move[first] for name, move in surface.moves.items()},
     )
     # Vertices without a triangle are invisible.
-    return whole.chosen(np.unique(corners))
+    return whole.subset(np.unique(corners))
 
 
 def components(triangles: Int32, n: int) -> Int32:
@@ -123,10 +123,10 @@ def cut(surface: Surface, height: Float64) -> Surface:
         return surface
     import scipy.sparse as sp
 
-    from realizer.facebuild.submesh import Patch
+    from realizer.facebuild.submesh import Submesh
 
     n = len(surface.vertices)
-    flat = Patch(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)
+    flat = Submesh(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)
     piece, mix = flat.clipped(height)
     nearest = np.asarray(mix.argmax(axis=1)).ravel()
     return replace(

@@ -11,7 +11,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.mpeg4.zones import Triple
-from realizer.facebuild.person.lips import hats
+from realizer.facebuild.person.lips import spline_basis
 
 # The contours from the right corner over the middle to the left corner: upper, then lower.
 INNER = (("2.5", "2.7", "2.2", "2.6", "2.4"), ("2.5", "2.9", "2.3", "2.8", "2.4"))
@@ -61,7 +61,7 @@ def mouth_of(skin: Float64, triangles: Int32, points: Mapping[str, Triple], uppe
     mean = averages(len(skin), triangles)
     for _ in range(BLUR):
         soft = np.asarray(mean @ soft)
-    return Mouth(hats(along), across, np.where(away < LIPS, above, soft), away, along)
+    return Mouth(spline_basis(along), across, np.where(away < LIPS, above, soft), away, along)
 
 
 def edge_graph(at: Float64, triangles: Int32) -> Any:

@@ -92,7 +92,7 @@ def pose_of(surface: Surface) -> Pose:
     return Pose(turn, scale, (left + right) / 2, unit, swapped, tuple(words), tuple(unsure))
 
 
-def stood(surface: Surface, pose: Pose) -> Surface:
+def oriented(surface: Surface, pose: Pose) -> Surface:
     """The surface in metres, origin between the eyes, +x the character's left, +y up, +z forward."""
     moves = {name: move @ pose.turn.T * pose.scale for name, move in surface.moves.items()}
     if pose.swapped:

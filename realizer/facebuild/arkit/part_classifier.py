@@ -28,7 +28,7 @@ ORDER = (
 
 
 @dataclass(frozen=True)
-class Sorted:
+class HeadParts:
     """Which vertices are what.
 
     Attributes:
@@ -68,7 +68,7 @@ def part_of(names: tuple[str, ...]) -> str:
     return weak
 
 
-def sort_parts(surface: Surface) -> Sorted:
+def sort_parts(surface: Surface) -> HeadParts:
     """Return the parts of an upright head in metres with its origin between the eyes.
 
     Raises:
@@ -115,7 +115,7 @@ def sort_parts(surface: Surface) -> Sorted:
         )
     parts = {name: index for name, index in parts.items() if len(index)}
     words.insert(0, ", ".join(f"{name} {len(index)}" for name, index in parts.items()) + " vertices")
-    return Sorted(parts, painted, tuple(words), tuple(unsure))
+    return HeadParts(parts, painted, tuple(words), tuple(unsure))
 
 
 def _by_shape(surface: Surface, mine: Any, said: str) -> str:
@@ -144,7 +144,7 @@ def is_ball(at: Float64) -> bool:
     return bool(BALL[0] < radius < BALL[1] and np.percentile(off, 80) < ROUND * radius)
 
 
-def behind(at: Float64) -> tuple[Float64, float]:
+def ball_behind(at: Float64) -> tuple[Float64, float]:
     """Centre and radius of the ball that would lie behind an eye (n, 3) that is part of the skin."""
     middle = np.asarray((at.min(axis=0) + at.max(axis=0)) / 2)
     return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
@@ -198,7 +198,7 @@ def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
     if not len(mine):
         return mine, mine, []
     drop = np.linalg.norm(surface.move("jawOpen")[mine], axis=1)
-    labels = components(surface.chosen(mine).triangles, len(mine))
+    labels = components(surface.subset(mine).triangles, len(mine))
     if drop.max() > 0.004:
         mean = np.bincount(labels, drop) / np.bincount(labels)
         lower: Bool = mean[labels] > 0.5 * drop.max()

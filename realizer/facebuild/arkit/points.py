@@ -10,7 +10,7 @@ import numpy as np
 from realizer.core.array_types import Float64
 from realizer.face.features import Point
 from realizer.facebuild.arkit.mesh_merge import Surface
-from realizer.facebuild.arkit.part_classifier import behind
+from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.mpeg4.landmarks import find_points
 from realizer.facebuild.submesh import vertex_normals
 
@@ -39,7 +39,7 @@ def points_of(
     if painted:
         # Eyes that are part of the skin cannot be measured as balls: assume balls behind them.
         for name in PUPILS:
-            centre, radius = behind(surface.vertices[slice(*ranges[name])])
+            centre, radius = ball_behind(surface.vertices[slice(*ranges[name])])
             parts[name] = (len(at), len(at) + len(SPHERE))
             at = np.concatenate([at, centre + radius * SPHERE])
     points, guesses = find_points(at, surface.triangles, parts)
@@ -50,7 +50,7 @@ def points_of(
             vertex = begin + int(np.argmin(off))
             points[pupil] = Point(pupil, vertex, *at[vertex])
     first, last = ranges["skin"]
-    skin = surface.chosen(np.arange(first, last))
+    skin = surface.subset(np.arange(first, last))
     sure = _lids(skin, points, first) | _slit(skin, points, first)
     points |= {name: Point(name, vertex, *surface.vertices[vertex]) for name, vertex in sure.items()}
     return points, tuple(name for name in guesses if name not in sure)

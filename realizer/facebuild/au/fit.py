@@ -13,9 +13,9 @@ from realizer.face.au.model import CENTIMETRE, HeadTurn, Model, Motion, Mouth, U
 from realizer.face.au.mouth import fit_mouth
 from realizer.face.au.units import units
 from realizer.face.model import Face
-from realizer.facebuild.au.fit_limits import FURTHEST, Watched, furthest, watched
-from realizer.facebuild.au.measure import Measured
-from realizer.facebuild.au.solve import STILL, Fit, Found
+from realizer.facebuild.au.fit_limits import FURTHEST, WatchedPlaces, furthest, watched_places
+from realizer.facebuild.au.measure import UnitMeasurement
+from realizer.facebuild.au.solve import STILL, Fit, FitResult
 from realizer.tables import action_units
 
 FORMS = ("published", "extended")  # one or two Gaussians; up to four
@@ -46,7 +46,7 @@ class Row:
 
 def fit_models(
     face: Face,
-    measured: Mapping[int, Measured],
+    measured: Mapping[int, UnitMeasurement],
     forms: Sequence[str] = FORMS,
     say: Callable[[str], None] = lambda _: None,
     source: str = "",
@@ -71,7 +71,7 @@ def fit_models(
         if form not in FORMS:
             raise FaceError(f"form: wanted one of {', '.join(FORMS)}, got {form!r}")
     mouth, jaw = fit_mouth(face), _jaw(face)
-    places, finer = watched(face, mouth), watched(face, mouth, between=True)
+    places, finer = watched_places(face, mouth), watched_places(face, mouth, between=True)
     fitted: dict[str, dict[int, UnitModel]] = {form: {} for form in forms}
     for au, one in measured.items():
         ratios = []
@@ -109,7 +109,7 @@ def fit_models(
     }
 
 
-def table(model: Model, measured: Mapping[int, Measured]) -> tuple[Row, ...]:
+def table(model: Model, measured: Mapping[int, UnitMeasurement]) -> tuple[Row, ...]:
     """Her table 4.3 for the units that both have."""
     return tuple(_row(model.units[au], one, model.mouth) for au, one in measured.items() if au in model.units)
 
@@ -129,16 +129,16 @@ def table_text(rows: tuple[Row, ...]) -> str:
     return "\n".join(lines)
 
 
-def _d_max(one: Measured) -> float:
-    if not one.moves[one.seen].any():
+def _d_max(one: UnitMeasurement) -> float:
+    if not one.moves[one.visible].any():
         raise FaceError(f"AU{one.au}: wanted a landmark that moves and can be seen, got none")
-    return float(np.linalg.norm(one.moves[one.seen], axis=1).max())
+    return float(np.linalg.norm(one.moves[one.visible], axis=1).max())
 
 
-def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
+def _row(unit: UnitModel, one: UnitMeasurement, mouth: Mouth) -> Row:
     long = np.linalg.norm(one.moves, axis=1)
     d_max = _d_max(one)
-    counts = one.seen & (long > MOVES * d_max)
+    counts = one.visible & (long > MOVES * d_max)
     upper = None if one.upper is None else one.upper[counts]
     miss = np.linalg.norm(unit.displacement(one.at[counts], mouth, upper) - one.moves[counts], axis=1)
     return Row(
@@ -146,13 +146,15 @@ def _row(unit: UnitModel, one: Measured, mouth: Mouth) -> Row:
     )
 
 
-def _fit_unit(one: Measured, mouth: Mouth, places: Watched, forms: Sequence[str]) -> dict[str, UnitModel]:
+def _fit_unit(
+    one: UnitMeasurement, mouth: Mouth, places: WatchedPlaces, forms: Sequence[str]
+) -> dict[str, UnitModel]:
     # Her units are symmetric: a measurement of one side holds for the other, so both are folded to the left.
     flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     at, moves = one.at * flip, one.moves * flip
     long = np.linalg.norm(moves, axis=1)
     size = _d_max(one)
-    weight = np.where(one.seen, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
+    weight = np.where(one.visible, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
     # A point in the middle counts once, any other one also for its mirror image.
     weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
     halves = {"whole": weight}
@@ -193,7 +195,7 @@ def _fit_motion(
     return {form: _motion(origin, found[form], size) for form in forms}
 
 
-def _motion(origin: Float64, found: Found, size: float) -> Motion:
+def _motion(origin: Float64, found: FitResult, size: float) -> Motion:
     gaussians = found.gaussians.copy()
     gaussians[:, 0] *= size
     return Motion(origin, gaussians, found.alpha, found.beta)

@@ -16,7 +16,7 @@ from realizer.face.au.functions import density
 from realizer.face.au.model import Model, Mouth, UnitModel
 from realizer.face.au.mouth import shares
 from realizer.face.model import Face
-from realizer.facebuild.au.measure import Measured
+from realizer.facebuild.au.measure import UnitMeasurement
 
 PARTS = ("skin", "lashes", "brows", "hair")  # what units move
 FURTHEST = 1.3  # times d_max: further no vertex goes
@@ -25,7 +25,7 @@ STEEP = 10.0  # and beyond it the excess squared, times this
 REACH = 1e-3  # share of a half that counts as belonging to it
 
 
-class Watched:
+class WatchedPlaces:
     """The places of a face at which a fit is limited.
 
     Attributes:
@@ -45,7 +45,7 @@ class Watched:
         return self.at[most > REACH if half == "upper" else least < 1 - REACH]
 
 
-def watched(face: Face, mouth: Mouth, between: bool = False) -> Watched:
+def watched_places(face: Face, mouth: Mouth, between: bool = False) -> WatchedPlaces:
     """Every vertex that units move, mirrored onto the left.
 
     Args:
@@ -64,10 +64,10 @@ def watched(face: Face, mouth: Mouth, between: bool = False) -> Watched:
     # The left, and of the right what has no twin there.
     at = at * np.where(at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     _, once = np.unique(np.rint(np.c_[at * 1e5, upper, plane]), axis=0, return_index=True)
-    return Watched(at[once], upper[once], plane[once])
+    return WatchedPlaces(at[once], upper[once], plane[once])
 
 
-def furthest(unit: UnitModel, mouth: Mouth, places: Watched) -> tuple[float, Float64]:
+def furthest(unit: UnitModel, mouth: Mouth, places: WatchedPlaces) -> tuple[float, Float64]:
     """Return the largest displacement of a unit in metres, and its place (3,)."""
     both = [unit.displacement(places.at, mouth, upper) for upper in (places.upper, places.plane)]
     long = np.maximum(*(np.linalg.norm(moves, axis=1) for moves in both))
@@ -88,13 +88,13 @@ def overshoot(gaussians: Float64, at: Float64) -> tuple[Float64, Float64]:
     return np.abs(sign) * (np.abs(value[over]) - FREE), sign[:, None] * slopes[over]
 
 
-def runaways(face: Face, model: Model, measured: Mapping[int, Measured]) -> tuple[str, ...]:
+def runaways(face: Face, model: Model, measured: Mapping[int, UnitMeasurement]) -> tuple[str, ...]:
     """A sentence for each unit that moves a vertex of the face further than `FURTHEST` times d_max."""
-    places = watched(face, model.mouth)
+    places = watched_places(face, model.mouth)
     out = []
     for au, one in measured.items():
         if au in model.units:
-            d_max = float(np.linalg.norm(one.moves[one.seen], axis=1).max())
+            d_max = float(np.linalg.norm(one.moves[one.visible], axis=1).max())
             far, where = furthest(model.units[au], model.mouth, places)
             if far > FURTHEST * d_max:
                 x, y, z = (1000 * where).round(1).tolist()

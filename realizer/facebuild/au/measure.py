@@ -21,21 +21,21 @@ FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class UnitMeasurement:
     """An action unit shown with full intensity, measured.
 
     Attributes:
         au: its number.
         at: (n, 3) metres, the landmarks on the neutral face.
         moves: (n, 3) metres, where each goes.
-        seen: (n,) visibility: hidden points count little in a fit and are left out of its table.
+        visible: (n,) visibility: hidden points count little in a fit and are left out of its table.
         upper: (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
     """
 
     au: int
     at: Float64
     moves: Float64
-    seen: Bool
+    visible: Bool
     upper: Float64 | None = None
 
 
@@ -52,7 +52,7 @@ class Landmark:
     dz: float
 
 
-def read_measured(path: Path) -> dict[int, Measured]:
+def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
     """Measurements from a CSV file: a row a landmark and action unit (au,x,y,z,dx,dy,dz in metres).
 
     Landmarks of one side are enough (Wojdel 2005, 4.2.1): the action units are even.
@@ -82,11 +82,11 @@ def read_measured(path: Path) -> dict[int, Measured]:
             raise FaceError(
                 f"{path}: AU{au}: wanted {FEWEST} landmarks or more of which one moves, got {len(table)}"
             )
-        found[au] = Measured(au, table[:, :3], table[:, 3:], np.ones(len(table), bool))
+        found[au] = UnitMeasurement(au, table[:, :3], table[:, 3:], np.ones(len(table), bool))
     return found
 
 
-def read_shapes(path: Path) -> dict[int, Measured]:
+def read_shapes(path: Path) -> dict[int, UnitMeasurement]:
     """Measurements from a face's own shapes, as `write_shapes` left them.
 
     Raises:
@@ -102,19 +102,19 @@ def read_shapes(path: Path) -> dict[int, Measured]:
         )
     seen, upper = stored["seen"].astype(bool), stored["upper"].astype(np.float64)
     return {
-        int(au): Measured(int(au), at, move.astype(np.float64) * FINE, seen, upper)
+        int(au): UnitMeasurement(int(au), at, move.astype(np.float64) * FINE, seen, upper)
         for au, move in zip(stored["au"], moves, strict=True)
     }
 
 
-def write_shapes(path: Path, measured: Mapping[int, Measured]) -> None:
+def write_shapes(path: Path, measured: Mapping[int, UnitMeasurement]) -> None:
     """Store measurements that share their landmarks."""
     first = next(iter(measured.values()))
     if first.upper is None:
         raise ValueError("wanted shapes whose halves are known, got landmarks")
     arrays: dict[str, Any] = {
         "at": first.at.astype(np.float32),
-        "seen": first.seen,
+        "seen": first.visible,
         "upper": np.asarray(first.upper, np.float32),
         "au": np.array(list(measured), np.int32),
         "moves": np.stack([np.rint(one.moves / FINE) for one in measured.values()]).astype(np.int16),

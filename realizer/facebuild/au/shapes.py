@@ -13,13 +13,13 @@ from realizer.core.errors import FaceError
 from realizer.face.au.mouth import fit_mouth, shares
 from realizer.face.au.units import Unit, units
 from realizer.face.model import Face
-from realizer.facebuild.au.measure import Measured
+from realizer.facebuild.au.measure import UnitMeasurement
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 
 OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 COLLAR = -0.16  # m; below it no face moves
@@ -30,7 +30,7 @@ AROUND = 32  # number of nearest triangles to look at
 
 def measure_shapes(
     face: Face, folder: Path, data: Path, wanted: Iterable[Unit] | None = None
-) -> dict[int, Measured]:
+) -> dict[int, UnitMeasurement]:
     """Each displacement unit's shape on the left half (x >= 0) of a face's skin.
 
     Args:
@@ -69,7 +69,7 @@ def measure_shapes(
                     shape += weight * makehuman.read_target(data, side, len(at)) * makehuman.DECIMETRE
             shape = (shape + shape[twin] * EVEN) / 2
             moves = np.einsum("nk,nkc->nc", share, shape[corners])
-            out[unit.au] = Measured(unit.au, skin, moves, seen, upper)
+            out[unit.au] = UnitMeasurement(unit.au, skin, moves, seen, upper)
     return out
 
 
@@ -91,7 +91,7 @@ def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Fl
     skin = face.vertices[first:last].astype(np.float64)
     mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
     ups, skin = vertex_normals(skin, mine)[index], skin[index]
-    body = Patch.of_quads(ground.mesh.quads["body"], len(ground.at))
+    body = Submesh.of_quads(ground.mesh.quads["body"], len(ground.at))
     base = body.mix.indices[body.triangles]
     corners = ground.at[base]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

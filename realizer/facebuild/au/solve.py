@@ -71,7 +71,7 @@ WIDE = (0.6, 1.4)  # cm; how wide a Gaussian that is added begins
 
 
 @dataclass(frozen=True)
-class Found:
+class FitResult:
     """The result of a fit: layout, free parameters of its Gaussians and angles, and its cost."""
 
     layout: str
@@ -202,7 +202,7 @@ class Fit:
         x = least(residual, x, 150)
         return x, float((residual(x)[0] ** 2).sum())
 
-    def joint(self, layout: str, bells: Float64, angles: Float64) -> Found:
+    def joint(self, layout: str, bells: Float64, angles: Float64) -> FitResult:
         """Both functions polished together: the least weighted sum of the lengths of the misses."""
         form = mirrored_gaussians(layout)
         split = len(bells)
@@ -245,9 +245,9 @@ class Fit:
                 best, cost = (x, now) if now < cost else (best, cost)
                 break
             best, cost = x, now
-        return Found(layout, best[:split], best[split:], cost)
+        return FitResult(layout, best[:split], best[split:], cost)
 
-    def published(self) -> Found:
+    def published(self) -> FitResult:
         """The best of one or two Gaussians."""
         ways = self.directions()
         ways = [ways[0], *(one for one in ways[1:] if one[1] > ways[0][1] * 1.02)][:2]
@@ -259,7 +259,7 @@ class Fit:
         found += [self.joint(*start) for one in found[: len(ways)] for start in self._grown(one, 2)]
         return min(found, key=lambda one: one.cost)
 
-    def extended(self, published: Found) -> Found:
+    def extended(self, published: FitResult) -> FitResult:
         """The best of up to four Gaussians: some added where most is missing, or four from the start."""
         found = [self.joint(layout, self.densities(layout)[0], published.angles) for layout in EXTENDED]
         grown = published
@@ -270,7 +270,7 @@ class Fit:
             grown = more
         return min([*found, grown], key=lambda one: one.cost)
 
-    def _grown(self, found: Found, most: int) -> Iterator[tuple[str, Float64, Float64]]:
+    def _grown(self, found: FitResult, most: int) -> Iterator[tuple[str, Float64, Float64]]:
         """Starts with one more Gaussian, or one more on each side, at the point that lacks most."""
         way = self._way(found.angles, self.at)[0]
         lack = np.einsum("ij,ij->i", self.moves, way) - density(found.gaussians, self.at)[0]

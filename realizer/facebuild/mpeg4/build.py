@@ -113,7 +113,7 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
         )
     whole = _with_masks_of_skin(setup, parts["skin"])
     made = _softened(zone_fields(whole, at[skin]), whole, at[skin], mesh["triangles"], parts["skin"])
-    rows = {fap: _dressed(at, parts, made[fap]) for fap in chosen}
+    rows = {fap: _with_brows(at, parts, made[fap]) for fap in chosen}
     if only:
         stored = read_arrays(path, ARRAYS)
         rows = _unpacked(stored, len(at)) | rows
@@ -206,7 +206,7 @@ def _with_masks_of_skin(setup: Setup, skin: tuple[int, int]) -> Setup:
     return replace(setup, masks=masks)
 
 
-def _dressed(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64) -> Float64:
+def _with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64) -> Float64:
     """A field of the skin on the whole face: brows and lashes go along, the rest stays."""
     from scipy.spatial import cKDTree
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 
-LEAST_POWER = 1e-3  # an ease of -100 is the limit where nothing moves
+MIN_POWER = 1e-3  # an ease of -100 is the limit where nothing moves
 SAMPLES = 2001
 
 
@@ -24,7 +24,7 @@ def ease(distance: Any, amount: float) -> Float64:
         amount: e, from -100 (less influence) over 0 (linear) to 100 (more).
     """
     power = 1 + amount / (100 if amount <= 0 else 20)
-    return np.asarray(1 - np.clip(distance, 0, 1) ** max(power, LEAST_POWER), np.float64)
+    return np.asarray(1 - np.clip(distance, 0, 1) ** max(power, MIN_POWER), np.float64)
 
 
 def cosine(distance: Any) -> Float64:

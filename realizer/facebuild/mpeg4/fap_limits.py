@@ -16,42 +16,42 @@ ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what goes down with it: the 
 
 
 @cache
-def usual(fap: int, sign: int) -> float:
+def usual_range(fap: int, sign: int) -> float:
     """The most that is usual of a FAP alone in a direction (its own unit, positive).
 
     A lower lip hangs on its jaw: what an action unit asks for as far as it opens the jaw does not count.
     """
     row = faps()[fap - 1]
-    most = max((_asked(fap, sign, au) for au in _units()), default=0.0)
+    most = max((_unit_value(fap, sign, au) for au in _units()), default=0.0)
     if most <= 0:
-        most = _reached(fap)
+        most = _face_range(fap)
     return float(min(most, row.most if sign > 0 else -row.least))
 
 
 @cache
-def borne(fap: int, sign: int) -> float:
+def required_range(fap: int, sign: int) -> float:
     """Return the largest value that a face must support: the usual maximum, at least what faces reach."""
     row = faps()[fap - 1]
     most = row.most if sign > 0 else -row.least
-    return max(usual(fap, sign), min(_reached(fap), float(most)))
+    return max(usual_range(fap, sign), min(_face_range(fap), float(most)))
 
 
 @cache
-def company(fap: int, sign: int) -> dict[int, float]:
+def accompanying_faps(fap: int, sign: int) -> dict[int, float]:
     """Return the FAPs of the action unit that uses one FAP most in a direction, or an empty mapping."""
     strongest = max(_units(), key=lambda au: sign * _units()[au].get(fap, 0.0))
     whole = _units()[strongest]
     return dict(whole) if sign * whole.get(fap, 0.0) > 0 else {}
 
 
-def _reached(fap: int) -> float:
+def _face_range(fap: int) -> float:
     row = faps()[fap - 1]
     if row.direction == "growing":
         return PUPIL
     return EYEBALLS_OUT if row.name.endswith("eyeball") and row.unit == "ES" else REACH[row.unit]
 
 
-def _asked(fap: int, sign: int, au: str) -> float:
+def _unit_value(fap: int, sign: int, au: str) -> float:
     asked = sign * _units()[au].get(fap, 0.0)
     return asked - _units()[au].get(OPEN_JAW, 0.0) if fap in ON_JAW and sign < 0 else asked
 

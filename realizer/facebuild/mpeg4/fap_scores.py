@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 
 from realizer.face.model import Face
-from realizer.facebuild.mpeg4.fap_limits import ROLLED, company, usual
+from realizer.facebuild.mpeg4.fap_limits import ROLLED, accompanying_faps, usual_range
 from realizer.facebuild.mpeg4.measure import Measure, error_of, flips_of, mirror_of, others_of, rough_of
 from realizer.tables import Fap, faps, read_csv
 
@@ -27,7 +27,7 @@ KNOWN = 0.75
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class FapScore:
     """The measures of one FAP in one direction, as shares of the requested movement.
 
     Attributes:
@@ -68,15 +68,15 @@ class Truth:
         return 1 if self.error <= KNOWN else 0
 
 
-def mean_score(truths: tuple[Truth, ...]) -> float:
+def mean_score(truths: tuple[FapScore, ...]) -> float:
     """The mean weighted by how much each FAP matters."""
     return sum(t.weight * t.score for t in truths) / sum(t.weight for t in truths)
 
 
-def face_truth(face: Face) -> tuple[Truth, ...]:
+def score_faps(face: Face) -> tuple[FapScore, ...]:
     """Every FAP from 3 to 68, in each of its directions: 127."""
     return tuple(
-        _truth(Measure.of(face), row, sign)
+        _score_fap(Measure.of(face), row, sign)
         for row in faps()[2:]
         for sign in ((1, -1) if row.least < 0 else (1,))
     )
@@ -94,15 +94,15 @@ def _weights() -> dict[int, int]:
     return {row.fap: row.weight for row in read_csv(text, _Weight, "weights.csv")}
 
 
-def _truth(measure: Measure, row: Fap, sign: int) -> Truth:
-    top = usual(row.fap, sign)
+def _score_fap(measure: Measure, row: Fap, sign: int) -> FapScore:
+    top = usual_range(row.fap, sign)
     half = TURN if row.unit == "angle_unit" else min(HALF, row.most if sign > 0 else -row.least)
     half = top if row.direction == "growing" else half
     value = sign * half
     # Both the range that Paul judged and the usual range must be right.
     asked = [value] + ([sign * top] if top < half else [])
     moves = [measure.moves({row.fap: v}) for v in asked]
-    return Truth(
+    return FapScore(
         fap=row.fap,
         name=row.name,
         sign=sign,
@@ -112,7 +112,7 @@ def _truth(measure: Measure, row: Fap, sign: int) -> Truth:
         others=others_of(measure, row, asked, moves),
         flips=max(
             flips_of(measure, row, {row.fap: sign * top}),
-            flips_of(measure, row, company(row.fap, sign), ROLLED),
+            flips_of(measure, row, accompanying_faps(row.fap, sign), ROLLED),
         ),
         rough=rough_of(measure, row, moves[0][measure.skin]),
         usual=top,

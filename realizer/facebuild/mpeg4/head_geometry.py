@@ -14,7 +14,7 @@ ASIDE = 0.002  # eye distances
 
 
 @dataclass(frozen=True, eq=False)
-class Head:
+class HeadGeometry:
     """A head in its own measure.
 
     Attributes:
@@ -31,7 +31,7 @@ class Head:
     radius: float
 
 
-def evidence(head: Head) -> dict[str, Float64]:
+def find_anchors(head: HeadGeometry) -> dict[str, Float64]:
     """Return anchor name -> place (3,), for the anchors that were found."""
     found = _profile(head)
     for side, centre in (("l", head.left), ("r", head.right)):
@@ -41,7 +41,7 @@ def evidence(head: Head) -> dict[str, Float64]:
     return found
 
 
-def profile_line(head: Head) -> tuple[Float64, Float64]:
+def profile_line(head: HeadGeometry) -> tuple[Float64, Float64]:
     """Heights, and how far forward the skin reaches in the middle of the face at each; NaN: no skin."""
     at, tri = head.skin, head.triangles
     near = at[tri[(np.abs(at[tri, 0]) < 0.6).all(axis=1) & (at[tri, 2] > -0.4).all(axis=1)]]
@@ -65,7 +65,7 @@ def profile_line(head: Head) -> tuple[Float64, Float64]:
     return heights, front
 
 
-def _profile(head: Head) -> dict[str, Float64]:
+def _profile(head: HeadGeometry) -> dict[str, Float64]:
     heights, front = profile_line(head)
     kernel = np.array([1, 2, 3, 2, 1]) / 9
 
@@ -109,7 +109,7 @@ def _profile(head: Head) -> dict[str, Float64]:
     return out
 
 
-def _opening(head: Head, centre: Float64, side: str) -> dict[str, Float64]:
+def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float64]:
     """The corners and edges of the gap between the lids, from the front."""
     size = 1.25 * head.radius
     x = centre[0] + np.linspace(-size, size, GRID)
@@ -169,7 +169,7 @@ def _opening(head: Head, centre: Float64, side: str) -> dict[str, Float64]:
     }
 
 
-def _corners(head: Head, found: dict[str, Float64]) -> dict[str, Float64]:
+def _corners(head: HeadGeometry, found: dict[str, Float64]) -> dict[str, Float64]:
     """The mouth's corners: the ends of where skin touches skin."""
     from scipy.spatial import cKDTree
 
@@ -204,7 +204,7 @@ def _corners(head: Head, found: dict[str, Float64]) -> dict[str, Float64]:
     return out
 
 
-def _outline(head: Head) -> dict[str, Float64]:
+def _outline(head: HeadGeometry) -> dict[str, Float64]:
     """The ears, and the top and the back of the skull."""
     at, out = head.skin, {}
     above = at[at[:, 1] > -1.3]

@@ -16,7 +16,7 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.features import INSIDE, NAMES, Point
-from realizer.facebuild.mpeg4.head_geometry import Head, evidence
+from realizer.facebuild.mpeg4.head_geometry import HeadGeometry, find_anchors
 from realizer.facebuild.mpeg4.rigid import balls
 from realizer.facebuild.submesh import vertex_normals
 from realizer.tables import read_csv
@@ -51,7 +51,7 @@ def _template() -> tuple[dict[str, Float64], dict[str, Float64]]:
 
 def head_of(
     vertices: Float64, triangles: Int32, parts: Mapping[str, tuple[int, int]]
-) -> tuple[Head, Float64, float]:
+) -> tuple[HeadGeometry, Float64, float]:
     """The head in its own measure, and its origin (3,) and unit in metres."""
     at = np.asarray(vertices, np.float64)
     (left, radius), (right, other) = balls(at, parts)
@@ -65,7 +65,7 @@ def head_of(
     first, last = parts["skin"]
     mine = triangles[(triangles >= first).all(axis=1) & (triangles < last).all(axis=1)] - first
     skin = (at[first:last] - origin) / unit
-    head = Head(
+    head = HeadGeometry(
         skin, mine, vertex_normals(skin, mine), (left - origin) / unit, (right - origin) / unit,
         (radius + other) / 2 / unit,
     )  # fmt: skip
@@ -95,7 +95,7 @@ def find_points(
             raise FaceError(f"parts: wanted {name!r}, got {', '.join(parts) or 'none'}")
     head, origin, unit = head_of(vertices, triangles, parts)
     marks, anchors = _template()
-    found = evidence(head)
+    found = find_anchors(head)
     shared = [name for name in anchors if name in found]
     found |= {name: np.where(np.isfinite(found[name]), found[name], anchors[name]) for name in shared}
     here = np.array([*(found[name] for name in shared), head.left, head.right])
@@ -120,7 +120,7 @@ def find_points(
 
 def _settled(
     name: str, place: Float64, vertices: Float64, parts: Mapping[str, tuple[int, int]],
-    head: Head, origin: Float64, unit: float,
+    head: HeadGeometry, origin: Float64, unit: float,
 ) -> tuple[int, tuple[float, float, float], float]:  # fmt: skip
     """The vertex of a point, the point itself, and how far it had to go; metres."""
     at = np.asarray(vertices, np.float64)

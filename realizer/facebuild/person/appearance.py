@@ -10,7 +10,7 @@ from realizer.core.errors import FaceError
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Appearance:
     """Figures of how a person looks, as `realizer/tables/look.toml` explains them."""
 
     brow_thick: float
@@ -27,7 +27,7 @@ class Look:
     collar_point: float
 
 
-def look_of(table: Mapping[str, Any]) -> Look:
+def appearance_of(table: Mapping[str, Any]) -> Appearance:
     """The plain look with the figures that a recipe's [look] changes.
 
     Raises:
@@ -35,11 +35,11 @@ def look_of(table: Mapping[str, Any]) -> Look:
     """
     from realizer.tables import read_toml, text_of
 
-    names = [field.name for field in fields(Look)]
+    names = [field.name for field in fields(Appearance)]
     for key, value in table.items():
         if key not in names:
             raise FaceError(f"look: wanted one of {', '.join(names)}, got {key!r}")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise FaceError(f"look: {key}: wanted a number, got {value!r}")
     plain = read_toml(text_of("look.toml"), "look.toml")
-    return Look(**{name: float(table.get(name, plain[name])) for name in names})
+    return Appearance(**{name: float(table.get(name, plain[name])) for name in names})

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 
 from realizer.core.array_types import Float64
 from realizer.facebuild.parts import Part, grid, smooth
-from realizer.facebuild.person.appearance import Look
+from realizer.facebuild.person.appearance import Appearance
 from realizer.facebuild.person.lids import Lid
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 
 ALONG, ACROSS = 26, 7  # vertices of a brow
 HALF = 0.0047  # m, half its width where it is widest, soft edges included
@@ -23,13 +23,13 @@ SEED = 3
 
 
 def brow(
-    skin: Patch,
+    skin: Submesh,
     base: Float64,
     tints: Float64,
     points: Mapping[str, Float64],
     side: float,
     colour: Any,
-    look: Look,
+    look: Appearance,
 ) -> Part:
     """A brow: a sheet on the skin, its hairs drawn into it, its edges of the skin's own colour.
 
@@ -58,9 +58,9 @@ def brow(
     flat = np.stack([side * across.ravel(), height.ravel()], 1)
     patch = _laid(skin, base, flat)
     if side > 0:
-        patch = Patch(patch.mix, patch.offset, grid(ACROSS, ALONG)[:, [0, 2, 1]])
+        patch = Submesh(patch.mix, patch.offset, grid(ACROSS, ALONG)[:, [0, 2, 1]])
     else:
-        patch = Patch(patch.mix, patch.offset, grid(ACROSS, ALONG))
+        patch = Submesh(patch.mix, patch.offset, grid(ACROSS, ALONG))
     at = patch.positions(base)
     thick = (1 - np.abs(v[:, None]) ** 2) * np.ones(ALONG)
     thick = thick * smooth(t, 0.0, 0.12) * smooth(t, 1.0, 0.9)
@@ -83,7 +83,7 @@ def brow(
     return Part("brows", patch, patch.positions(base), patch.triangles, np.clip(tint, 0, 255), gloss)
 
 
-def _spread(skin: Patch, tints: Float64) -> Float64:
+def _spread(skin: Submesh, tints: Float64) -> Float64:
     """The skin's tints on the base mesh's vertices, those of single vertices alone."""
     out = np.zeros((skin.mix.shape[1], 3))
     single = np.diff(skin.mix.indptr) == 1
@@ -91,7 +91,7 @@ def _spread(skin: Patch, tints: Float64) -> Float64:
     return out
 
 
-def _laid(skin: Patch, base: Float64, flat: Float64) -> Patch:
+def _laid(skin: Submesh, base: Float64, flat: Float64) -> Submesh:
     """Vertices over places (n, 2) in the front view, on the skin's foremost triangle there."""
     at = skin.positions(base)
     low, high = flat.min(axis=0) - 0.01, flat.max(axis=0) + 0.01
@@ -117,7 +117,7 @@ def _cross(a: Float64, b: Float64) -> Float64:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, look: Look) -> Part:
+def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, look: Appearance) -> Part:
     """Lashes: tapered fins that stand on the lids' edges, longest in the outer half, lighter at their tips.
 
     A lash leans on its lid: where the edge falls further than the fold above it, the tip turns down.
@@ -179,7 +179,7 @@ def lashes(base: Float64, lid: Lid, centre: Float64, skin: Any, colour: Any, loo
         (len(rows), len(base)),
     )
     order = np.array(triangles, np.int32)
-    patch = Patch(mix, np.array([place for _, place in rows]), order)
+    patch = Submesh(mix, np.array([place for _, place in rows]), order)
     count = len(rows)
     return Part(
         "lashes", patch, patch.positions(base), order, np.array(tints), np.zeros(count), np.full(count, 0.8)

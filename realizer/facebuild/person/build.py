@@ -39,5 +39,5 @@ def build_face(name: str, data: Path, output: Path | None = None) -> Path:
     fields, lips = face_fields(person.ground, person.jaw_pivot)
     lids = [Lid(person.ground, side) for side in (1, -1)]
     made = assemble(person, lips, lids, recipe)
-    write_face(folder, name, recipe.says, person, made, fields)
+    write_face(folder, name, recipe.description, person, made, fields)
     return folder

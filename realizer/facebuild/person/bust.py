@@ -8,7 +8,7 @@ from realizer.core.array_types import Bool, Float64
 from realizer.facebuild import parts
 from realizer.facebuild.parts import Part, smooth
 from realizer.facebuild.person import clothing, skin_colours
-from realizer.facebuild.person.appearance import look_of
+from realizer.facebuild.person.appearance import appearance_of
 from realizer.facebuild.person.brows import brow, lashes
 from realizer.facebuild.person.hair import hair, scalp_of, shadow, style_of
 from realizer.facebuild.person.lids import Lid
@@ -16,7 +16,7 @@ from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.person import Person
 from realizer.facebuild.person.recipe import Recipe
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 
 ORDER = (
     "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "hair",
@@ -37,10 +37,10 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     ground, look = person.ground, recipe.colours
     at, n = ground.at, len(ground.at)
     points = {name: ground.point(name) for name in ground.points}
-    body = Patch.of_quads(ground.mesh.quads["body"], n)
-    body = body.kept((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
+    body = Submesh.of_quads(ground.mesh.quads["body"], n)
+    body = body.with_triangles((body.positions(at)[:, 1] > person.floor - MARGIN)[body.triangles].all(axis=1))
     body = body.clipped(body.positions(at)[:, 1] - person.floor)[0]
-    own = look_of(recipe.look)
+    own = appearance_of(recipe.look)
     dressed = clothing.under_collar(
         body.positions(at), points["2.1"], person.face, own.collar_low, own.collar_point
     )
@@ -84,7 +84,7 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     stays = np.zeros(n, bool)
     stays[list(ground.points.values())] = True
     stays[lips.fade > 0.5] = True
-    made = [_spared(part, person, scalp, stays) for part in made]
+    made = [_decimate_hidden(part, person, scalp, stays) for part in made]
     _line_mouth(made[0], person, lips, look)
     return made
 
@@ -100,14 +100,14 @@ def _line_mouth(skin: Part, person: Person, lips: Lips, colours: dict[str, list[
     skin_colours.paint_mouth(skin.colours, skin.gloss, skin.occlusion, share, deep, colours)
 
 
-def _spared(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
+def _decimate_hidden(part: Part, person: Person, scalp: Scalp, stays: Bool) -> Part:
     """Decimate hidden and plain surface; feature points, lips and the mouth behind them stay."""
     if part.name not in ("skin", "tongue", "shirt") or part.patch is None:
         return part
     single = np.diff(part.patch.mix.indptr) == 1
     keep = single & stays[part.patch.mix.indices[part.patch.mix.indptr[:-1]]]
     chin = float(person.ground.point("2.1")[1])
-    return clothing.spared(part, keep, scalp.off_ear(part.vertices) < 0, chin, person.floor)
+    return clothing.decimate_hidden(part, keep, scalp.off_ear(part.vertices) < 0, chin, person.floor)
 
 
 def _teeth(person: Person, recipe: Recipe) -> list[Part]:
@@ -123,7 +123,7 @@ def _teeth(person: Person, recipe: Recipe) -> list[Part]:
 
 def _tongue(person: Person, recipe: Recipe) -> Part:
     ground = person.ground
-    tongue = Patch.of_quads(ground.mesh.quads["helper-tongue"], len(ground.at))
+    tongue = Submesh.of_quads(ground.mesh.quads["helper-tongue"], len(ground.at))
     tongue = tongue.moved(np.repeat(TONGUE[None], len(tongue), 0))
     place = tongue.positions(ground.at)
     # Darker in the groove along the middle and at the sides.

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.facebuild.decimate import thinned
+from realizer.facebuild.decimate import decimate
 from realizer.facebuild.parts import Part, smooth
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 
 COLLAR = 0.486  # of the face's height, hairline to chin: how far below the chin the collar is in front
 TILT = 0.42  # of the plane of the collar, which rises backwards
@@ -30,11 +30,11 @@ def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, poin
     return np.asarray(collar - (at[:, 1] + TILT * (at[:, 2] + 0.01)))
 
 
-def shirt(skin: Patch, base: Float64, low: Float64, colour: list[float]) -> Part:
+def shirt(skin: Submesh, base: Float64, low: Float64, colour: list[float]) -> Part:
     """A shirt: the body below the neckline, lifted off. `low`: (n,) metres of its vertices below that."""
     some = (low > -0.03)[skin.triangles].any(axis=1)
     low = low[np.unique(skin.triangles[some])]
-    piece = skin.kept(some)
+    piece = skin.with_triangles(some)
     piece, mix = piece.clipped(low)
     low = np.asarray(mix @ low)
     at = piece.positions(base)
@@ -51,7 +51,7 @@ HIDDEN = 0.27
 UNSEEN, EAR, BUST, CLOTH, DEEP_CLOTH = 0.003, 0.0006, 0.0005, 0.0008, 0.003
 
 
-def spared(part: Part, keep: Any, ear: Any, chin: float, floor: float) -> Part:
+def decimate_hidden(part: Part, keep: Any, ear: Any, chin: float, floor: float) -> Part:
     """Return skin, shirt or tongue with fewer vertices where hidden, or evenly curved and far from the face.
 
     Args:
@@ -73,4 +73,4 @@ def spared(part: Part, keep: Any, ear: Any, chin: float, floor: float) -> Part:
         tolerance = np.where(at[:, 1] < floor + 0.05, DEEP_CLOTH, CLOTH)
     else:
         tolerance = np.full(len(at), BUST)
-    return part.picked(*thinned(at, part.triangles, np.where(keep, 0, tolerance)))
+    return part.subset(*decimate(at, part.triangles, np.where(keep, 0, tolerance)))

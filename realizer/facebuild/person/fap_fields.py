@@ -9,7 +9,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.face.basis import JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
-from realizer.facebuild.fix_flipped import even, without_flips
+from realizer.facebuild.fix_flipped import symmetrize, without_flips
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.base_mesh import FORWARD, LEFT, UP, Ground, scaled
 from realizer.facebuild.person.lids import lid_fields
@@ -49,7 +49,7 @@ def _untangled(ground: Ground, fields: dict[int, Float64], pivot: Float64) -> di
 
 def _mirrored(ground: Ground, fields: dict[int, Float64]) -> dict[int, Float64]:
     """The fields as even as a face is: each the mean of itself and its twin's mirror image."""
-    return even(fields, ground.mesh.mirror())
+    return symmetrize(fields, ground.mesh.mirror())
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:

@@ -12,7 +12,7 @@ from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.facebuild.parts import Part, grid, smooth
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Patch
+from realizer.facebuild.submesh import Submesh
 
 SEED = 11  # of the locks: the same head, the same hair
 FALLS = 6  # rows of what hangs down
@@ -69,7 +69,7 @@ def style_of(table: Mapping[str, Any]) -> Style:
     return Style(**figures)
 
 
-def scalp_of(skin: Patch, base: Float64, points: Mapping[str, Float64], style: Style) -> Scalp:
+def scalp_of(skin: Submesh, base: Float64, points: Mapping[str, Float64], style: Style) -> Scalp:
     """Return where hair of a style grows."""
     return Scalp(skin, base, points, style.line, style.rise)
 

@@ -39,7 +39,7 @@ def _stretch() -> tuple[Float64, Float64]:
 _STRETCH = _stretch()
 
 
-def hats(u: Any) -> Float64:
+def spline_basis(u: Any) -> Float64:
     """(5, n): cardinal splines over the knots u = -1, -0.5, 0, 0.5, 1; 1 at their own knot, 0 at the others.
 
     The weights sum to 1 everywhere, so a lip whose FAPs are equal does not bend into a w.
@@ -187,7 +187,7 @@ def close_lips(ground: Ground) -> Float64:
 def lip_fields(ground: Ground, lips: Lips) -> dict[int, Float64]:
     """Fields of FAPs 4-13, 16-18 and 51-60."""
     at, points = ground.at, ground.points
-    knots = hats(lips.u)
+    knots = spline_basis(lips.u)
     in_front = ground.body & (at[:, 2] > -0.03)
     soft = np.where(lips.is_upper, 0.015, 0.026)
     # Between a straight line and a curve without corners: gentle where the chin folds.

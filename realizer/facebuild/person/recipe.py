@@ -26,14 +26,14 @@ class Recipe:
     """The recipe of a person.
 
     Attributes:
-        says: a sentence about them, for lists of faces.
+        description: a sentence about them, for lists of faces.
         targets: shape target -> weight 0..1; `*` in a name stands for both sides.
         colours: what for -> sRGB 0..255.
         hair: the style of the hair, and the figures it changes.
-        look: figures of `realizer.facebuild.person.appearance.Look` that differ from the plain ones.
+        look: figures of `realizer.facebuild.person.appearance.Appearance` that differ from the plain ones.
     """
 
-    says: str
+    description: str
     targets: dict[str, float]
     colours: dict[str, list[float]]
     hair: dict[str, Any] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 
 CROWN, CHIN, BACK = (
     0.1087,
@@ -30,7 +30,7 @@ class Scalp:
     """
 
     def __init__(
-        self, skin: Patch, base: Float64, points: Mapping[str, Float64], line: Any, rise: Any
+        self, skin: Submesh, base: Float64, points: Mapping[str, Float64], line: Any, rise: Any
     ) -> None:
         """`line`: (degrees, metres above the eyes) on the head it was drawn on; `rise`: metres to add."""
         from scipy.spatial import cKDTree

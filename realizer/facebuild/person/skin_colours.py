@@ -9,13 +9,13 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.appearance import Look
+from realizer.facebuild.person.appearance import Appearance
 from realizer.facebuild.person.base_mesh import Ground
 from realizer.facebuild.person.lips import Lips
 
 
 def paint_skin(
-    ground: Ground, lips: Lips, rings: list[list[list[int]]], colours: Mapping[str, Any], look: Look
+    ground: Ground, lips: Lips, rings: list[list[list[int]]], colours: Mapping[str, Any], look: Appearance
 ) -> tuple[Float64, Float64]:
     """Colours (n, 3) sRGB 0..255 and gloss (n,) of the base mesh's body, but for the red of the lips.
 
@@ -86,7 +86,7 @@ def _beard(ground: Ground, lips: Lips) -> Float64:
     return np.asarray(face * before * (1 - lips.lips) * ground.body)
 
 
-def _mottle(ground: Ground, look: Look) -> Float64:
+def _mottle(ground: Ground, look: Appearance) -> Float64:
     """(n,) how much lighter or darker than its surroundings the skin is: freckles and age."""
     rng = np.random.default_rng(5)
     fine = rng.uniform(-1, 1, len(ground.at))

@@ -127,7 +127,7 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
     """How stills are lit and framed and what they add to a face, for whoever draws the mesh stream."""
     from realizer.face.load import load_face
     from realizer.render.cameras import camera_for
-    from realizer.render.eye_highlights import Glints
+    from realizer.render.eye_highlights import EyeHighlights
     from realizer.render.light import preset, presets
     from realizer.render.wrinkles import Wrinkles
 
@@ -139,7 +139,7 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
         "background": background,
         "camera": camera.to_json(),
         "furrows": Wrinkles(face).to_json(),
-        "glints": Glints(face, chosen, camera.towards).to_json(),
+        "glints": EyeHighlights(face, chosen, camera.towards).to_json(),
     }
     return json.dumps(look, separators=(",", ":")).encode()
 

@@ -110,7 +110,7 @@ class Session:
             settings.play_options(scene),
             kinds=KINDS,
             clips=self.clips.recordings,
-            face_inputs=lambda index: self.faces.of(index).takes,
+            face_inputs=lambda index: self.faces.of(index).inputs,
             veto=lambda block, schedule: too_long(block, schedule, settings),
         )
         self.capabilities = dict(capabilities or {})

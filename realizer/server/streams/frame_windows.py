@@ -159,7 +159,7 @@ class Window:
     @cached_property
     def poses(self) -> Float32:
         """(n, k) float32: what the face is drawn by."""
-        return poses(self.aus, self._face().takes, self._mapping)
+        return poses(self.aus, self._face().inputs, self._mapping)
 
     def message(self, wanted: Wanted, frame: int) -> str | bytes:
         """One of its frames as a WebSocket message."""

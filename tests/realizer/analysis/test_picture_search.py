@@ -10,7 +10,7 @@ from realizer.animation.axis import au, axis
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
 from realizer.expressions.library import shipped
-from realizer.face.load import takes
+from realizer.face.load import input_names
 from realizer.render import Renderer
 
 NAMES = ("SMILE", "RAISE_LEFT_BROW", "RAISE_RIGHT_BROW", "template:anger", "template:sadness", "OPEN_MOUTH")
@@ -25,7 +25,7 @@ def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> lis
             row[[target.column for target in au(number, side)]] = value * intensity
     frames = AUFrames(np.arange(len(rows), dtype=np.float64), rows)
     with Renderer(face, size, "front", light=light) as renderer:
-        return [picture[..., :3].copy() for picture in renderer.draw(poses(frames, takes(face)))]
+        return [picture[..., :3].copy() for picture in renderer.draw(poses(frames, input_names(face)))]
 
 
 def test_expression_is_found_in_a_picture_of_a_face_that_is_known() -> None:

@@ -14,7 +14,7 @@ import pytest
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Worker, perform
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 
 
@@ -32,7 +32,7 @@ def test_a_document_gives_the_bytes_that_it_gives_alone(
         outcome = worker.perform(task)
         for suffix, output in outcome.row["outputs"].items():
             path = tmp_path / f"alone{suffix}"
-            OUTPUTS[suffix].write(realize(task.text, voice="silent"), path, Drawing())
+            OUTPUTS[suffix].write(realize(task.text, voice="silent"), path, RenderSettings())
             content = outcome.files[output["file"]]
             assert content == path.read_bytes()
             assert output["bytes"] == len(content)

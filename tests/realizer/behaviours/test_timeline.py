@@ -131,7 +131,7 @@ AMAZED = {"entries": [{"expression": "template:surprise", "duration": 2.0}]}
 
 
 def mixed(played, face, name: str) -> np.ndarray:
-    return played.realization.poses[:, face.takes.index(name)]
+    return played.realization.poses[:, face.inputs.index(name)]
 
 
 def test_the_mixer_and_the_order_reach_the_face_while_it_plays(timeline) -> None:

@@ -22,7 +22,7 @@ def test_every_output_has_a_line_that_says_what_it_is():
     assert list(found) == sorted(OUTPUTS)
     for suffix, output in OUTPUTS.items():
         assert output.media_type in found[suffix]
-        assert output.says in found[suffix]
+        assert output.description in found[suffix]
 
 
 def test_what_is_missing_is_said_with_what_to_install():
@@ -34,4 +34,4 @@ def test_what_is_missing_is_said_with_what_to_install():
 
 @pytest.mark.parametrize("suffix", OUTPUTS)
 def test_an_output_that_draws_says_that_it_needs_what_draws(suffix):
-    assert ("render" in OUTPUTS[suffix].needs) == (OUTPUTS[suffix].draws is not None)
+    assert ("render" in OUTPUTS[suffix].needs) == (OUTPUTS[suffix].picture_size is not None)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realizer.face.contours import CONTOURS, contours_of, together
+from realizer.face.contours import CONTOURS, contours_of, couple_lips
 from realizer.face.load import load_face
 from realizer.tables import faps
 from tests.shipped import FACES
@@ -30,24 +30,24 @@ def test_contours_are_the_inner_and_outer_lip_points_in_one_unit_and_direction()
 
 def test_small_differences_are_left_alone(kept) -> None:
     asked = rows({4: 60, 51: -30, 12: 40})
-    assert together(kept, asked) is asked
+    assert couple_lips(kept, asked) is asked
 
 
 def test_a_contour_asked_for_alone_is_reached_and_drags_the_other(kept) -> None:
     for inner, outer in CONTOURS.items():
         for one, other in ((inner, outer), (outer, inner)):
             for value in (1000.0, -1000.0):
-                got = together(kept, rows({one: value}))[0]
+                got = couple_lips(kept, rows({one: value}))[0]
                 assert got[one - 1] == value
                 assert 0 < got[other - 1] / value < 1
 
 
 def test_contours_asked_for_alike_stay_alike(kept) -> None:
     asked = rows({4: 900, 51: 900, 6: -500, 53: -500})
-    assert np.array_equal(together(kept, asked), asked)
+    assert np.array_equal(couple_lips(kept, asked), asked)
 
 
 def test_contours_asked_apart_meet_half_way(kept) -> None:
-    got = together(kept, rows({5: 800, 52: -800}))[0]
+    got = couple_lips(kept, rows({5: 800, 52: -800}))[0]
     assert got[4] == pytest.approx(-got[51])
     assert got[4] - got[51] == pytest.approx(kept.apart[1], rel=1e-4)

@@ -11,7 +11,7 @@ from realizer.animation.fap.au_fap_mapping import FapMapping, standard
 from realizer.core.errors import FaceError, TableError
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
-from realizer.face.load import folder_of, takes
+from realizer.face.load import folder_of, input_names
 from realizer.facebuild.check import check_face
 from realizer.offline import realize
 from realizer.server.session.session import Session
@@ -82,7 +82,7 @@ def test_a_users_mapping_reaches_what_is_realized(tmp_path: Path) -> None:
     assert plain.faps.values[:, 11].max() > 0 == plain.faps.values[:, 60].max()
     assert mine.faps.values[:, 60].max() == pytest.approx(50)
     assert not mine.faps.values[:, 11].any()
-    names = list(takes("default"))
+    names = list(input_names("default"))
     assert mine.poses[:, names.index("stretch_l_nose")].max() == pytest.approx(50)
 
 

@@ -29,4 +29,4 @@ def test_a_face_has_bounds_and_takes_the_68_faps(balls: tuple[Face, np.ndarray])
     low, high = balls[0].bounds
     assert low == pytest.approx([-0.075, -0.145, -0.18], abs=1e-3)
     assert high == pytest.approx([0.075, 0.085, 0.0], abs=3e-3)
-    assert balls[0].takes == tuple(row.name for row in faps())
+    assert balls[0].inputs == tuple(row.name for row in faps())

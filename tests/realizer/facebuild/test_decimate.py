@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realizer.facebuild.decimate import thinned
+from realizer.facebuild.decimate import decimate
 
 
 def sheet(bend: float) -> tuple[np.ndarray, np.ndarray]:
@@ -25,7 +25,7 @@ def area(at: np.ndarray, triangles: np.ndarray) -> float:
 
 def test_a_flat_sheet_needs_few_vertices_and_keeps_its_outline() -> None:
     at, triangles = sheet(0)
-    kept, left = thinned(at, triangles, np.full(len(at), 0.001))
+    kept, left = decimate(at, triangles, np.full(len(at), 0.001))
     assert len(kept) < len(at) / 4
     assert area(at[kept], left) == pytest.approx(0.04)
     a, b, c = (at[kept][left[:, k]] for k in range(3))
@@ -35,7 +35,7 @@ def test_a_flat_sheet_needs_few_vertices_and_keeps_its_outline() -> None:
 def test_what_has_no_tolerance_stays() -> None:
     at, triangles = sheet(0)
     tolerance = np.where(at[:, 1] > 0, 0.001, 0)
-    kept, _ = thinned(at, triangles, tolerance)
+    kept, _ = decimate(at, triangles, tolerance)
     assert set(np.flatnonzero(tolerance == 0)) <= set(kept)
     assert len(kept) < len(at)
 
@@ -43,7 +43,7 @@ def test_what_has_no_tolerance_stays() -> None:
 @pytest.mark.parametrize("tolerance", [0.0005, 0.002])
 def test_a_bent_sheet_changes_by_no_more_than_it_may(tolerance: float) -> None:
     at, triangles = sheet(0.02)
-    kept, left = thinned(at, triangles, np.full(len(at), tolerance))
+    kept, left = decimate(at, triangles, np.full(len(at), tolerance))
     assert len(kept) < len(at)
     middle = at[kept][left].mean(axis=1)
     assert np.abs(middle[:, 2] - 0.02 * np.cos(middle[:, 0] * 15)).max() < 2.5 * tolerance
@@ -51,7 +51,7 @@ def test_a_bent_sheet_changes_by_no_more_than_it_may(tolerance: float) -> None:
 
 def test_no_hole_comes_and_each_edge_has_two_sides() -> None:
     at, triangles = sheet(0.02)
-    kept, left = thinned(at, triangles, np.full(len(at), 0.002))
+    kept, left = decimate(at, triangles, np.full(len(at), 0.002))
     edges = np.sort(np.concatenate([left[:, [0, 1]], left[:, [1, 2]], left[:, [2, 0]]]), axis=1)
     pairs, count = np.unique(edges, axis=0, return_counts=True)
     assert count.max() == 2

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64
-from realizer.facebuild.fix_flipped import turned, untangled
+from realizer.facebuild.fix_flipped import flipped_triangles, soften_flips
 from realizer.facebuild.parts import grid
 
 SIDE = 15
@@ -21,14 +21,14 @@ def bump(width: float) -> Float64:
 
 
 def mended(fields: list[Float64], plays: list[tuple[Float64, Any, float]], fixed: list[int]) -> Float64:
-    return untangled(np.stack(fields), AT, TRIANGLES, plays, fixed)
+    return soften_flips(np.stack(fields), AT, TRIANGLES, plays, fixed)
 
 
 def test_a_narrow_bump_that_is_pushed_through_its_neighbours_is_widened() -> None:
     field = bump(1.6)
-    assert turned(AT, AT + 2.5 * field, TRIANGLES).any()
+    assert flipped_triangles(AT, AT + 2.5 * field, TRIANGLES).any()
     (wide,) = mended([field], [(np.array([2.5]), 0.0, 0.0)], [MIDDLE])
-    assert not turned(AT, AT + 2.5 * wide, TRIANGLES).any()
+    assert not flipped_triangles(AT, AT + 2.5 * wide, TRIANGLES).any()
     assert np.array_equal(wide[MIDDLE], field[MIDDLE])
 
 

@@ -10,7 +10,7 @@ from realizer.face.surface import normals
 from realizer.facebuild.parts import SHADES, teeth
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.software import OnboardCanvas
+from realizer.render.software import SoftwareCanvas
 
 COLOURS = {"tooth": [240.0, 232, 214], "root": [228.0, 206, 180], "gum": [196.0, 112, 106]}
 WIDE = {3: 1100, 4: -80, 5: -1535, 10: -1245, 11: -1245, 52: -1525, 57: -1315, 58: -1315, 12: -480, 13: -480}
@@ -42,7 +42,7 @@ def test_an_open_mouth_is_dark_red_from_the_side_and_not_black(name: str) -> Non
     face = load_face(name)
     shape = opened(face)
     camera = camera_for(face, "three-quarter")
-    canvas = OnboardCanvas(face, (512, 512), camera, preset("portrait"))
+    canvas = SoftwareCanvas(face, (512, 512), camera, preset("portrait"))
     picture = canvas.draw(shape, normals(face, shape[None])[0]).astype(float)
     canvas.close()
     upper, lower = camera.project(shape[[face.feature_points["2.2"], face.feature_points["2.3"]]], (512, 512))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 
 GRID = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
 QUADS = np.array(
@@ -12,24 +12,24 @@ QUADS = np.array(
 
 
 @pytest.fixture
-def sheet() -> Patch:
-    return Patch.of_quads(QUADS, len(GRID))
+def sheet() -> Submesh:
+    return Submesh.of_quads(QUADS, len(GRID))
 
 
-def area(patch: Patch) -> float:
+def area(patch: Submesh) -> float:
     at = patch.positions(GRID)
     a, b, c = (at[patch.triangles[:, k]] for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def test_a_cut_leaves_a_straight_edge_and_nothing_beyond(sheet: Patch) -> None:
+def test_a_cut_leaves_a_straight_edge_and_nothing_beyond(sheet: Submesh) -> None:
     cut, _ = sheet.clipped(sheet.positions(GRID)[:, 0] - 1.25)
     assert cut.positions(GRID)[:, 0].min() == pytest.approx(1.25)
     assert area(cut) == pytest.approx(3 * 1.75)
 
 
 @pytest.mark.parametrize("flat", [True, False])
-def test_refining_makes_four_of_each_triangle(sheet: Patch, flat: bool) -> None:
+def test_refining_makes_four_of_each_triangle(sheet: Submesh, flat: bool) -> None:
     fine, _ = sheet.subdivided(flat)
     assert len(fine.triangles) == 4 * len(sheet.triangles)
     # Loop's rule rounds the four corners of a sheet; flat keeps every place.
@@ -37,7 +37,7 @@ def test_refining_makes_four_of_each_triangle(sheet: Patch, flat: bool) -> None:
     assert np.allclose(vertex_normals(fine.positions(GRID), fine.triangles), [0, 0, 1])
 
 
-def test_cut_and_refined_vertices_are_mixes_of_base_vertices(sheet: Patch) -> None:
+def test_cut_and_refined_vertices_are_mixes_of_base_vertices(sheet: Submesh) -> None:
     fine = sheet.clipped(sheet.positions(GRID)[:, 1] - 0.4)[0].subdivided()[0]
     assert np.allclose(np.asarray(fine.mix.sum(axis=1)).ravel(), 1)
     assert np.allclose(fine.positions(GRID + np.array([0, 0, 2.0]))[:, 2], 2)
@@ -49,7 +49,7 @@ def test_a_threaded_loop_has_twice_its_vertices_and_stays_round() -> None:
     base = np.concatenate(rings)
     k = np.arange(8)
     quads = np.stack([k, 8 + k, 8 + (k + 1) % 8, (k + 1) % 8], 1)
-    patch = Patch.of_quads(quads, 16)
+    patch = Submesh.of_quads(quads, 16)
     fine = patch.threaded([list(range(8)), list(range(8, 16))])
     assert len(fine) == 32
     away = np.linalg.norm(fine.positions(base), axis=1)

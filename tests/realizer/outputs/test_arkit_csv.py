@@ -10,7 +10,7 @@ import pytest
 
 from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS, output_for
 
 pytestmark = pytest.mark.xdist_group("outputs")
@@ -43,7 +43,7 @@ def test_the_file_has_the_columns_of_live_link_face(spoken, tmp_path):
     path = tmp_path / "Take.ARKit.csv"
     output = output_for(path)
     assert output is OUTPUTS[".arkit.csv"]
-    output.write(spoken, path, Drawing())
+    output.write(spoken, path, RenderSettings())
     reader = csv.DictReader(io.StringIO(path.read_text("utf-8")))
     rows = list(reader)
     assert ",".join(reader.fieldnames) == HEADER
@@ -59,7 +59,7 @@ def test_the_file_has_the_columns_of_live_link_face(spoken, tmp_path):
 
 def test_a_rate_that_is_no_whole_number_has_timecodes_that_go_up(tmp_path):
     quiet = realize(SPEECH, idle=False, voice="silent", fps=29.97)
-    OUTPUTS[".arkit.csv"].write(quiet, tmp_path / "x.arkit.csv", Drawing())
+    OUTPUTS[".arkit.csv"].write(quiet, tmp_path / "x.arkit.csv", RenderSettings())
     codes = [line.split(",")[0] for line in (tmp_path / "x.arkit.csv").read_text().splitlines()[1:]]
     assert codes == sorted(codes)
     assert len(set(codes)) == len(codes) == quiet.frames
@@ -72,7 +72,7 @@ def test_other_csv_files_are_what_they_were():
 
 def test_a_reader_of_live_link_face_finds_the_weights_at_their_times(spoken, tmp_path):
     read_csv = pytest.importorskip("openfacefx.importers_csv", reason="pip install openfacefx").read_csv
-    OUTPUTS[".arkit.csv"].write(spoken, tmp_path / "x.arkit.csv", Drawing())
+    OUTPUTS[".arkit.csv"].write(spoken, tmp_path / "x.arkit.csv", RenderSettings())
     track, notes = read_csv(str(tmp_path / "x.arkit.csv"), fps=25, epsilon=0)
     # It takes every column for a weight, and says of turns that they are none.
     assert all("Head" in note or "Eye" in note for note in notes)

@@ -15,7 +15,7 @@ from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
 from realizer.offline import realize
 from realizer.outputs.csv_table import encode_csv
-from realizer.outputs.fap_clip_files import ENCODINGS, limited, read_clip
+from realizer.outputs.fap_clip_files import ENCODINGS, clip_to_range, read_clip
 from realizer.outputs.json_text import encode_json
 from realizer.tables import faps
 
@@ -76,7 +76,7 @@ def test_a_fap_file_is_limited_to_the_ranges_and_says_so() -> None:
     clip = FAPClip(
         "x", 25, values, np.arange(68) == 2, np.zeros((2, 4), np.int32), np.zeros((2, 6), np.int32)
     )
-    got = limited(clip)
+    got = clip_to_range(clip)
     assert got.values[:, 2].tolist() == [0, 4320]
     assert got.notes == ("FAP 3 (open_jaw): wanted 0..4320, got -5; limited to it",)
     assert read_clip(ENCODINGS[".fap"](clip).encode()).values[:, 2].tolist() == [0, 4320]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from realizer.outputs.film import FORMATS, RATE, encode_film
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.speech_spans import Span
 
@@ -141,7 +141,7 @@ def test_without_pyav_a_sentence_says_what_to_install(tmp_path):
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_realization_becomes_a_film_of_its_face(realization, tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
-    OUTPUTS[suffix].write(realization, path, Drawing(size=(129, 128)))
+    OUTPUTS[suffix].write(realization, path, RenderSettings(size=(129, 128)))
     shown = seen(path)
     assert len(shown) == 38
     assert shown[0][1].shape == (128, 130, 3)

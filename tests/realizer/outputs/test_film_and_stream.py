@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.runtime.engines import Studio
 from realizer.server.session.effects import Draw, Speak
@@ -62,7 +62,7 @@ def played(turn):
 
 @pytest.mark.gl
 def test_the_pictures_are_the_same_to_the_bit(streamed, played):
-    with Drawing(SIZE).renderer(played, SIZE) as renderer:
+    with RenderSettings(SIZE).make_renderer(played, SIZE) as renderer:
         drawn = renderer.draw(played.poses)
     assert set(range(len(drawn))) <= set(streamed)
     assert np.abs(drawn[0].astype(int) - drawn[8]).max() > 60
@@ -74,7 +74,7 @@ def test_the_pictures_are_the_same_to_the_bit(streamed, played):
 @pytest.mark.slow
 def test_a_film_has_them_as_far_as_its_encoder_lets_it(streamed, played, tmp_path):
     path = tmp_path / "x.mp4"
-    OUTPUTS[".mp4"].write(played, path, Drawing(SIZE))
+    OUTPUTS[".mp4"].write(played, path, RenderSettings(SIZE))
     with av.open(str(path)) as film:
         filmed = [frame.to_ndarray(format="rgb24").astype(int) for frame in film.decode(video=0)]
     assert len(filmed) == played.frames

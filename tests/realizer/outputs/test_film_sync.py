@@ -9,7 +9,7 @@ import pytest
 
 from realizer.offline import realize
 from realizer.outputs.film import RATE, write_film
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 
 av = pytest.importorskip("av", reason="films need PyAV: pip install 'bml-realizer[film]'")
 
@@ -45,7 +45,7 @@ def decoded(path: Path) -> tuple[np.ndarray, list[float], np.ndarray]:
 def test_the_mouth_opens_in_the_picture_in_which_it_is_heard(tmp_path: Path, suffix: str) -> None:
     played = realize(SAID, fps=FPS, idle=False, prosody=False, voice="espeak")
     path = tmp_path / f"x{suffix}"
-    write_film(played, path, Drawing((SIZE, SIZE), "close"))
+    write_film(played, path, RenderSettings((SIZE, SIZE), "close"))
     pictures, times, line = decoded(path)
     assert times == pytest.approx([k / FPS for k in range(len(pictures))], abs=0.002)
 

@@ -16,8 +16,8 @@ from realizer.face.load import load_face
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.offline import realize
 from realizer.outputs.glb import encode_glb
-from realizer.outputs.morph_targets import TRUE, morphs
-from realizer.outputs.output import Drawing
+from realizer.outputs.morph_targets import TRUE, make_morph_targets
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 
 pytestmark = pytest.mark.xdist_group("outputs")
@@ -34,7 +34,7 @@ def played(request, turn):
 @pytest.fixture(scope="module")
 def path(played, tmp_path_factory):
     found = tmp_path_factory.mktemp("glb") / "turn.glb"
-    OUTPUTS[".glb"].write(played, found, Drawing())
+    OUTPUTS[".glb"].write(played, found, RenderSettings())
     return found
 
 
@@ -111,7 +111,7 @@ def test_a_program_that_knows_no_weights_below_none_reads_them_all(played, path)
     track, notes = read_gltf(str(path), epsilon=0)
     assert notes == []
     assert track.fps == pytest.approx(FPS)
-    made = morphs(played.face, played.poses)
+    made = make_morph_targets(played.face, played.poses)
     assert [channel.name for channel in track.channels] == list(made.names)
     times = np.arange(played.frames) / FPS
     for channel, wanted in zip(track.channels, made.weights.T, strict=True):
@@ -127,9 +127,9 @@ def turned_by(quaternion, vertices):
 
 def test_eyes_that_are_pushed_move_on_their_nodes(tmp_path, read_by):
     face = load_face("default")
-    poses = np.zeros((4, len(face.takes)), np.float32)
+    poses = np.zeros((4, len(face.inputs)), np.float32)
     for number, value in ((27, 150), (28, -80), (23, 2e4), (24, -1e4), (49, 3e4)):
-        poses[1:, face.takes.index(fap(number).name)] = np.array([0.3, 0.7, 1]) * value
+        poses[1:, face.inputs.index(fap(number).name)] = np.array([0.3, 0.7, 1]) * value
     (tmp_path / "x.glb").write_bytes(encode_glb(face, poses, 25.0))
     seen = read_by("gltf.mjs", tmp_path / "x.glb", *(str(k / 25) for k in range(4)))
     assert seen["issues"]["messages"] == []
@@ -140,9 +140,9 @@ def test_eyes_that_are_pushed_move_on_their_nodes(tmp_path, read_by):
 def test_eyes_that_are_no_balls_are_part_of_the_face(tmp_path, read_by):
     face = load_face("default")
     flat = replace(face, basis={**face.basis, "eyes": tuple(((0, 0), at) for _, at in face.basis["eyes"])})
-    poses = np.zeros((2, len(face.takes)), np.float32)
+    poses = np.zeros((2, len(face.inputs)), np.float32)
     for number, value in ((3, 400), (19, 700), (49, 2e4)):
-        poses[1, face.takes.index(fap(number).name)] = value
+        poses[1, face.inputs.index(fap(number).name)] = value
     (tmp_path / "x.glb").write_bytes(encode_glb(flat, poses, 25.0))
     seen = read_by("gltf.mjs", tmp_path / "x.glb", "0", "0.04")
     assert seen["issues"]["messages"] == []
@@ -152,7 +152,7 @@ def test_eyes_that_are_no_balls_are_part_of_the_face(tmp_path, read_by):
 
 def test_a_head_that_rests_is_a_file_without_targets(tmp_path, read_by):
     face = load_face("default")
-    (tmp_path / "x.glb").write_bytes(encode_glb(face, np.zeros((1, len(face.takes)), np.float32), 25.0))
+    (tmp_path / "x.glb").write_bytes(encode_glb(face, np.zeros((1, len(face.inputs)), np.float32), 25.0))
     seen = read_by("gltf.mjs", tmp_path / "x.glb", "0")
     assert seen["issues"]["messages"] == []
     assert seen["targets"] == []

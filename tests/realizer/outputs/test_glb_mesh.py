@@ -12,7 +12,7 @@ from realizer.face.glb_file import GlbFile
 from realizer.face.model import Face
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.outputs.glb_mesh import morphing_mesh, rigid_mesh
-from realizer.outputs.morph_targets import Morphs
+from realizer.outputs.morph_targets import MorphTargets
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_a_morphing_mesh_has_its_targets_and_two_joints(tmp_path, face: Face, ey
     moves = np.zeros((1, *face.vertices.shape), np.float32)
     moves[0, np.flatnonzero(eye)[5]] = (0, 0.01, 0)
     none = np.zeros((0, 3), np.float32)
-    made = Morphs(("up",), moves, none[:, :1], none, np.zeros((0, 2, 2), np.float32), none[:, :2])
+    made = MorphTargets(("up",), moves, none[:, :1], none, np.zeros((0, 2, 2), np.float32), none[:, :2])
     file = GlbFile()
     mesh = morphing_mesh(file, face, eye, 0, made)
     (primitive,) = mesh["primitives"]

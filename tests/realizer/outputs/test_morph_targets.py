@@ -9,7 +9,7 @@ from realizer.animation.axis import fap
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.offline import realize
-from realizer.outputs.morph_targets import TRUE, morphs
+from realizer.outputs.morph_targets import TRUE, make_morph_targets
 
 pytestmark = pytest.mark.xdist_group("outputs")
 
@@ -23,12 +23,12 @@ def still(face, poses):
     """What they are when neither the head nor the eyes turn."""
     rows = poses.copy()
     for number in (23, 24, 25, 26, 48, 49, 50):
-        rows[:, face.takes.index(fap(number).name)] = 0
+        rows[:, face.inputs.index(fap(number).name)] = 0
     return rows
 
 
 def test_no_vertex_of_any_frame_is_off_by_a_tenth_of_a_millimetre(played):
-    face, made = played.face, morphs(played.face, played.poses)
+    face, made = played.face, make_morph_targets(played.face, played.poses)
     wanted = deform(face, still(face, played.poses))
     got = face.vertices + np.einsum("nk,kvc->nvc", made.weights, made.moves)
     assert np.abs(wanted - face.vertices).max() > 5e-3
@@ -36,22 +36,22 @@ def test_no_vertex_of_any_frame_is_off_by_a_tenth_of_a_millimetre(played):
 
 
 def test_targets_are_what_the_face_takes_and_few_more(played):
-    names = morphs(played.face, played.poses).names
+    names = make_morph_targets(played.face, played.poses).names
     own = [name for name in names if not name.startswith("correction ")]
-    assert {name.removesuffix(" reversed") for name in own} <= set(played.face.takes)
+    assert {name.removesuffix(" reversed") for name in own} <= set(played.face.inputs)
     assert {"open_jaw", "close_t_l_eyelid"} <= set(own)
     assert len(names) - len(own) <= 32
     assert len(set(names)) == len(names)
 
 
 def test_weights_are_never_less_than_none_nor_more_than_all(played):
-    weights = morphs(played.face, played.poses).weights
+    weights = make_morph_targets(played.face, played.poses).weights
     assert weights.min() == 0
     np.testing.assert_allclose(weights.max(axis=0), 1, atol=1e-6)
 
 
 def test_head_and_eyes_are_no_targets(played):
-    made = morphs(played.face, played.poses)
+    made = make_morph_targets(played.face, played.poses)
     assert np.abs(made.head[:, 1]).max() > 0.05  # the head shakes
     assert np.abs(made.eyes).max() > 0.05  # the eyes look aside
     for ball, _ in played.face.basis["eyes"]:
@@ -60,9 +60,9 @@ def test_head_and_eyes_are_no_targets(played):
 
 def test_an_eyeball_that_is_pushed_goes_forward_and_its_lids_with_it():
     face = load_face("default")
-    poses = np.zeros((3, len(face.takes)), np.float32)
-    poses[:, face.takes.index(fap(27).name)] = (0, 100, 200)
-    made = morphs(face, poses)
+    poses = np.zeros((3, len(face.inputs)), np.float32)
+    poses[:, face.inputs.index(fap(27).name)] = (0, 100, 200)
+    made = make_morph_targets(face, poses)
     assert made.thrust[:, 0] == pytest.approx(np.array([0, 100, 200]) * face.fapu.metres("ES"))
     assert not made.thrust[:, 1].any()
     wanted = deform(face, poses)
@@ -74,7 +74,7 @@ def test_an_eyeball_that_is_pushed_goes_forward_and_its_lids_with_it():
 
 def test_a_face_that_rests_has_no_targets():
     face = load_face("default")
-    made = morphs(face, np.zeros((2, len(face.takes)), np.float32))
+    made = make_morph_targets(face, np.zeros((2, len(face.inputs)), np.float32))
     assert made.names == ()
     assert made.moves.shape == (0, len(face.vertices), 3)
     assert made.weights.shape == (2, 0)

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from realizer.animation.fap.fap_reader import read_fap
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS, output_for
 from realizer.speech.utterance import Phoneme
 
-SMALL = Drawing(size=(32, 32))
+SMALL = RenderSettings(size=(32, 32))
 HERE = Path(__file__).parent
 # Those that draw take 10 s each to start.
-EACH = [pytest.param(suffix, marks=[pytest.mark.gl, pytest.mark.slow] if output.draws else [])
+EACH = [pytest.param(suffix, marks=[pytest.mark.gl, pytest.mark.slow] if output.picture_size else [])
         for suffix, output in OUTPUTS.items()]  # fmt: skip
 
 
@@ -53,14 +53,14 @@ def test_a_failing_write_leaves_the_old_file(realization, tmp_path):
     broken = realization.faps.values
     realization.aus.values[0, 0] = np.nan
     with pytest.raises(ValueError, match="JSON"):
-        OUTPUTS[".json"].write(realization, path, Drawing())
+        OUTPUTS[".json"].write(realization, path, RenderSettings())
     assert broken is realization.faps.values
     assert path.read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_pipe_is_written_to_as_it_is(realization):
-    OUTPUTS[".csv"].write(realization, Path("/dev/null"), Drawing())
+    OUTPUTS[".csv"].write(realization, Path("/dev/null"), RenderSettings())
     assert not Path("/dev/null").is_file()
 
 
@@ -79,12 +79,12 @@ def test_fap_1_is_written_where_it_is_asked_for(realization, tmp_path):
     said = replace(speaking, utterance=replace(speaking.utterance, phonemes=sounds))
     spoken = replace(realization, speeches=(said,))
     path = tmp_path / "clip.fap"
-    OUTPUTS[".fap"].write(spoken, path, Drawing(visemes=True))
+    OUTPUTS[".fap"].write(spoken, path, RenderSettings(visemes=True))
     clip = read_fap(path.read_text())
     assert clip.mask[0]
     assert np.array_equal(clip.values, realization.faps.integers())
     assert clip.visemes[round(25 * (said.start + 0.4))].tolist() == [1, 0, 63, 0]
     assert clip.visemes[round(25 * (said.start + 0.65))][0] == 10
     assert clip.visemes[[0, -1]].tolist() == [[0, 0, 63, 0]] * 2
-    OUTPUTS[".fap"].write(spoken, path, Drawing())
+    OUTPUTS[".fap"].write(spoken, path, RenderSettings())
     assert not read_fap(path.read_text()).mask[0]

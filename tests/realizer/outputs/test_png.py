@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.png import moments, row_at
 from realizer.outputs.registry import OUTPUTS
 from realizer.scheduling.timing import Schedule
@@ -52,18 +52,18 @@ def drawn(realization, path, drawing) -> np.ndarray:
 
 @pytest.mark.gl
 def test_with_an_instant_the_png_is_one_picture_of_that_size(realization, tmp_path):
-    picture = drawn(realization, tmp_path / "x.png", Drawing((160, 120), at=0.4))
+    picture = drawn(realization, tmp_path / "x.png", RenderSettings((160, 120), at=0.4))
     assert picture.shape == (120, 160, 3)
     assert picture.std() > 15
-    later = drawn(realization, tmp_path / "y.png", Drawing((160, 120), at=0.8))
+    later = drawn(realization, tmp_path / "y.png", RenderSettings((160, 120), at=0.8))
     assert not np.array_equal(picture, later)
 
 
 @pytest.mark.gl
 @pytest.mark.slow
 def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_path):
-    first = drawn(realization, tmp_path / "x.png", Drawing((160, 120)))
-    drawn(realization, tmp_path / "y.png", Drawing((160, 120)))
+    first = drawn(realization, tmp_path / "x.png", RenderSettings((160, 120)))
+    drawn(realization, tmp_path / "y.png", RenderSettings((160, 120)))
     assert first.shape[1] > 3 * 80
     assert (tmp_path / "x.png").read_bytes() == (tmp_path / "y.png").read_bytes()
 
@@ -72,18 +72,18 @@ def test_without_one_it_is_a_sheet_and_two_runs_are_the_same(realization, tmp_pa
 @pytest.mark.parametrize("at", [None, 0.4])
 @pytest.mark.slow
 def test_what_draws_may_be_started_before_there_is_anything_to_draw(realization, tmp_path, at):
-    drawing = Drawing((160, 120), at=at)
+    drawing = RenderSettings((160, 120), at=at)
     early = OUTPUTS[".png"].begin(drawing, realization.face_name, realization.deformer)
-    assert early.begun is not None
-    started = early.begun.pid
+    assert early.renderer is not None
+    started = early.renderer.pid
     assert started is not None
     size, alpha = ((160, 120), True) if at is not None else ((80, 60), False)
-    assert early.renderer(realization, size, alpha=alpha).pid == started
+    assert early.make_renderer(realization, size, alpha=alpha).pid == started
     assert np.array_equal(
         drawn(realization, tmp_path / "x.png", early), drawn(realization, tmp_path / "y.png", drawing)
     )
 
 
 def test_nothing_starts_for_what_has_no_pictures(realization):
-    drawing = Drawing()
+    drawing = RenderSettings()
     assert OUTPUTS[".fap"].begin(drawing, realization.face_name) is drawing

@@ -14,8 +14,8 @@ def test_every_output_says_what_it_is(suffix):
     output = OUTPUTS[suffix]
     assert output.suffix == suffix
     assert re.fullmatch(r"\w+/[\w.+-]+", output.media_type)
-    assert output.says
-    assert "\n" not in output.says
+    assert output.description
+    assert "\n" not in output.description
 
 
 def test_the_suffix_picks_the_encoder_in_either_case():
@@ -34,5 +34,5 @@ def test_the_longest_suffix_that_fits_is_taken() -> None:
 
 
 def test_outputs_of_texts_and_sound_hold_what_all_characters_do() -> None:
-    whole = {suffix for suffix, output in OUTPUTS.items() if output.everybody}
+    whole = {suffix for suffix, output in OUTPUTS.items() if output.all_characters}
     assert whole == {".json", ".wav", ".vtt", ".textgrid"}

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS, output_for
 from realizer.tables.arkit_names import shapes
 
@@ -25,7 +25,7 @@ KINDS = {".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascrip
 def written(realization, tmp_path):
     path = tmp_path / "x.talkinghead.json"
     assert output_for(path) is OUTPUTS[".talkinghead.json"]
-    output_for(path).write(realization, path, Drawing())
+    output_for(path).write(realization, path, RenderSettings())
     return json.loads(path.read_text("utf-8"))
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.speech.utterance import Word
 
@@ -24,7 +24,7 @@ TWO = (
 
 def opened(realization, tmp_path):
     path = tmp_path / "x.TextGrid"
-    OUTPUTS[".textgrid"].write(realization, path, Drawing())
+    OUTPUTS[".textgrid"].write(realization, path, RenderSettings())
     return textgrid.openTextgrid(str(path), includeEmptyIntervals=True, reportingMode="error")
 
 

@@ -12,7 +12,7 @@ from realizer.animation.arkit import arkit
 from realizer.animation.axis import axis
 from realizer.animation.frames import AUFrames
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.vrma import encode_vrma, expressions
 from realizer.tables.lexemes import face_lexemes
@@ -44,7 +44,7 @@ def seen(realization):
 
 
 def test_three_vrm_reads_every_expression_the_head_and_the_gaze(played, tmp_path, read_by):
-    OUTPUTS[".vrma"].write(played, tmp_path / "x.vrma", Drawing())
+    OUTPUTS[".vrma"].write(played, tmp_path / "x.vrma", RenderSettings())
     read = read_by("vrma.mjs", tmp_path / "x.vrma")
     assert read["warnings"] == []
     assert read["issues"]["numErrors"] == read["issues"]["numWarnings"] == 0

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 
 webvtt = pytest.importorskip("webvtt", reason="pip install webvtt-py")
@@ -16,7 +16,7 @@ webvtt = pytest.importorskip("webvtt", reason="pip install webvtt-py")
 
 def cues(realization, tmp_path):
     """(start, end, kind, text) of what webvtt-py finds."""
-    OUTPUTS[".vtt"].write(realization, tmp_path / "x.vtt", Drawing())
+    OUTPUTS[".vtt"].write(realization, tmp_path / "x.vtt", RenderSettings())
     found = []
     for cue in webvtt.read(str(tmp_path / "x.vtt")):
         kind = cue.raw_text.removeprefix("<c.").partition(">")[0]

@@ -7,12 +7,12 @@ import wave
 
 import numpy as np
 
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.wav import WAV, encode_wav
 
 
 def test_wav_is_sixteen_bit_mono_and_as_long_as_the_realization(realization):
-    with wave.open(io.BytesIO(WAV.encode(realization, Drawing()))) as file:
+    with wave.open(io.BytesIO(WAV.encode(realization, RenderSettings()))) as file:
         assert (file.getnchannels(), file.getsampwidth(), file.getframerate()) == (1, 2, 22050)
         assert file.getnframes() == round(1.5 * 22050)
         pcm = np.frombuffer(file.readframes(file.getnframes()), "<i2")

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from realizer.offline import realize
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.outputs.webp import encode_webp
 
@@ -55,11 +55,11 @@ def test_times_that_are_no_whole_milliseconds_do_not_drift(tmp_path):
 @pytest.mark.slow
 def test_a_realization_becomes_an_animated_picture_of_its_face(realization, tmp_path):
     for name in ("x", "y"):
-        OUTPUTS[".webp"].write(realization, tmp_path / f"{name}.webp", Drawing(size=(97, 96)))
+        OUTPUTS[".webp"].write(realization, tmp_path / f"{name}.webp", RenderSettings(size=(97, 96)))
     found, _ = opened(tmp_path / "x.webp")
     assert len(found) == 38
     assert {shown for shown, _ in found} == {0.04}
-    with Drawing(size=(97, 96)).renderer(realization, (97, 96)) as renderer:
+    with RenderSettings(size=(97, 96)).make_renderer(realization, (97, 96)) as renderer:
         drawn = renderer.draw(realization.poses)
     for (_, got), wanted in zip(found, drawn, strict=True):
         assert np.abs(got.astype(int) - wanted).mean() < 4
@@ -70,7 +70,7 @@ def test_a_realization_becomes_an_animated_picture_of_its_face(realization, tmp_
 @pytest.mark.gl
 def test_more_than_25_pictures_a_second_are_thinned(tmp_path):
     quick = realize('<bml id="b"><head id="n" lexeme="NOD" end="0.5"/></bml>', fps=60, idle=False)
-    OUTPUTS[".webp"].write(quick, tmp_path / "x.webp", Drawing(size=(32, 32)))
+    OUTPUTS[".webp"].write(quick, tmp_path / "x.webp", RenderSettings(size=(32, 32)))
     found, _ = opened(tmp_path / "x.webp")
     assert len(found) == len(quick.poses[::3])
     assert {shown for shown, _ in found} == {0.05}

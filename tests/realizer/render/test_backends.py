@@ -21,7 +21,7 @@ def test_a_graphics_card_is_used_first_and_without_one_the_processor(tmp_path):
 @pytest.mark.parametrize("way", ["auto", "onboard"])
 def test_a_canvas_comes_with_the_way_that_was_taken(balls, way):
     face, normals = balls
-    taken, canvas = backends.open_canvas(face, (32, 24), camera_for(face), preset(), way=way)
+    taken, canvas = backends.open_canvas(face, (32, 24), camera_for(face), preset(), backend=way)
     assert taken in ("gl", "onboard")
     assert way in ("auto", taken)
     assert canvas.draw(face.vertices, normals).shape == (24, 32, 3)
@@ -31,7 +31,7 @@ def test_a_canvas_comes_with_the_way_that_was_taken(balls, way):
 def test_another_way_is_refused_with_the_known_ones(balls):
     face, _ = balls
     with pytest.raises(RenderError, match="wanted one of auto, gl, onboard, got 'vulkan'"):
-        backends.open_canvas(face, (32, 24), camera_for(face), preset(), way="vulkan")
+        backends.open_canvas(face, (32, 24), camera_for(face), preset(), backend="vulkan")
 
 
 def test_where_no_way_is_there_the_sentence_names_both(balls, monkeypatch):

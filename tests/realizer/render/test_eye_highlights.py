@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from realizer.render.eye_highlights import Glints
+from realizer.render.eye_highlights import EyeHighlights
 from realizer.render.light import preset, unit
 
 FRONT = np.array([0, 0, 1], np.float32)
@@ -15,7 +15,7 @@ FRONT = np.array([0, 0, 1], np.float32)
 
 def test_each_eye_has_a_cap_between_the_key_and_who_looks(balls):
     face, _ = balls
-    points = Glints(face, preset(), FRONT)(face.vertices)
+    points = EyeHighlights(face, preset(), FRONT)(face.vertices)
     assert len(points) == 22
     for name, cap in zip(("left_eye", "right_eye"), np.split(points, 2), strict=True):
         first, last = face.parts[name]
@@ -27,7 +27,7 @@ def test_each_eye_has_a_cap_between_the_key_and_who_looks(balls):
 
 def test_it_follows_the_eye_that_moves_and_the_page_can_tell_where(balls):
     face, _ = balls
-    glints = Glints(face, preset(), FRONT)
+    glints = EyeHighlights(face, preset(), FRONT)
     moved = face.vertices + np.array([0.01, -0.02, 0.005], np.float32)
     assert glints(moved) - glints(face.vertices) == pytest.approx(
         np.tile([0.01, -0.02, 0.005], (len(glints(moved)), 1)), abs=1e-5

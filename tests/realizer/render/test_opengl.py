@@ -9,7 +9,7 @@ import pytest
 
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.opengl import Canvas
+from realizer.render.opengl import OpenGLCanvas
 
 pytestmark = pytest.mark.gl("gl")
 
@@ -17,10 +17,10 @@ SIZE = (320, 240)
 
 
 @pytest.fixture
-def canvas(balls) -> Iterator[Canvas]:
+def canvas(balls) -> Iterator[OpenGLCanvas]:
     """One a test: closing one ends the display of all in the process."""
     face, _ = balls
-    canvas = Canvas(face, SIZE, camera_for(face), preset())
+    canvas = OpenGLCanvas(face, SIZE, camera_for(face), preset())
     yield canvas
     canvas.close()
 
@@ -94,7 +94,7 @@ def test_the_backdrop_is_a_soft_neutral_gradient(canvas, balls):
 def test_odd_sizes_are_not_sheared(balls):
     """Rows of 3 x 101 bytes are no multiple of four, GL's default row alignment."""
     face, normals = balls
-    canvas = Canvas(face, (101, 77), camera_for(face), preset())
+    canvas = OpenGLCanvas(face, (101, 77), camera_for(face), preset())
     picture = canvas.draw(face.vertices, normals)
     canvas.close()
     columns = np.nonzero(skin(picture))[1]

@@ -208,9 +208,9 @@ def test_a_picture_is_written_in_every_form(renderer, form):
 def test_a_transparent_picture_is_the_opaque_one_without_its_backdrop(way):
     if missing := available(way):
         pytest.skip(missing)
-    with Renderer("default", SIZE, background="#000000", way=way) as renderer:
+    with Renderer("default", SIZE, background="#000000", backend=way) as renderer:
         black = renderer.draw(rows(2)).astype(int)
-    with Renderer("default", SIZE, background="transparent", way=way) as renderer:
+    with Renderer("default", SIZE, background="transparent", backend=way) as renderer:
         clear = renderer.draw(rows(2)).astype(int)
         assert Image.open(io.BytesIO(renderer.encoded(rows(1)[0]))).mode == "RGB"
         for form in ("png", "webp"):

@@ -6,13 +6,13 @@ import numpy as np
 
 from realizer.render.cameras import camera_for
 from realizer.render.light import Shader, preset
-from realizer.render.shaded_mesh import Figure
+from realizer.render.shaded_mesh import ShadedMesh
 
 
 def test_the_head_is_lit_and_stands_where_it_is_told(balls):
     face, ups = balls
     camera = camera_for(face)
-    figure = Figure(face, camera, preset())
+    figure = ShadedMesh(face, camera, preset())
     moved = face.vertices + np.float32([0.01, 0, 0])
     figure.pose(moved, ups)
     shader = Shader(preset(), face.colours, face.occlusion, face.gloss, camera.towards)
@@ -23,7 +23,7 @@ def test_the_head_is_lit_and_stands_where_it_is_told(balls):
 
 def test_glints_ride_on_the_eyes(balls):
     face, ups = balls
-    figure = Figure(face, camera_for(face), preset())
+    figure = ShadedMesh(face, camera_for(face), preset())
     before = figure.points[len(face.vertices) :].copy()
     figure.pose(face.vertices + np.float32([0, 0.02, 0]), ups)
     assert np.allclose(figure.points[len(face.vertices) :] - before, [0, 0.02, 0], atol=1e-5)

@@ -11,7 +11,7 @@ from realizer.face.surface import normals
 from realizer.render.backdrop import backdrop
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.software import OnboardCanvas
+from realizer.render.software import SoftwareCanvas
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
 
@@ -35,11 +35,11 @@ def pose(face, **faps):
 @pytest.mark.parametrize("camera", ["front", "three-quarter", "profile", "close"])
 @pytest.mark.parametrize("light", ["portrait", "evening"])
 def test_both_ways_draw_the_same_picture(face, camera, light):
-    from realizer.render.opengl import Canvas
+    from realizer.render.opengl import OpenGLCanvas
 
     eye, lamp = camera_for(face, camera), preset(light)
     behind = backdrop(SIZE, lamp)[..., :3].astype(int)
-    card, own = Canvas(face, SIZE, eye, lamp), OnboardCanvas(face, SIZE, eye, lamp)
+    card, own = OpenGLCanvas(face, SIZE, eye, lamp), SoftwareCanvas(face, SIZE, eye, lamp)
     try:
         for shape in (pose(face), pose(face, fap3=900, fap5=-900, fap19=500, fap49=8000)):
             a, b = card.draw(*shape).astype(int), own.draw(*shape).astype(int)
@@ -56,7 +56,7 @@ def test_both_ways_draw_the_same_picture(face, camera, light):
 
 def test_the_chin_and_the_pupils_stand_where_the_camera_projects_them(face):
     camera = camera_for(face)
-    picture = OnboardCanvas(face, SIZE, camera, preset()).draw(*pose(face)).astype(int)
+    picture = SoftwareCanvas(face, SIZE, camera, preset()).draw(*pose(face)).astype(int)
     for point in ("3.5", "3.6"):
         x, y = camera.project(face.points[point], SIZE)[0].round().astype(int)
         assert picture[y - 2 : y + 3, x - 2 : x + 3].sum(2).min() < 150
@@ -66,13 +66,13 @@ def test_the_chin_and_the_pupils_stand_where_the_camera_projects_them(face):
 
 
 def test_one_sample_a_pixel_is_the_same_picture_with_rough_edges(face):
-    fine = OnboardCanvas(face, SIZE, camera_for(face), preset()).draw(*pose(face)).astype(int)
-    plain = OnboardCanvas(face, SIZE, camera_for(face), preset(), smooth=False).draw(*pose(face)).astype(int)
+    fine = SoftwareCanvas(face, SIZE, camera_for(face), preset()).draw(*pose(face)).astype(int)
+    plain = SoftwareCanvas(face, SIZE, camera_for(face), preset(), smooth=False).draw(*pose(face)).astype(int)
     assert 0.05 < np.abs(fine - plain).mean() < 2.5
 
 
 def test_draw_fills_the_given_memory(face):
-    canvas = OnboardCanvas(face, (64, 48), camera_for(face), preset())
+    canvas = SoftwareCanvas(face, (64, 48), camera_for(face), preset())
     out = np.zeros((48, 64, 3), np.uint8)
     assert canvas.draw(*pose(face), out) is out
     assert np.array_equal(canvas.draw(*pose(face)), out)
@@ -82,5 +82,5 @@ def test_draw_fills_the_given_memory(face):
 def test_vertices_behind_the_lens_are_left_out(face):
     vertices, ups = pose(face)
     behind = vertices + np.float32([0, 0, 9])
-    picture = OnboardCanvas(face, (64, 48), camera_for(face), preset()).draw(behind, ups)
+    picture = SoftwareCanvas(face, (64, 48), camera_for(face), preset()).draw(behind, ups)
     assert not (picture[..., 0].astype(int) - picture[..., 2] > 10).any()

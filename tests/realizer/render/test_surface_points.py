@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.render.surface_points import on_skin
+from realizer.render.surface_points import locate_on_skin
 
 RIGHT, FRONT = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
 
@@ -13,7 +13,7 @@ RIGHT, FRONT = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
 def test_a_place_is_found_on_the_near_side_where_it_projects(balls):
     face, _ = balls
     places = np.array([[0.0, -0.03], [0.031, 0.02], [-0.02, -0.1]])
-    corners, weights = on_skin(face, places, RIGHT, FRONT, 1.0)
+    corners, weights = locate_on_skin(face, places, RIGHT, FRONT, 1.0)
     points = (face.vertices[corners] * weights[..., None]).sum(axis=1)
     assert np.allclose(points[:, :2], places, atol=1e-6)
     assert (points[:, 2] > -0.09).all()
@@ -22,12 +22,12 @@ def test_a_place_is_found_on_the_near_side_where_it_projects(balls):
 
 def test_from_aside_the_picture_is_turned(balls):
     face, _ = balls
-    corners, weights = on_skin(face, np.array([[0.09, -0.03]]), np.array([0, 0, -1.0]), RIGHT, 1.0)
+    corners, weights = locate_on_skin(face, np.array([[0.09, -0.03]]), np.array([0, 0, -1.0]), RIGHT, 1.0)
     (point,) = (face.vertices[corners] * weights[..., None]).sum(axis=1)
     assert point == pytest.approx([0.075, -0.03, -0.09], abs=0.001)
 
 
 def test_beside_the_skin_or_where_it_is_coarse_there_is_no_place(balls):
     face, _ = balls
-    assert on_skin(face, np.array([[0.0, 0.0], [0.3, 0.0]]), RIGHT, FRONT, 1.0) is None
-    assert on_skin(face, np.array([[0.0, -0.03]]), RIGHT, FRONT, 1e-4) is None
+    assert locate_on_skin(face, np.array([[0.0, 0.0], [0.3, 0.0]]), RIGHT, FRONT, 1.0) is None
+    assert locate_on_skin(face, np.array([[0.0, -0.03]]), RIGHT, FRONT, 1e-4) is None

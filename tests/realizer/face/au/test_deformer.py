@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.au.mixers import mix, opened
+from realizer.face.au.mixers import limit_opening, mix
 from realizer.face.deform import deform
-from realizer.face.load import list_faces, load_face, takes
+from realizer.face.load import input_names, list_faces, load_face
 from realizer.face.model import Face
 
 FOLDER = next(info.path for info in list_faces() if info.name == load_face().name)
@@ -22,12 +22,12 @@ def face() -> Face:
 
 def pose(face: Face, **values: float) -> np.ndarray:
     """A row: au12=1 (both sides), au12L=1, or a FAP by its name."""
-    row = np.zeros(len(face.takes), np.float32)
+    row = np.zeros(len(face.inputs), np.float32)
     for key, value in values.items():
         name = key.removeprefix("au")
         for column in (name, f"{name}L", f"{name}R"):
-            if column in face.takes:
-                row[face.takes.index(column)] = value
+            if column in face.inputs:
+                row[face.inputs.index(column)] = value
     return row
 
 
@@ -41,17 +41,17 @@ def part(face: Face, vertices: np.ndarray, name: str) -> np.ndarray:
 
 
 def test_at_rest_the_face_is_neutral_to_the_last_bit(face: Face) -> None:
-    assert (deform(face, np.zeros((2, len(face.takes)))) == face.vertices).all()
+    assert (deform(face, np.zeros((2, len(face.inputs)))) == face.vertices).all()
 
 
 def test_a_pose_is_the_faps_then_each_unit_by_side_then_the_lips_and_the_mixing(face: Face) -> None:
-    assert face.takes[:68] == load_face(deformer="mpeg4").takes
-    assert {"12L", "12R", "17", "45L", "46R"} <= set(face.takes[68:])
-    mixing = face.takes.index("lips")
-    assert face.takes[mixing + 1 : mixing + 4] == ("successive", "rank 1", "rank 2")
-    assert face.takes[-1] == "rank 28"
-    assert len(set(face.takes)) == len(face.takes)
-    assert takes(deformer="au") == face.takes
+    assert face.inputs[:68] == load_face(deformer="mpeg4").inputs
+    assert {"12L", "12R", "17", "45L", "46R"} <= set(face.inputs[68:])
+    mixing = face.inputs.index("lips")
+    assert face.inputs[mixing + 1 : mixing + 4] == ("successive", "rank 1", "rank 2")
+    assert face.inputs[-1] == "rank 28"
+    assert len(set(face.inputs)) == len(face.inputs)
+    assert input_names(deformer="au") == face.inputs
 
 
 def test_units_give_what_the_mixers_give(face: Face) -> None:
@@ -192,7 +192,7 @@ def test_the_mouth_opens_as_far_as_the_widest_unit_opens_it(face: Face) -> None:
     assert face.model is not None
     gaps = np.array([face.model.gap(au) for au in (27, 26, 25)])
     values = np.random.default_rng(0).uniform(0, 1, (3, 50))
-    assert gaps @ opened(gaps, values) == pytest.approx((gaps[:, None] * values).max(axis=0))
+    assert gaps @ limit_opening(gaps, values) == pytest.approx((gaps[:, None] * values).max(axis=0))
 
 
 def test_speech_has_the_lips_and_leaves_brows_cheeks_and_part_of_the_corners(face: Face) -> None:
@@ -212,7 +212,7 @@ def test_values_of_another_shape_or_not_finite_are_refused(face: Face) -> None:
     with pytest.raises(ValueError, match=r"wanted \(n, 68\) or \(n, "):
         deform(face, np.zeros((1, 3)))
     with pytest.raises(ValueError, match="finite"):
-        deform(face, np.full((1, len(face.takes)), np.nan))
+        deform(face, np.full((1, len(face.inputs)), np.nan))
 
 
 @pytest.fixture
@@ -245,8 +245,8 @@ def test_a_face_may_be_drawn_by_its_model_without_being_asked(mine: Path) -> Non
 def test_a_face_may_leave_some_of_its_units_to_the_faps(mine: Path) -> None:
     say(mine, 'deformer = { name = "au", model = "au_published.toml", aus = [1, 2, 12] }')
     face = load_face("mine", mine.parent)
-    assert face.takes[68:75] == ("1L", "1R", "2L", "2R", "12L", "12R", "lips")
-    assert face.takes[75:] == ("successive", "rank 1", "rank 2", "rank 12")
+    assert face.inputs[68:75] == ("1L", "1R", "2L", "2R", "12L", "12R", "lips")
+    assert face.inputs[75:] == ("successive", "rank 1", "rank 2", "rank 12")
     assert face.model is not None
     assert face.model.form == "published"
 

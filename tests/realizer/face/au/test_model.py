@@ -110,8 +110,8 @@ def test_the_same_model_drives_a_mesh_of_another_topology(name: str, model: Mode
     misses = []
     for au, one in measured.items():
         goes = one.moves[place[known]]
-        far = np.linalg.norm(one.moves[one.seen], axis=1).max()
-        counts = one.seen[place[known]] & (np.linalg.norm(goes, axis=1) > 0.01 * far)
+        far = np.linalg.norm(one.moves[one.visible], axis=1).max()
+        counts = one.visible[place[known]] & (np.linalg.norm(goes, axis=1) > 0.01 * far)
         miss = (model.displacement(au, skin[index][known]) - goes)[counts]
         misses.append(np.linalg.norm(miss, axis=1).mean() / far)
     assert np.mean(misses) < 0.1

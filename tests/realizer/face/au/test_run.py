@@ -123,7 +123,7 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
     face = faces["au"]
     player = Player(PlayOptions(idle=True, seed=3))
     window = Timeline(player, 0, 25, lambda: face).window(0, 20)
-    assert window.poses.shape == (window.count, len(face.takes))
+    assert window.poses.shape == (window.count, len(face.inputs))
     meshes = quantise(face, deform(face, window.poses[:30]))
     for row in (0, 29, 7, 8):  # in any order
         assert np.array_equal(window.mesh(row), meshes[row])
@@ -132,8 +132,8 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
 
 def test_a_session_draws_as_the_service_was_told(faces: dict[str, Face]) -> None:
     session = Session("s", Settings(deformer="au"), 0.0)
-    assert session.faces.of(0).takes == faces["au"].takes
-    assert Session("s", Settings(), 0.0).faces.of(0).takes == faces["mpeg4"].takes
+    assert session.faces.of(0).inputs == faces["au"].inputs
+    assert Session("s", Settings(), 0.0).faces.of(0).inputs == faces["mpeg4"].inputs
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from realizer.face.au.skin_binding import roots
+from realizer.face.au.skin_binding import skin_roots
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
@@ -29,7 +29,7 @@ def hairy() -> Face:
 
 def test_a_root_is_the_place_below_and_a_tip_goes_with_its_root() -> None:
     face = hairy()
-    corners, share = roots(face, "lashes")
+    corners, share = skin_roots(face, "lashes")
     assert share.sum(axis=1) == pytest.approx(1)
     places = (share[:, :, None] * face.vertices[corners]).sum(axis=1)
     assert places[0] == pytest.approx([0.01, -0.06, 0], abs=1e-6)
@@ -42,8 +42,8 @@ def test_a_root_is_the_place_below_and_a_tip_goes_with_its_root() -> None:
 @pytest.mark.parametrize("unit", ["1", "2", "4"])
 def test_brows_bend_with_the_skin_without_steps(name: str, unit: str) -> None:
     face = load_face(name, deformer="au")
-    row = np.zeros((1, len(face.takes)), np.float32)
-    row[0, [face.takes.index(f"{unit}{side}") for side in "LR"]] = 1
+    row = np.zeros((1, len(face.inputs)), np.float32)
+    row[0, [face.inputs.index(f"{unit}{side}") for side in "LR"]] = 1
     moved = deform(face, row)[0].astype(float) - face.vertices
     first, last = face.parts["brows"]
     mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)]

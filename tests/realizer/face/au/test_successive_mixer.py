@@ -6,7 +6,7 @@ import pytest
 from realizer.face.au.mixers import successive
 from realizer.face.au.model import Model
 from realizer.face.au.mouth import shares
-from realizer.face.au.skin_binding import grown, skin
+from realizer.face.au.skin_binding import attached_parts, skin
 from realizer.face.au.successive_mixer import Succession
 from realizer.face.load import load_face
 from realizer.face.model import Face
@@ -42,7 +42,7 @@ def test_only_what_units_move_moves(face: Face) -> None:
 
 def test_brows_and_lashes_go_with_the_skin_they_grow_on(face: Face) -> None:
     made = Succession(face, model(face))({4: (1, 1), 1: (1, 1), 7: (1, 1)})
-    parts = grown(face)
+    parts = attached_parts(face)
     assert len(parts) == 2
     for first, last, corners, share in parts:
         assert made[first:last] == pytest.approx(np.einsum("nk,nkc->nc", share, made[corners]))

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
-from realizer.facebuild.arkit.importer import look_at
+from realizer.facebuild.arkit.importer import inspect_head
 from realizer.tables.arkit_names import canonical, nearest
 
 pytestmark = pytest.mark.xdist_group("fits")
@@ -41,16 +41,16 @@ def test_foreign_names_are_told_with_the_nearest_known(write_head: Callable[...,
     assert "mouthSmileLeft" in nearest("mouthSmileLeftt")
     path = write_head(spell=lambda n: f"{n}{n}", only=("jawOpen", "mouthSmileLeft"))
     with pytest.raises(FaceError, match="wanted morph targets with ARKit's names"):
-        look_at(path)
+        inspect_head(path)
 
 
 def test_a_head_without_shapes_is_refused(write_head: Callable[..., Path]) -> None:
     with pytest.raises(FaceError, match="found none; export the head with its shape keys"):
-        look_at(write_head(only=()))
+        inspect_head(write_head(only=()))
 
 
 def test_missing_shapes_are_told_with_what_does_not_work(write_head: Callable[..., Path]) -> None:
-    report = look_at(write_head(only=("jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthSmileLeft")))
+    report = inspect_head(write_head(only=("jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthSmileLeft")))
     assert any(line.startswith("browInnerUp: ") for line in report.missing)
     assert not any("jawOpen" in line for line in report.missing)
 
@@ -60,7 +60,7 @@ def test_a_truncated_file_is_refused(ada_glb: Path, tmp_path: Path, length: int)
     path = tmp_path / "cut.glb"
     path.write_bytes(ada_glb.read_bytes()[:length])
     with pytest.raises(FaceError, match=r"cut\.glb"):
-        look_at(path)
+        inspect_head(path)
 
 
 @pytest.mark.parametrize("spoil", [
@@ -84,7 +84,7 @@ def test_a_broken_document_is_refused_with_the_file(
     path = tmp_path / "head.gltf"
     path.write_text(json.dumps(document), "utf-8")
     with pytest.raises(FaceError, match=r"head\.gltf"):
-        look_at(path)
+        inspect_head(path)
 
 
 SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
@@ -107,13 +107,13 @@ def test_places_that_are_none_are_refused_as_such(ada_glb: Path, tmp_path: Path,
     spoil, words = SPOILT[name]
     spoil(document)
     with pytest.raises(FaceError, match=words):
-        look_at(written(tmp_path / "odd.glb", document, data))
+        inspect_head(written(tmp_path / "odd.glb", document, data))
 
 
 def test_a_name_that_is_a_number_is_a_name(ada_glb: Path, tmp_path: Path) -> None:
     document, data = split(ada_glb)
     document["meshes"][0]["name"] = 3
-    assert look_at(written(tmp_path / "odd.glb", document, data)).lines
+    assert inspect_head(written(tmp_path / "odd.glb", document, data)).lines
 
 
 def test_a_gltf_with_its_data_inside_or_beside_is_read(ada_glb: Path, tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_gltf_with_its_data_inside_or_beside_is_read(ada_glb: Path, tmp_path: 
         (tmp_path / "head.bin").write_bytes(data)
         document["buffers"][0]["uri"] = uri
         path.write_text(json.dumps(document), "utf-8")
-        assert look_at(path).found == look_at(ada_glb).found
+        assert inspect_head(path).found == inspect_head(ada_glb).found
 
 
 def test_the_command_says_what_an_import_would_find(ada_glb: Path, tmp_path: Path) -> None:

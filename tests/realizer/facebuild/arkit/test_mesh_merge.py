@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.facebuild.arkit.mesh_merge import Surface, components, cut, joined
+from realizer.facebuild.arkit.mesh_merge import Surface, components, cut, merge_pieces
 from realizer.facebuild.arkit.scene import Piece
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
@@ -21,28 +21,28 @@ def piece(aside: float = 0, glass: bool = False, **moves: float) -> Piece:
 
 
 def test_joined_pieces_share_the_vertices_of_their_seam() -> None:
-    surface = joined([piece(), piece(1)])
+    surface = merge_pieces([piece(), piece(1)])
     assert len(surface.vertices) == 6
     assert len(surface.triangles) == 4
     assert set(surface.piece.tolist()) == {0, 1}
 
 
 def test_joined_pieces_keep_a_seam_that_opens() -> None:
-    surface = joined([piece(jawOpen=0.0), piece(1, jawOpen=-0.5)])
+    surface = merge_pieces([piece(jawOpen=0.0), piece(1, jawOpen=-0.5)])
     assert len(surface.vertices) == 8
     assert sorted(surface.move("jawOpen")[:, 1].tolist()) == [-0.5] * 4 + [0] * 4
     assert not surface.move("eyeBlinkLeft").any()
 
 
 def test_joined_pieces_have_arkit_s_names_and_no_glass() -> None:
-    surface = joined([piece(Mouth_Smile_L=1.0, hat=1.0), piece(5, glass=True)])
+    surface = merge_pieces([piece(Mouth_Smile_L=1.0, hat=1.0), piece(5, glass=True)])
     assert list(surface.moves) == ["mouthSmileLeft"]
     assert len(surface.vertices) == 4
 
 
 def test_chosen_vertices_keep_the_triangles_that_they_alone_make() -> None:
-    whole = joined([piece(jawOpen=1.0)])
-    surface = whole.chosen(whole.triangles[0][::-1])
+    whole = merge_pieces([piece(jawOpen=1.0)])
+    surface = whole.subset(whole.triangles[0][::-1])
     assert surface.triangles.tolist() == [[2, 1, 0]]
     assert len(surface.move("jawOpen")) == len(surface.colours) == 3
 
@@ -52,7 +52,7 @@ def test_components_are_numbered() -> None:
 
 
 def test_cut_ends_the_surface_along_a_straight_line() -> None:
-    surface = joined([piece(jawOpen=1.0)])
+    surface = merge_pieces([piece(jawOpen=1.0)])
     left = cut(surface, surface.vertices[:, 0] - 0.25)
     assert left.vertices[:, 0].min() == pytest.approx(0.25)
     assert area(left) == pytest.approx(0.75)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realizer.facebuild.arkit.importer import look_at
+from realizer.facebuild.arkit.importer import inspect_head
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -24,7 +24,7 @@ WAYS = {
 def test_unit_and_facing_are_told_by_the_shapes(
     write_head: Callable[..., Path], way: str, scale: float, unit: str
 ) -> None:
-    found = look_at(write_head(scale=scale, turn=WAYS[way], sparse=scale > 1)).found
+    found = inspect_head(write_head(scale=scale, turn=WAYS[way], sparse=scale > 1)).found
     assert any(f"in {unit}: its eyes stand" in line for line in found)
     assert not any("exchanged" in line for line in found)
 
@@ -32,4 +32,4 @@ def test_unit_and_facing_are_told_by_the_shapes(
 def test_a_viewers_left_and_right_are_exchanged(write_head: Callable[..., Path]) -> None:
     other = {"Left": "Right", "Right": "Left"}
     path = write_head(spell=lambda n: next((n[: -len(k)] + other[k] for k in other if n.endswith(k)), n))
-    assert any("exchanged" in line for line in look_at(path).found)
+    assert any("exchanged" in line for line in inspect_head(path).found)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.face.model import Face
-from realizer.facebuild.arkit.part_classifier import ball_of, behind, is_ball, part_of
+from realizer.facebuild.arkit.part_classifier import ball_behind, ball_of, is_ball, part_of
 
 
 @pytest.mark.parametrize(
@@ -37,5 +37,5 @@ def test_a_ball_is_found_with_its_centre_and_radius(balls: tuple[Face, np.ndarra
 
 
 def test_a_ball_lies_behind_a_painted_eye() -> None:
-    centre, radius = behind(np.array([[0.02, 0.01, 0.03], [0.04, -0.01, 0.02]]))
+    centre, radius = ball_behind(np.array([[0.02, 0.01, 0.03], [0.04, -0.01, 0.02]]))
     assert centre == pytest.approx([0.03, 0, 0.03 - radius])

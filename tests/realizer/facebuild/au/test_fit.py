@@ -14,7 +14,7 @@ from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.facebuild.au.fit import fit_models, table, table_text
-from realizer.facebuild.au.measure import read_measured, read_shapes
+from realizer.facebuild.au.measure import read_measurements, read_shapes
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -45,7 +45,7 @@ def landmarks(model: Model, aus: tuple[int, ...], count: int = 120) -> str:
 def test_a_unit_that_her_form_can_show_is_found_again_from_landmarks(known: Model, tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
     path.write_text(landmarks(known, (1, 15)))
-    measured = read_measured(path)
+    measured = read_measurements(path)
     told: list[str] = []
     model = fit_models(load_face(), measured, ("published",), told.append)["published"]
     rows = table(model, measured)
@@ -102,7 +102,7 @@ def fitted(known: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     """Landmarks of one unit, and a model of them that serves as either form."""
     path = tmp_path_factory.mktemp("fit") / "landmarks.csv"
     path.write_text(landmarks(known, (2,), 30))
-    model = fit_models(load_face(), read_measured(path), ("published",))["published"]
+    model = fit_models(load_face(), read_measurements(path), ("published",))["published"]
     return path, {"published": model, "extended": model}
 
 

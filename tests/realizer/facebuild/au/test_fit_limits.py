@@ -15,8 +15,8 @@ from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.facebuild.au.fit import fit_models
-from realizer.facebuild.au.fit_limits import FURTHEST, overshoot, runaways, watched
-from realizer.facebuild.au.measure import Measured, read_shapes
+from realizer.facebuild.au.fit_limits import FURTHEST, overshoot, runaways, watched_places
+from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -50,7 +50,7 @@ def test_nor_does_any_place_near_the_face(name: str, form: str) -> None:
     at = np.einsum("mk,mkc->mc", rng.dirichlet(np.ones(3), len(skin)), skin)
     at += rng.uniform(-0.001, 0.001, at.shape)
     for au, one in read_shapes(FITTED[name] / "au_shapes.npz").items():
-        d_max = np.linalg.norm(one.moves[one.seen], axis=1).max()
+        d_max = np.linalg.norm(one.moves[one.visible], axis=1).max()
         far = np.linalg.norm(model.displacement(au, at), axis=1).max()
         assert far < 2 * d_max, f"AU{au}"
 
@@ -61,7 +61,7 @@ def test_places_that_nobody_measured_are_held_too(face: Face) -> None:
     x = np.linspace(0.005, 0.03, 8)
     at = np.stack([x, np.full(8, -0.055), np.full(8, 0.02)], axis=1)
     moves = np.stack([0 * x, 0.5 * x, 0.2 * x], axis=1)
-    measured = {12: Measured(12, at, moves, np.ones(8, bool))}
+    measured = {12: UnitMeasurement(12, at, moves, np.ones(8, bool))}
     for model in fit_models(face, measured).values():
         assert runaways(face, model, measured) == ()
 
@@ -92,12 +92,12 @@ def test_a_density_costs_from_where_it_goes_too_far() -> None:
 
 def test_what_is_watched_is_each_vertex_once_on_the_left(face: Face) -> None:
     model = read_model(FOLDER / "au_published.toml")
-    places = watched(face, model.mouth)
+    places = watched_places(face, model.mouth)
     assert (places.at[:, 0] >= 0).all()
     assert 1000 < len(places.at) < len(face.vertices)
     corner = np.linalg.norm(places.at - face.points["8.3"], axis=1)
     assert corner.min() < 1e-6
-    finer = watched(face, model.mouth, between=True)
+    finer = watched_places(face, model.mouth, between=True)
     assert len(finer.at) > 3 * len(places.at)
     assert {tuple(at) for at in places.at.tolist()} <= {tuple(at) for at in finer.at.tolist()}
     # Every place belongs to a half, or in part to both.

@@ -9,7 +9,7 @@ import pytest
 from realizer.core.errors import FaceError
 from realizer.face.au.units import units
 from realizer.face.load import list_faces, load_face
-from realizer.facebuild.au.measure import read_measured, read_shapes, write_shapes
+from realizer.facebuild.au.measure import read_measurements, read_shapes, write_shapes
 
 HEAD = "# source: made for tests\n# units: metres\n# licence: MIT\nau,x,y,z,dx,dy,dz\n"
 
@@ -30,7 +30,7 @@ def test_bad_measurements_are_refused_with_their_place(text: str, words: str, tm
     path = tmp_path / "landmarks.csv"
     path.write_text(text)
     with pytest.raises(FaceError, match=words) as caught:
-        read_measured(path)
+        read_measurements(path)
     assert "landmarks.csv" in str(caught.value)
 
 
@@ -42,7 +42,7 @@ def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
     assert set(again) == {unit.au for unit in units().values() if unit.kind == "displacement"}
     for au, one in measured.items():
         assert again[au].moves == pytest.approx(one.moves, abs=1e-9)
-        assert (again[au].seen == one.seen).all()
+        assert (again[au].visible == one.visible).all()
     with pytest.raises(FaceError, match=r"none\.npz"):
         read_shapes(tmp_path / "none.npz")
 
@@ -50,10 +50,10 @@ def test_shapes_are_the_same_when_read_again(tmp_path: Path) -> None:
 def test_measured_landmarks_are_gathered_by_unit(tmp_path: Path) -> None:
     path = tmp_path / "landmarks.csv"
     path.write_text(HEAD + "".join(f"{au},0.1,0.2,{k},0,{au},0\n" for k in range(8) for au in (12, 4)))
-    found = read_measured(path)
+    found = read_measurements(path)
     assert list(found) == [4, 12]
     assert found[12].at.tolist() == [[0.1, 0.2, k] for k in range(8)]
     assert found[4].moves.tolist() == [[0, 4, 0]] * 8
-    assert found[4].seen.all()
+    assert found[4].visible.all()
     with pytest.raises(ValueError, match="wanted shapes whose halves are known"):
         write_shapes(tmp_path / "x.npz", found)

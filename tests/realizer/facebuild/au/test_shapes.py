@@ -34,7 +34,7 @@ def test_the_stored_shapes_go_where_their_units_names_say(folder: Path) -> None:
     ways = {1: 1, 2: 1, 4: -1, 5: 1, 6: 1, 10: 1, 12: 1, 15: -1, 16: -1, 27: -1, 43: -1}
     for au, sign in ways.items():
         one = measured[au]
-        long = np.where(one.seen, np.linalg.norm(one.moves, axis=1), 0)
+        long = np.where(one.visible, np.linalg.norm(one.moves, axis=1), 0)
         assert sign * one.moves[np.argmax(long), 1] > 0.001, f"AU{au}"
 
 
@@ -74,7 +74,7 @@ def test_pressed_lips_do_not_smile(folder: Path) -> None:
     one = read_shapes(folder / "au_shapes.npz")[24]
     corner = np.linalg.norm(one.at - face.points["8.3"], axis=1).argmin()
     long = np.linalg.norm(one.moves, axis=1)
-    assert long[corner] < 0.15 * long[one.seen].max()
+    assert long[corner] < 0.15 * long[one.visible].max()
 
 
 @pytest.mark.skipif("REALIZER_HEAD_DATA" not in os.environ, reason="wants the unpacked CC0 head data")

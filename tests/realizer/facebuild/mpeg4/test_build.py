@@ -14,7 +14,7 @@ from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
 from realizer.facebuild.mpeg4.build import apply_zones, setup_of
-from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.parameters import write_setup
 
 pytestmark = pytest.mark.xdist_group("faces")
@@ -45,7 +45,7 @@ def test_a_head_without_shapes_becomes_a_sound_face(plain: Path) -> None:
 
 
 def test_its_faps_are_true(plain: Path) -> None:
-    truths = face_truth(face_of(plain))
+    truths = score_faps(face_of(plain))
     assert mean_score(truths) > 2.8
     assert min(t.score for t in truths) >= 2
     assert all(t.error < 0.02 and t.mirror < 0.01 and t.others < 0.05 for t in truths)

@@ -12,7 +12,7 @@ from realizer.core.errors import FaceError
 from realizer.face.load import folder_of, load_face
 from realizer.facebuild.mpeg4.build import setup_of
 from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
-from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.zones import Setup, Zone
 
 FILE = """<?xml version="1.0"?>
@@ -114,7 +114,7 @@ def test_a_face_made_by_way_of_the_xml_is_as_true(tmp_path: Path) -> None:
     ):
         ran = CliRunner().invoke(faces, arguments)
         assert ran.exit_code == 0, ran.output
-    truths = face_truth(load_face("two", tmp_path))
+    truths = score_faps(load_face("two", tmp_path))
     assert mean_score(truths) > 2.6
     assert max(t.error for t in truths) < 0.02
 

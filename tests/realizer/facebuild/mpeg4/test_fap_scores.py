@@ -8,23 +8,23 @@ import pytest
 
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
-from realizer.facebuild.mpeg4.fap_scores import PEERS, Truth, face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import PEERS, FapScore, mean_score, score_faps
 
 FACES = [info.name for info in list_faces()]
 FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}
 
 
 @cache
-def truth_of(name: str) -> tuple[Truth, ...]:
-    return face_truth(load_face(name))
+def truth_of(name: str) -> tuple[FapScore, ...]:
+    return score_faps(load_face(name))
 
 
 @pytest.fixture(params=FACES)
-def truths(request: pytest.FixtureRequest) -> tuple[Truth, ...]:
+def truths(request: pytest.FixtureRequest) -> tuple[FapScore, ...]:
     return truth_of(request.param)
 
 
-def spoiled(change: dict[int, object]) -> dict[tuple[int, int], Truth]:
+def spoiled(change: dict[int, object]) -> dict[tuple[int, int], FapScore]:
     """The truth of the default face after its fields (3 x moving,) of some FAPs were replaced."""
     face = load_face()
     fields = face.basis["fields"].toarray()
@@ -33,20 +33,20 @@ def spoiled(change: dict[int, object]) -> dict[tuple[int, int], Truth]:
     from scipy.sparse import csr_matrix
 
     worse: Face = dataclasses.replace(face, basis={**face.basis, "fields": csr_matrix(fields)})
-    return {(t.fap, t.sign): t for t in face_truth(worse)}
+    return {(t.fap, t.sign): t for t in score_faps(worse)}
 
 
-def test_127_displacements_are_measured(truths: tuple[Truth, ...]) -> None:
+def test_127_displacements_are_measured(truths: tuple[FapScore, ...]) -> None:
     assert len(truths) == 127
     assert {t.fap for t in truths} == set(range(3, 69))
 
 
-def test_every_face_is_truer_than_every_face_that_paul_measured(truths: tuple[Truth, ...]) -> None:
+def test_every_face_is_truer_than_every_face_that_paul_measured(truths: tuple[FapScore, ...]) -> None:
     assert mean_score(truths) > max(PEERS.values())
     assert min(t.score for t in truths) >= 1
 
 
-def test_every_feature_point_goes_where_it_is_asked_to(truths: tuple[Truth, ...]) -> None:
+def test_every_feature_point_goes_where_it_is_asked_to(truths: tuple[FapScore, ...]) -> None:
     assert all(t.error < 0.02 for t in truths)
     assert all(t.mirror < 0.01 and t.others < 0.05 for t in truths)
 

@@ -13,7 +13,7 @@ from realizer.core.errors import FaceError
 from realizer.face.features import NAMES
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer.facebuild.check import check_face
-from realizer.facebuild.mpeg4.fap_scores import face_truth, mean_score
+from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.landmarks import find_points
 
 FACES = [info.name for info in list_faces()]
@@ -60,7 +60,7 @@ def test_a_bare_mesh_becomes_a_face_and_the_guesses_are_told(tmp_path: Path) -> 
     assert ran.exit_code == 0, ran.output
     assert "guessed, look at them:" in ran.output
     assert check_face("made", tmp_path) == ()
-    assert mean_score(face_truth(load_face("made", tmp_path))) > 2.7
+    assert mean_score(score_faps(load_face("made", tmp_path))) > 2.7
 
 
 def test_a_head_that_looks_away_is_refused() -> None:

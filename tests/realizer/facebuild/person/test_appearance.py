@@ -3,11 +3,11 @@
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.facebuild.person.appearance import look_of
+from realizer.facebuild.person.appearance import appearance_of
 
 
 def test_what_a_recipe_does_not_say_is_plain() -> None:
-    plain, own = look_of({}), look_of({"stubble": 0.7})
+    plain, own = appearance_of({}), appearance_of({"stubble": 0.7})
     assert (plain.stubble, own.stubble) == (0.0, 0.7)
     assert own.lips == plain.lips
 
@@ -22,4 +22,4 @@ def test_what_a_recipe_does_not_say_is_plain() -> None:
 )
 def test_what_is_no_figure_is_refused(table: dict[str, object], says: str) -> None:
     with pytest.raises(FaceError, match=says):
-        look_of(table)
+        appearance_of(table)

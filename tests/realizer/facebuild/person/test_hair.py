@@ -10,7 +10,7 @@ from realizer.core.errors import FaceError
 from realizer.face.load import load_face
 from realizer.facebuild.person.hair import Style, hair, scalp_of, shadow, style_of
 from realizer.facebuild.person.scalp import Scalp
-from realizer.facebuild.submesh import Patch, vertex_normals
+from realizer.facebuild.submesh import Submesh, vertex_normals
 from realizer.tables import read_toml, text_of
 
 pytestmark = pytest.mark.xdist_group("faces")
@@ -21,12 +21,12 @@ CLOSE = ("bun", "short", "buzz", "receding", "rim")  # styles that hang nowhere
 
 
 @pytest.fixture(scope="module")
-def head() -> tuple[Patch, np.ndarray, dict[str, np.ndarray]]:
+def head() -> tuple[Submesh, np.ndarray, dict[str, np.ndarray]]:
     face = load_face()
     first, last = face.parts["skin"]
     base = face.vertices[first:last].astype(float)
     mine = face.triangles[((face.triangles >= first) & (face.triangles < last)).all(axis=1)] - first
-    patch = Patch(sp.eye_array(len(base), format="csr"), np.zeros_like(base), mine)
+    patch = Submesh(sp.eye_array(len(base), format="csr"), np.zeros_like(base), mine)
     return patch, base, {name: np.array(at, float) for name, at in face.points.items()}
 
 

@@ -45,7 +45,7 @@ def test_a_recipe_is_read_as_it_is_written(data: Path) -> None:
     path = data / "recipe.toml"
     path.write_text(GOOD, "utf-8")
     recipe = read_recipe(path, data)
-    assert recipe.says == "Eve"
+    assert recipe.description == "Eve"
     assert recipe.targets == {"macrodetails/asian-female-old": 1.0, "eyes/*eye-scale-incr": 0.5}
     assert recipe.colours["skin"] == [1, 2.5, 255]
 
@@ -94,4 +94,4 @@ def test_every_recipe_that_ships_names_all_that_it_must(info: object, data: Path
             target = data / "mpfb2/targets" / f"{name.replace('*', side)}.target"
             target.parent.mkdir(parents=True, exist_ok=True)
             target.touch()
-    assert read_recipe(path, data).says
+    assert read_recipe(path, data).description

@@ -13,7 +13,7 @@ import pytest
 from realizer.animation.axis import AU_NAMES
 from realizer.core.array_types import Int32
 from realizer.core.settings import Settings
-from realizer.outputs.output import Drawing
+from realizer.outputs.output import RenderSettings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.render import Renderer
 from realizer.server.journal.journal_writer import Notes
@@ -191,7 +191,7 @@ def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> Non
     assert (before.face_name, changed, after.face_name) == ("ada", 26, "ben")
     assert (before.frames, after.frames) == (26, realization.frames - 26)
     size = (48, 48)
-    pictures = list(Drawing(size=size).pictures(realization, size, [25, 26]))
+    pictures = list(RenderSettings(size=size).pictures(realization, size, [25, 26]))
     assert len(pictures) == 2
     with Renderer("ben", size) as renderer:
         shown = renderer.draw(realization.poses[[25, 26]])
