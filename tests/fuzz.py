@@ -40,10 +40,10 @@ from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.session.effects import Send
 from realizer.server.session.session import Session
-from realizer.server.transports.message_format import Leave, ToSession
+from realizer.server.transports.message_format import Disconnect, Inbound
 from realizer.server.transports.xface.attachments import prepare
 from realizer.server.transports.xface.reader import Content, Fault, TaskReader
-from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, Desk
+from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner
 from realizer.server.transports.xface.wire import Task, pack_task, read_notes
 from realizer.speech.silent import SilentVoice
 from tests.interleavings import CONTROLS, FILTERS, Interleaving, no_error
@@ -221,7 +221,7 @@ def tasks(seed: int, mutant: bytes) -> None:
     # A text that is too long is let go of when it is too long: how much of it is shown depends on the cuts.
     if not any(isinstance(one, Fault) for one in (*found, *once)):
         assert found == once, mutant
-    desk, now, settings = Desk(1), 0.0, Settings(media=CORPUS / "media")
+    desk, now, settings = TaskRunner(1), 0.0, Settings(media=CORPUS / "media")
     for one in found[:60]:
         if isinstance(one, Task):
             _answered(desk, list(desk.accept(one)), now)
@@ -230,23 +230,23 @@ def tasks(seed: int, mutant: bytes) -> None:
             now += random.choice((0.0, 0.1, 3.0))
 
 
-def _answered(desk: Desk, answers: list[Answer], now: float) -> None:
+def _answered(desk: TaskRunner, answers: list[Answer], now: float) -> None:
     """Notes are notes; what goes to the session is understood there, and what it tells is answered."""
     for answer in answers:
         if isinstance(answer, bytes):
             assert len(read_notes(bytearray(answer))) == 1, answer
-        elif isinstance(answer, ToSession) and answer.text.startswith("{"):
+        elif isinstance(answer, Inbound) and answer.text.startswith("{"):
             control = parse_control(answer.text)
             assert not isinstance(control, ErrorMessage), control
-        elif isinstance(answer, ToSession):
+        elif isinstance(answer, Inbound):
             for item in read(answer.text, VOCABULARY):
                 if isinstance(item, Block):
                     refused = WarningFeedback(id=item.id, type="IMPOSSIBLE_TO_SCHEDULE", text="no")
                     start = BlockProgress(id=f"{item.id}:start", global_time=now)
                     told = refused if len(item.id) % 2 else start
-                    _answered(desk, list(desk.told(told.to_xml(), now)), now)
+                    _answered(desk, list(desk.on_feedback(told.to_xml(), now)), now)
         else:
-            assert isinstance(answer, Leave)
+            assert isinstance(answer, Disconnect)
 
 
 # control messages -------------------------------------------------------------------------------
@@ -293,7 +293,7 @@ def _change(message: dict[str, object], random: Random) -> None:
 
 def _sent(session: Session) -> str:
     """All that a client got, which can be read."""
-    told = [effect.data for effect in session.outgoing() if isinstance(effect, Send)]
+    told = [effect.data for effect in session.take_effects() if isinstance(effect, Send)]
     for data in told:
         if isinstance(data, str) and data.startswith("<"):
             assert "internal error" not in data, data

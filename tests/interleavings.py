@@ -20,10 +20,10 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.journal import JournalError
 from realizer.server.journal import journal_writer as thresholds
-from realizer.server.journal.entry import Entry, Kept
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.replay import restored
-from realizer.server.runtime.session_registry import Hub
+from realizer.server.journal.entry import Entry, SavedSession
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.replay import restore_session
+from realizer.server.runtime.session_registry import SessionRegistry
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -113,12 +113,12 @@ class Memory:
             raise JournalError("no room")
         self.entries[session].append(Entry.read(entry.line()))
 
-    def take(self, session: str) -> Kept | None:
+    def claim(self, session: str) -> SavedSession | None:
         if session not in self.entries:
             return None
-        return Kept(EPOCH, list(self.entries[session]), dict(self.parts[session]))
+        return SavedSession(EPOCH, list(self.entries[session]), dict(self.parts[session]))
 
-    def taken(self, sessions: Collection[str]) -> set[str]:
+    def taken_over(self, sessions: Collection[str]) -> set[str]:
         return set()
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
@@ -172,7 +172,7 @@ class Interleaving:
         self._full = full
         self._journal = Memory(lambda: self.random.random() < self._full)
         self._settings = Settings(max_blocks=50, keep=5)
-        self._hub = Hub(self._make, self._settings)
+        self._hub = SessionRegistry(self._make, self._settings)
         self._broken = mutants(documents, 10**9, seed) if documents else None
         self._views: dict[int, View] = {}
         self._count = 0
@@ -182,8 +182,8 @@ class Interleaving:
 
     def _make(self, id: str, now: float, named: bool) -> Session:
         session = Session(id, self._settings, now, named=named, epoch=EPOCH)
-        session.notes = Notes(id, self._journal if named else None)
-        session.notes.begin(EPOCH)
+        session.journal = JournalWriter(id, self._journal if named else None)
+        session.journal.begin(EPOCH)
         return session
 
     def run(self, steps: int) -> None:
@@ -227,7 +227,7 @@ class Interleaving:
         name = self.random.choice((None, "show", "show", "other"))
         seen = self.random.choice((None, None, 0, self.random.randrange(40)))
         there = None if name is None else self._hub.sessions.get(name)
-        newest = 0 if there is None else there.log.newest
+        newest = 0 if there is None else there.feedback_log.newest
         session = self._hub.open(self._count, name, self.now, seen)
         self._views[self._count] = View(session, newest if seen is None else seen if seen <= newest else 0)
 
@@ -276,7 +276,7 @@ class Interleaving:
         one = self._one()
         session = self._hub.session_of(one)
         assert session is not None
-        session.backlog(one, self.random.choice((0, 0, 10**6, 10**9)))
+        session.update_backlog(one, self.random.choice((0, 0, 10**6, 10**9)))
 
     def _answer(self) -> None:
         """A voice or the renderer answers, not in the order in which they were asked."""
@@ -286,9 +286,9 @@ class Interleaving:
         session, order = kind.pop(self.random.randrange(len(kind)))
         fails = self.random.random() < 0.1
         if isinstance(order, Speak):
-            session.spoken(order.id, VoiceError("hoarse") if fails else spoken(order), self.now)
+            session.on_speech(order.id, VoiceError("hoarse") if fails else spoken(order), self.now)
         else:
-            session.drawn(order.id, RenderError("blind") if fails else b"picture", self.now)
+            session.on_picture(order.id, RenderError("blind") if fails else b"picture", self.now)
 
     def _pass(self) -> None:
         """Time passes; or it does while nobody looks."""
@@ -298,7 +298,7 @@ class Interleaving:
         else:
             self._until(self.now + step)
         if self.random.random() < 0.1:
-            self._hub.sweep(self.now)
+            self._hub.remove_expired(self.now)
 
     # what comes of it --------------------------------------------------------------------------
 
@@ -319,7 +319,7 @@ class Interleaving:
 
     def _pump(self) -> None:
         for session in list(self._hub.sessions.values()):
-            for effect in self._hub.effects(session, self.now):
+            for effect in self._hub.take_effects(session, self.now):
                 self._do(session, effect)
 
     def _do(self, session: Session, effect: Effect) -> None:
@@ -377,7 +377,7 @@ class Interleaving:
         self._pump()
         while self._speaks:
             session, order = self._speaks.pop()
-            session.spoken(order.id, spoken(order), self.now)
+            session.on_speech(order.id, spoken(order), self.now)
             self._pump()
         self._until(self.now + 1)
         for one in list(self._views):
@@ -385,7 +385,7 @@ class Interleaving:
         self._until(self.now + 100)
         for session in self._hub.sessions.values():
             if not self._full:
-                assert not session.intake.inbox, session.id
+                assert not session.submission.queue, session.id
                 self._again(session)
 
     def _leave_one(self, one: int) -> None:
@@ -396,13 +396,13 @@ class Interleaving:
     def _again(self, session: Session) -> None:
         """Another process tells the same, from the journal."""
         other = Session(session.id, self._settings, 0.0, named=True, epoch=EPOCH)
-        kept = self._journal.take(session.id)
+        kept = self._journal.claim(session.id)
         assert kept is not None
-        restored(other, kept, spoken)
+        restore_session(other, kept, spoken)
         while (due := wakes(other)) <= self.now - session.opened:
             other.tick(max(due, 0.0))
-        first = max(session.log.first, other.log.first)
-        told, again = session.log.since(first), other.log.since(first)
+        first = max(session.feedback_log.first, other.feedback_log.first)
+        told, again = session.feedback_log.since(first), other.feedback_log.since(first)
         for here, there in zip(told, again, strict=False):
             assert here == there, f"told {here}, told again {there}"
         assert len(told) == len(again), (told[len(again) :], again[len(told) :])
@@ -410,8 +410,8 @@ class Interleaving:
 
 def spoken(order: Speak) -> Utterance:
     """What a voice makes of a text, always the same; of every other text with sound."""
-    utterance = speak_to_length(SilentVoice(), replace(order.say, voice=None))
-    if crc32(repr(order.say).encode()) % 2 or not utterance.duration:
+    utterance = speak_to_length(SilentVoice(), replace(order.request, voice=None))
+    if crc32(repr(order.request).encode()) % 2 or not utterance.duration:
         return utterance
     pcm = np.full(round(utterance.duration * RATE), 1000, np.int16)
     return replace(utterance, sample_rate=RATE, pcm=pcm, duration=len(pcm) / RATE)

@@ -19,9 +19,9 @@ import realizer
 from realizer.protocol.messages.common import ANSWERS, PROTOCOL
 from realizer.protocol.messages.parse import SUPPORTED, Control
 from realizer.protocol.messages.replies import (
-    Changed,
     ErrorCode,
     ErrorMessage,
+    FaceChanged,
     FrameMessage,
     Gap,
     Pong,
@@ -32,7 +32,7 @@ from realizer.protocol.messages.replies import (
 )
 from realizer.protocol.messages.requests import Subscribe
 from realizer.protocol.streams import KINDS, STREAMS
-from realizer.protocol.wire import FINAL, FORGET, VERSION
+from realizer.protocol.wire import FINAL, FLUSH, VERSION
 from realizer.protocol.wire import HEADER as BYTES
 
 FILE = Path(realizer.__path__[0]) / "server" / "asyncapi.json"
@@ -49,7 +49,7 @@ REQUESTS: dict[str, type[BaseModel]] = {
 REPLIES: dict[str, type[BaseModel]] = {
     "welcome": Welcome,
     "subscribed": Subscribed,
-    "changed": Changed,
+    "changed": FaceChanged,
     "state": StateMessage,
     "pong": Pong,
     "gap": Gap,
@@ -74,7 +74,7 @@ HEADER = (
 _FLUSHED = ", ".join(f"`{row.name}`" for row in STREAMS.values() if row.flushes)
 FLAGS = (
     "The low byte of flags is the `index` of `subscribed`; "
-    f"{FORGET:#x} on {_FLUSHED} means: discard everything from this time on."
+    f"{FLUSH:#x} on {_FLUSHED} means: discard everything from this time on."
 )
 CLIP = (
     f"A part of a sound clip: u8 kind 4, u8 version {VERSION}, u16 flags ({FINAL:#x}: the last part), u32 "
@@ -242,7 +242,7 @@ def constants() -> str:
             "/** Version of the protocol; a service that speaks another one refuses `hello`. */",
             f"export const VERSION = {PROTOCOL};",
             f"const HEADER = {BYTES.size}; // bytes: u8 kind, u8 version, u16 flags, u32 frame, f64 time",
-            f"const FORGET = {FORGET:#x}; // flag: forget everything from this time on",
+            f"const FORGET = {FLUSH:#x}; // flag: forget everything from this time on",
             "const KINDS = {",
             *kinds,
             "};",

@@ -11,4 +11,4 @@ __all__ = ["wakes"]
 
 def wakes(session: Session) -> float:
     """When `tick` is wanted, on the caller's clock: at once while it can read; infinite: never."""
-    return -math.inf if session.reads else session.next_due()
+    return -math.inf if session.has_documents else session.next_due()

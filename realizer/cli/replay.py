@@ -44,7 +44,7 @@ def replay(
     from realizer.outputs.output import RenderSettings
     from realizer.outputs.registry import output_for
     from realizer.server.journal import JournalError
-    from realizer.server.journal.playback import played, told
+    from realizer.server.journal.playback import replay_feedback, replay_recording
     from realizer.server.journal.recordings import read_record
 
     writer = None
@@ -57,10 +57,10 @@ def replay(
     try:
         found = read_record(record)
         if writer is None or output is None:
-            for text in told(found, **changed):
+            for text in replay_feedback(found, **changed):
                 click.echo(text)
             return 0
-        realization, _ = played(found, **changed)
+        realization, _ = replay_recording(found, **changed)
     except JournalError as error:  # of the file: nothing is missing here
         raise click.ClickException(str(error)) from None
     if writer.suffix in PICTURES:

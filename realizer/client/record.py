@@ -111,7 +111,7 @@ def _sound(packets: Sequence[WireFrame], start: float, seconds: float) -> Int16:
     pcm = np.zeros(round(seconds * RATE), np.int16)
     for packet in packets:
         first = round((packet.time - start) * RATE)
-        if packet.forget:
+        if packet.flush:
             pcm[max(0, first) :] = 0
         samples = np.frombuffer(packet.payload, "<i2")[max(0, -first) :]
         there = pcm[max(0, first) :][: len(samples)]

@@ -19,7 +19,7 @@ VERSION = 1
 # for a Float32Array or an Int32Array over the message.
 HEADER = struct.Struct("<BBHId")
 # On a sound packet: forget every sample from this packet's time on; what follows replaces it.
-FORGET = 0x100
+FLUSH = 0x100
 # On a piece of a sound clip that comes in: it is the last one.
 FINAL = 0x200
 # Behind the header of such a piece: u32 rate, u8 length of the id, the id (UTF-8), then sound.
@@ -44,7 +44,7 @@ class WireFrame:
     time: float
     payload: bytes
     character: int = 0
-    forget: bool = False
+    flush: bool = False
     told: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -85,11 +85,11 @@ def pack(
     payload: bytes,
     *,
     character: int = 0,
-    forget: bool = False,
+    flush: bool = False,
 ) -> bytes:
     """One binary message. `frame` counts from the session's start, `time` is seconds on its clock."""
     kind = STREAMS[stream].kind
-    return HEADER.pack(kind, VERSION, (character & 0xFF) | (FORGET if forget else 0), frame, time) + payload
+    return HEADER.pack(kind, VERSION, (character & 0xFF) | (FLUSH if flush else 0), frame, time) + payload
 
 
 def pack_frames(
@@ -132,7 +132,7 @@ def unpack(message: bytes) -> WireFrame:
         raise WireError(f"wanted version {VERSION} of the frame header, got {version}")
     if kind not in KINDS:
         raise WireError(f"wanted a kind in {list(KINDS)}, got {kind}")
-    return WireFrame(kind, frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FORGET))
+    return WireFrame(kind, frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FLUSH))
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,12 +15,12 @@ from realizer.core.logs import write_json
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
-from realizer.server.runtime.gc_policy import leave_to_shell
-from realizer.server.runtime.session_host import Shell
-from realizer.server.runtime.workers import FAULT, READY, Workers, handed
+from realizer.server.runtime.gc_policy import disable_automatic_gc
+from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.workers import FAULT, READY, Workers, receive_sockets
 from realizer.server.transports import registry
-from realizer.server.transports.transport import Door
-from realizer.server.transports.websocket.server import WebSocketDoor, lines
+from realizer.server.transports.transport import Transport
+from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
 # How often the drain looks whether everything has ended.
 DRAIN_STEP = 0.05  # s
@@ -39,22 +39,22 @@ async def serve(settings: Settings | None = None) -> None:
     if settings.log == "json":
         write_json()
     if settings.workers > 1:
-        with _told(settings):
+        with _bind_errors(settings):
             workers = await Workers(settings, run_worker).start()
-        asked = _asked(signal.SIGINT, signal.SIGTERM)
+        asked = _wait_for_signal(signal.SIGINT, signal.SIGTERM)
         try:
-            print(*lines(settings, workers.port), sep="\n", flush=True)
+            print(*startup_lines(settings, workers.port), sep="\n", flush=True)
             await asked
         finally:
             await workers.close()
         return
-    with _told(settings):
+    with _bind_errors(settings):
         server = await Server(settings).start()
-    await _serve(server, _asked(signal.SIGINT, signal.SIGTERM))
+    await _serve(server, _wait_for_signal(signal.SIGINT, signal.SIGTERM))
 
 
 @contextlib.contextmanager
-def _told(settings: Settings) -> Iterator[None]:
+def _bind_errors(settings: Settings) -> Iterator[None]:
     """A name that no machine has, as what it is."""
     try:
         yield
@@ -74,12 +74,12 @@ async def work(settings: Settings, number: int, control: socket.socket) -> None:
         await loop.sock_sendall(control, FAULT + str(error).encode())
         return
     # Before READY: the parent may ask a worker that is ready to end.
-    ending = _asked(signal.SIGTERM)
+    ending = _wait_for_signal(signal.SIGTERM)
 
     def take() -> None:
         try:
-            for client in handed(control):
-                server.take(client)
+            for client in receive_sockets(control):
+                server.serve_socket(client)
         except BlockingIOError:
             pass
         except (EOFError, OSError):
@@ -99,8 +99,8 @@ def run_worker(settings: Settings, number: int, control: socket.socket) -> None:
 
 
 async def _serve(server: Server, asked: Awaitable[None]) -> None:
-    leave_to_shell()
-    telling = [asyncio.create_task(_tell(door)) for door in server.doors]
+    disable_automatic_gc()
+    telling = [asyncio.create_task(_print_lines(transport)) for transport in server.transports]
     try:
         await asked
         await server.drain()
@@ -110,7 +110,7 @@ async def _serve(server: Server, asked: Awaitable[None]) -> None:
         await server.close()
 
 
-def _asked(*signals: signal.Signals) -> asyncio.Future[None]:
+def _wait_for_signal(*signals: signal.Signals) -> asyncio.Future[None]:
     """Return a future that is done once one of these signals has come; another one ends the process."""
     loop = asyncio.get_running_loop()
     come: asyncio.Future[None] = loop.create_future()
@@ -126,9 +126,9 @@ def _asked(*signals: signal.Signals) -> asyncio.Future[None]:
     return come
 
 
-async def _tell(door: Door) -> None:
-    await door.ready()
-    for line in door.lines:
+async def _print_lines(transport: Transport) -> None:
+    await transport.ready()
+    for line in transport.startup_lines:
         print(line, flush=True)
 
 
@@ -159,17 +159,18 @@ class Server:
     """The service inside an event loop: `start`, then `close`; or `async with Server(settings) as server`.
 
     Attributes:
-        doors: the open ones; the WebSocket is the first.
+        transports: the open ones; the WebSocket is the first.
 
     Args:
-        worker: the number of this one among several; then connections are only those it is told to `take`.
+        worker: the number of this one among several; then connections are only those it is told to
+            `serve_socket`.
     """
 
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
         self.settings = settings or Settings()
-        self._shell = Shell(self.settings, worker)
-        self._web = WebSocketDoor(self._shell, self.settings, worker=worker)
-        self.doors: list[Door] = []
+        self._sessions = SessionHost(self.settings, worker)
+        self._web = WebSocketTransport(self._sessions, self.settings, worker=worker)
+        self.transports: list[Transport] = []
         self._closed = asyncio.Event()
 
     @property
@@ -196,13 +197,13 @@ class Server:
             FaceError: no such face.
             RealizerError: a door needs something that is not installed.
         """
-        await self._shell.start()
+        await self._sessions.start()
         try:
-            made = (make(self._shell, self.settings) for make in registry.requested(self.settings))
-            for door in (self._web, *made):
-                if door is not None:
-                    await door.start()
-                    self.doors.append(door)
+            made = (make(self._sessions, self.settings) for make in registry.requested(self.settings))
+            for transport in (self._web, *made):
+                if transport is not None:
+                    await transport.start()
+                    self.transports.append(transport)
         except BaseException:
             await self.close()
             raise
@@ -211,18 +212,18 @@ class Server:
         asyncio.get_running_loop().run_in_executor(None, _warm_up, self.settings)
         return self
 
-    def take(self, client: socket.socket) -> None:
+    def serve_socket(self, client: socket.socket) -> None:
         """Serve a connection that another process has accepted."""
-        self._web.take(client)
+        self._web.serve_socket(client)
 
     async def drain(self) -> None:
         """Take no more connections and documents; wait for what plays, at most `settings.drain` seconds."""
-        self._shell.end()
-        for door in self.doors:
-            door.shut()
+        self._sessions.stop_accepting()
+        for transport in self.transports:
+            transport.stop_accepting()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(self.settings.drain):
-                while self._shell.busy:
+                while self._sessions.busy:
                     await asyncio.sleep(DRAIN_STEP)
 
     async def close(self) -> None:
@@ -230,9 +231,9 @@ class Server:
         if self._closed.is_set():
             return
         try:
-            await asyncio.gather(*(door.close() for door in self.doors))
+            await asyncio.gather(*(transport.close() for transport in self.transports))
         finally:
-            await self._shell.close()
+            await self._sessions.close()
             self._closed.set()
 
     async def wait_closed(self) -> None:

@@ -26,7 +26,7 @@ from realizer.charts.svg import svg
 from realizer.core.options import PlayOptions
 from realizer.pipeline import plan
 from realizer.playback.player import Player
-from realizer.server.streams.schedule_stream import Plans
+from realizer.server.streams.schedule_stream import ScheduleStream
 
 
 def faces(count: int) -> str:
@@ -40,10 +40,10 @@ def faces(count: int) -> str:
 def stream(count: int) -> None:
     player = Player(PlayOptions(idle=False))
     plan([f'<bml id="b{i}"><head id="n" lexeme="NOD" start="1"/></bml>' for i in range(count)], player)
-    known = Plans(player.blocks)
+    known = ScheduleStream(player.blocks)
     known.changes()
-    quiet = median(known.have_changed, 30)
-    whole = median(lambda: Plans(player.blocks).changes(), 5)
+    quiet = median(known.has_changes, 30)
+    whole = median(lambda: ScheduleStream(player.blocks).changes(), 5)
     print(f"{count:6} blocks alive   quiet tick {quiet:8.3f}   whole state {whole:8.1f}")
 
 

@@ -24,11 +24,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 from realizer.core.settings import Settings
-from realizer.server.journal import Entry, Journal, Kept, Log, journal_at
+from realizer.server.journal import Entry, Journal, Log, SavedSession, journal_at
 from realizer.server.journal import journal_writer as thresholds
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.recordings import FolderJournal
-from realizer.server.journal.replay import restored
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.recordings import RecordingFolder
+from realizer.server.journal.replay import restore_session
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -52,7 +52,7 @@ class Watched:
     def __init__(self, journal: Journal) -> None:
         self._journal = journal
         self.adds: list[float] = []
-        self.begin, self.take, self.end, self.close = journal.begin, journal.take, journal.end, journal.close
+        self.begin, self.take, self.end, self.close = journal.begin, journal.claim, journal.end, journal.close
         self.compact = journal.compact
 
     def add(self, session: str, entry: Entry) -> None:
@@ -84,7 +84,7 @@ def timed_checkpoints() -> Iterator[list[float]]:
 
 
 def spoken(order: Speak) -> Utterance:
-    return speak_to_length(SilentVoice(), order.say)
+    return speak_to_length(SilentVoice(), order.request)
 
 
 def opened() -> Session:
@@ -94,8 +94,8 @@ def opened() -> Session:
 def played(documents: int, apart: float, journal: Journal | None, record: Log | None = None) -> float:
     """CPU milliseconds of a document."""
     session = opened()
-    session.notes = Notes("long", journal, record)
-    session.notes.begin(0.0)
+    session.journal = JournalWriter("long", journal, record)
+    session.journal.begin(0.0)
     session.connect(1, 0.0)
     session.receive(1, '{"type":"scene","objects":{"cup":{"x":0.2,"y":-0.1,"z":0.5}}}', 0.0)
     began = time.process_time()
@@ -103,10 +103,10 @@ def played(documents: int, apart: float, journal: Journal | None, record: Log | 
         session.receive(1, DOCUMENTS[k % len(DOCUMENTS)].replace("{k}", str(k)), apart * k)
         now = apart * k
         while True:
-            for effect in session.outgoing():
+            for effect in session.take_effects():
                 if isinstance(effect, Speak):
-                    session.spoken(effect.id, spoken(effect), now)
-            due = 0.0 if session.reads else session.next_due()
+                    session.on_speech(effect.id, spoken(effect), now)
+            due = 0.0 if session.has_documents else session.next_due()
             if due > apart * (k + 1):
                 break
             now = max(now, due)
@@ -114,7 +114,7 @@ def played(documents: int, apart: float, journal: Journal | None, record: Log | 
     return 1000 * (time.process_time() - began) / documents
 
 
-def size(kept: Kept) -> int:
+def size(kept: SavedSession) -> int:
     """Bytes that are kept of the session."""
     return sum(len(entry.line().encode()) for entry in kept.entries) + sum(
         len(text.encode()) for text in kept.parts.values()
@@ -129,7 +129,7 @@ def report(name: str, where: str, documents: int, apart: float, bare: float) -> 
     kept = journal.take("long")
     assert kept is not None
     session = opened()
-    restored(session, kept, spoken)
+    restore_session(session, kept, spoken)
     took = time.process_time() - began
     entries = len(journal.adds) / documents
     compacts = ""
@@ -193,7 +193,7 @@ def main() -> None:
             print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
         if "record" not in asked.kinds:
             return
-        record = FolderJournal(folder / "records", {})
+        record = RecordingFolder(folder / "records", {})
         cost = played(documents, apart, None, record)
         record.close()
         (path,) = (folder / "records").iterdir()

@@ -63,14 +63,16 @@ def first_sound(voice: Voice, message: str) -> float:
     session = Session("benchmark", Settings(), time.perf_counter())
     session.connect(1, time.perf_counter())
     session.receive(1, json.dumps({"type": "subscribe", "stream": "audio"}), time.perf_counter())
-    session.outgoing()
+    session.take_effects()
     begin = time.perf_counter()
     session.receive(1, message, begin)
     while True:
-        for effect in session.outgoing():
+        for effect in session.take_effects():
             match effect:
                 case Speak(id, say):
-                    session.spoken(id, speak_to_length(voice, replace(say, voice=None)), time.perf_counter())
+                    session.on_speech(
+                        id, speak_to_length(voice, replace(say, voice=None)), time.perf_counter()
+                    )
                 case Send(_, bytes() as data):
                     frame = unpack(data)
                     if frame.stream == "audio" and np.any(frame.values):

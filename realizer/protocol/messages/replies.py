@@ -82,7 +82,7 @@ class Subscribed(Reply):
     elements: list[str] | None = Field(None, description="feedback: which of it comes")
 
 
-class Changed(Reply):
+class FaceChanged(Reply):
     """A character of a `mesh` has another face; the fields describe the values from `frame` on."""
 
     type: Literal["changed"] = "changed"

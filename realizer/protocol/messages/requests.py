@@ -158,7 +158,7 @@ class CharacterMessage(Message):
     voice: str | None = Field(None, max_length=64)
 
 
-class Feeling(Message):
+class EmotionFields(Message):
     """An emotion: its word, its place on the wheel, or its place in the plane of valence and arousal."""
 
     name: str | None = Field(None, min_length=1, max_length=64, description="a word, such as guilty")
@@ -185,7 +185,7 @@ class SetMessage(Message):
     )
 
     type: Literal["set"]
-    emotion: Feeling | None = None
+    emotion: EmotionFields | None = None
     aus: dict[str, Annotated[float, Field(ge=0, le=1)] | None] | None = Field(
         {}, validation_alias=AliasChoices("aus", "au"), description='"12" or "12L"'
     )

@@ -12,7 +12,7 @@ from realizer.protocol.messages.common import Message
 MAX_APPEND = 20_000  # characters
 
 
-class Timed(Message):
+class TimedText(Message):
     """A word, a phoneme or a viseme of a clip, and when it is said."""
 
     start: float = Field(ge=0, le=1e5, description="seconds from the start of the clip")
@@ -63,9 +63,9 @@ class SpeechMessage(Message):
     language: str | None = Field(None, max_length=64, description="BCP-47 of the text; none: the service's")
     clip: str | None = Field(None, min_length=1, max_length=64, description="of which the rest tells")
     text: str | None = Field(None, max_length=MAX_APPEND, description="plain: what is said in the clip")
-    words: list[Timed] = Field([], max_length=MAX_APPEND)
-    phonemes: list[Timed] = Field([], max_length=MAX_APPEND, description="in IPA")
-    visemes: list[Timed] = Field([], max_length=MAX_APPEND, description="instead of phonemes")
+    words: list[TimedText] = Field([], max_length=MAX_APPEND)
+    phonemes: list[TimedText] = Field([], max_length=MAX_APPEND, description="in IPA")
+    visemes: list[TimedText] = Field([], max_length=MAX_APPEND, description="instead of phonemes")
     viseme_set: str = Field("oculus", max_length=64, description="of visemes: mpeg4, oculus, sapi or polly")
     final: bool = Field(True, description="all of the clip's times are told")
 

@@ -18,7 +18,7 @@ MEMORY = Path("/proc/self/statm")  # its second number: pages that are in memory
 MAX_CHARACTERS = 16
 
 
-def too_large(text: str, settings: Settings) -> str | None:
+def size_error(text: str, settings: Settings) -> str | None:
     """Why documents in one message are not read; None where they are."""
     size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
     if size > settings.max_document:
@@ -32,7 +32,9 @@ def too_large(text: str, settings: Settings) -> str | None:
     return None
 
 
-def beyond(block: Block, settings: Settings, busy: int, characters: Collection[str | None]) -> str | None:
+def block_limit_error(
+    block: Block, settings: Settings, busy: int, characters: Collection[str | None]
+) -> str | None:
     """Why a session refuses a block; None where it takes it.
 
     Args:
@@ -51,7 +53,7 @@ def beyond(block: Block, settings: Settings, busy: int, characters: Collection[s
     return None
 
 
-def too_long(block: Block, schedule: Schedule, settings: Settings) -> str | None:
+def duration_error(block: Block, schedule: Schedule, settings: Settings) -> str | None:
     """Why what was planned is not played; None where it is.
 
     A block that is tied to points of others, or to what a client anticipates, lasts as these say: an open
@@ -63,7 +65,9 @@ def too_long(block: Block, schedule: Schedule, settings: Settings) -> str | None
     return f"{words} {raises('max_duration')}"
 
 
-def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings, beside: float = 0.0) -> str | None:
+def pixel_rate_error(
+    size: tuple[int, int], fps: float, settings: Settings, beside: float = 0.0
+) -> str | None:
     """Why pictures of that size are not drawn at that rate; None where they are.
 
     Args:
@@ -77,7 +81,7 @@ def too_many_pixels(size: tuple[int, int], fps: float, settings: Settings, besid
     return f"{words}, {size[0]}x{size[1]} at {fps:g} fps{more} {raises('max_pixels')}"
 
 
-def used_up(settings: Settings) -> str | None:
+def memory_error(settings: Settings) -> str | None:
     """Why there is no memory for one more session; None where there is."""
     if settings.max_memory is None or (used := memory() / 1e6) <= settings.max_memory:
         return None

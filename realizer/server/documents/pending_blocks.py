@@ -12,46 +12,46 @@ from realizer.speech.utterance import SpeechRequest, Utterance
 
 
 @dataclass(eq=False)
-class Waiting:
+class PendingBlock:
     """A block in preparation.
 
     Attributes:
-        says: speak id -> (behaviour, what it says): what the voice still owes.
+        requests: speak id -> (behaviour, what it says): what the voice still owes.
         utterances: behaviour -> what the voice has made.
-        after: blocks in preparation that must be planned first.
+        predecessors: blocks in preparation that must be planned first.
         final: what the voice makes now is not asked for again.
-        lacks: whether something the block names is still to come.
-        flows: what it says is a part of a sentence: the rest follows in another block.
+        is_incomplete: whether something the block names is still to come.
+        is_streaming: what it says is a part of a sentence: the rest follows in another block.
     """
 
     block: Block
     character: int
-    since: float
-    says: dict[int, tuple[str, SpeechRequest]]
+    waiting_since: float
+    requests: dict[int, tuple[str, SpeechRequest]]
     utterances: dict[str, Utterance] = field(default_factory=dict)
-    after: set[Waiting] = field(default_factory=set)
+    predecessors: set[PendingBlock] = field(default_factory=set)
     final: bool = False
-    lacks: Callable[[Block], bool] = lambda block: False
-    flows: bool = False
+    is_incomplete: Callable[[Block], bool] = lambda block: False
+    is_streaming: bool = False
 
     @property
-    def ready(self) -> bool:
+    def is_ready(self) -> bool:
         """It waits for nothing."""
-        return not self.says and not self.after and not self.lacks(self.block)
+        return not self.requests and not self.predecessors and not self.is_incomplete(self.block)
 
 
-class Preparation:
+class PendingBlocks:
     """The blocks that wait, in the order in which they came."""
 
     def __init__(self) -> None:
-        self.waiting: list[Waiting] = []
+        self.blocks: list[PendingBlock] = []
 
     def __len__(self) -> int:
-        return len(self.waiting)
+        return len(self.blocks)
 
     def add(
-        self, block: Block, character: int, says: dict[int, tuple[str, SpeechRequest]], now: float
-    ) -> Waiting:
+        self, block: Block, character: int, requests: dict[int, tuple[str, SpeechRequest]], now: float
+    ) -> PendingBlock:
         """Let a block wait for its voice, and for the earlier blocks it depends on.
 
         It depends on blocks whose sync points it names, on those it is to follow, on one with its own id,
@@ -61,7 +61,7 @@ class Preparation:
         named = {ref.block for ref in references(block)} | {*block.append_after, *block.chunk_after}
         after = {
             w
-            for w in self.waiting
+            for w in self.blocks
             if block.composition != "REPLACE"
             and (
                 w.block.id in named
@@ -72,53 +72,57 @@ class Preparation:
                 )
             )
         }
-        waiting = Waiting(block, character, now, says, after=after)
-        for other in self.waiting:
+        pending = PendingBlock(block, character, now, requests, predecessors=after)
+        for other in self.blocks:
             if other.block.id in (*block.prepend_before, *block.chunk_before) and other not in after:
-                other.after.add(waiting)
-        self.waiting.append(waiting)
-        return waiting
+                other.predecessors.add(pending)
+        self.blocks.append(pending)
+        return pending
 
-    def spoken(self, speak: int, utterance: Utterance) -> None:
+    def add_utterance(self, speak: int, utterance: Utterance) -> None:
         """The voice has made one utterance; one nobody waits for any more is dropped."""
-        for waiting in self.waiting:
-            if speak in waiting.says:
-                behaviour, _ = waiting.says.pop(speak)
-                waiting.utterances[behaviour] = allow_small_warp(utterance) if waiting.final else utterance
+        for pending in self.blocks:
+            if speak in pending.requests:
+                behaviour, _ = pending.requests.pop(speak)
+                pending.utterances[behaviour] = allow_small_warp(utterance) if pending.final else utterance
 
-    def unspoken(self, speak: int) -> None:
+    def give_up(self, speak: int) -> None:
         """No voice can say it: the block goes on without, its speech is dropped when it is planned."""
-        for waiting in self.waiting:
-            waiting.says.pop(speak, None)
+        for pending in self.blocks:
+            pending.requests.pop(speak, None)
 
-    def said(self, speak: int) -> SpeechRequest | None:
+    def request_of(self, speak: int) -> SpeechRequest | None:
         """What a speak id asked for; None where nobody waits for it."""
-        return next((w.says[speak][1] for w in self.waiting if speak in w.says), None)
+        return next((w.requests[speak][1] for w in self.blocks if speak in w.requests), None)
 
     @property
     def has_ready(self) -> bool:
-        """Whether `ready` would give a block."""
-        return any(w.ready for w in self.waiting)
+        """Whether `first_ready` would give a block."""
+        return any(w.is_ready for w in self.blocks)
 
-    def ready(self) -> Waiting | None:
+    def first_ready(self) -> PendingBlock | None:
         """The first block that waits for nothing; None where all wait. `remove` it when it is planned."""
-        return next((w for w in self.waiting if w.ready), None)
+        return next((w for w in self.blocks if w.is_ready), None)
 
-    def replaced_by(self, waiting: Waiting) -> list[Waiting]:
+    def replaced_by(self, pending: PendingBlock) -> list[PendingBlock]:
         """The blocks in preparation that came before a replacing block of their character."""
-        return [w for w in self.waiting if w.character == waiting.character and w.since <= waiting.since]
+        return [
+            w
+            for w in self.blocks
+            if w.character == pending.character and w.waiting_since <= pending.waiting_since
+        ]
 
     def overdue(self, before: float) -> Iterator[int]:
         """Speak ids asked for before that time and not answered."""
-        return iter([speak for w in self.waiting if w.since < before for speak in w.says])
+        return iter([speak for w in self.blocks if w.waiting_since < before for speak in w.requests])
 
     def deadline(self, patience: float) -> float | None:
         """When the first voice that owes something will have taken longer than `patience` seconds."""
-        return min((w.since + patience for w in self.waiting if w.says), default=None)
+        return min((w.waiting_since + patience for w in self.blocks if w.requests), default=None)
 
-    def remove(self, gone: Iterable[Waiting]) -> None:
+    def remove(self, gone: Iterable[PendingBlock]) -> None:
         """Take blocks out; nobody waits for them any more."""
         ids = {id(w) for w in gone}
-        self.waiting = [w for w in self.waiting if id(w) not in ids]
-        for waiting in self.waiting:
-            waiting.after = {w for w in waiting.after if id(w) not in ids}
+        self.blocks = [w for w in self.blocks if id(w) not in ids]
+        for pending in self.blocks:
+            pending.predecessors = {w for w in pending.predecessors if id(w) not in ids}

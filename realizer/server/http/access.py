@@ -13,19 +13,19 @@ from urllib.parse import parse_qs, urlsplit
 
 from realizer.core.settings import Settings, SettingsError, raises
 from realizer.protocol.messages.common import MAX_CONTROL
-from realizer.server.documents.limits import used_up
-from realizer.server.http.jwt_tokens import Pass, PassError, Passes
-from realizer.server.runtime.session_registry import HubError
+from realizer.server.documents.limits import memory_error
+from realizer.server.http.jwt_tokens import Grant, TokenError, TokenVerifier
+from realizer.server.runtime.session_registry import JoinError
 
 # Names of this machine for itself.
 LOOPBACK = {"localhost", "127.0.0.1", "::1"}
 # A client that brings its token in `hello` must have said it by then.
 PATIENCE = 10.0  # s
 # Where nobody is asked, and of who has the service's token.
-ANYTHING = Pass()
+ANY_GRANT = Grant()
 
 
-class Guard:
+class AccessControl:
     """What a service's settings say about who may come in.
 
     A token may come as `Authorization: Bearer TOKEN`, as `?token=TOKEN` (browsers can send no header with a
@@ -39,38 +39,40 @@ class Guard:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._token = None if settings.token is None else _digest(settings.token)
-        self._passes = None if settings.jwt_key is None else Passes(settings.jwt_key, settings.jwt_audience)
-        if self.asks:
+        self._passes = (
+            None if settings.jwt_key is None else TokenVerifier(settings.jwt_key, settings.jwt_audience)
+        )
+        if self.requires_token:
             # At its finest the library logs whole requests, with what is in them.
             logging.getLogger("websockets.server").setLevel(logging.WARNING)
 
     @property
-    def asks(self) -> bool:
+    def requires_token(self) -> bool:
         """Whether a token is wanted."""
         return self._token is not None or self._passes is not None
 
-    def _admit(self, token: str | None) -> Pass:
+    def _admit(self, token: str | None) -> Grant:
         """What a token lets its bearer do; all where none is wanted.
 
         Raises:
             HubError: 401, no token or a wrong one.
         """
-        if not self.asks:
-            return ANYTHING
+        if not self.requires_token:
+            return ANY_GRANT
         got = "none" if token is None else "another one"
         if token is not None:
             if self._token is not None and hmac.compare_digest(_digest(token), self._token):
-                return ANYTHING
+                return ANY_GRANT
             try:
                 if self._passes is not None:
-                    return self._passes.read(token)
-            except PassError as error:
+                    return self._passes.verify(token)
+            except TokenError as error:
                 got = str(error)
         wanted = ["that of this service (REALIZER_TOKEN)"] if self._token is not None else []
         wanted += ["a JWT of this service's key (REALIZER_JWT_KEY)"] if self._passes is not None else []
-        raise HubError(HTTPStatus.UNAUTHORIZED, f"token: wanted {' or '.join(wanted)}, got {got}")
+        raise JoinError(HTTPStatus.UNAUTHORIZED, f"token: wanted {' or '.join(wanted)}, got {got}")
 
-    def request(self, target: str, headers: Mapping[str, str], *, later: bool = False) -> Pass | None:
+    def request(self, target: str, headers: Mapping[str, str], *, later: bool = False) -> Grant | None:
         """What the token of a request lets it do; None where it has none and may bring it `later`.
 
         Args:
@@ -80,13 +82,13 @@ class Guard:
         Raises:
             HubError: 403, a page of elsewhere; 401, no token or a wrong one.
         """
-        self._from_where(headers)
+        self._check_origin(headers)
         scheme, _, credentials = headers.get("authorization", "").partition(" ")
         query = parse_qs(target.partition("?")[2]).get("token", [None])[-1]
         token = credentials.strip() if scheme.lower() == "bearer" else query
-        return None if token is None and self.asks and later else self._admit(token)
+        return None if token is None and self.requires_token and later else self._admit(token)
 
-    def greets(self, message: str | bytes) -> Pass:
+    def check_hello(self, message: str | bytes) -> Grant:
         """What the token of a first message lets it do, which is a `hello`.
 
         Raises:
@@ -98,18 +100,18 @@ class Guard:
             hello = None
         if not isinstance(hello, dict) or hello.get("type") != "hello":
             words = "token: wanted one in the address, a header or a first hello, got none"
-            raise HubError(HTTPStatus.UNAUTHORIZED, words)
+            raise JoinError(HTTPStatus.UNAUTHORIZED, words)
         token = hello.get("token")
         return self._admit(token if isinstance(token, str) else None)
 
-    def room(self) -> None:
+    def check_memory(self) -> None:
         """Whether there is memory for more.
 
         Raises:
             HubError: 503, there is none.
         """
-        if (words := used_up(self._settings)) is not None:
-            raise HubError(HTTPStatus.SERVICE_UNAVAILABLE, words)
+        if (words := memory_error(self._settings)) is not None:
+            raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, words)
 
     def tls(self) -> ssl.SSLContext | None:
         """What speaks TLS with the service's certificate; None where it has none.
@@ -135,7 +137,7 @@ class Guard:
             ) from None
         return context
 
-    def _from_where(self, headers: Mapping[str, str]) -> None:
+    def _check_origin(self, headers: Mapping[str, str]) -> None:
         origin = headers.get("origin")
         if origin is None or "*" in self._settings.origins or _same(origin, self._settings.origins):
             return  # programs that are no browser say none
@@ -149,27 +151,27 @@ class Guard:
         else:
             welcome = parts.netloc != "" and parts.netloc == headers.get("host", "").lower()
         if not welcome:
-            raise HubError(
+            raise JoinError(
                 HTTPStatus.FORBIDDEN,
                 f"origin: wanted a page of this service, got one of {origin[:200]!r}; "
                 "REALIZER_ORIGINS lets more in",
             )
 
 
-class Pace:
+class RateLimiter:
     """How long to wait before a client's next message is read, so that it has no more than its share.
 
     Args:
         rate: messages a second; twice as many may come at once after a pause.
 
     Attributes:
-        news: what the client is to be told of the last wait; None where it was told, or kept to the rate.
+        notice: what the client is to be told of the last wait; None where it was told, or kept to the rate.
     """
 
     def __init__(self, rate: float) -> None:
-        self.news: str | None = None
+        self.notice: str | None = None
         self._rate = rate
-        self._held = False
+        self._was_limited = False
         self._free = float("-inf")  # when everything that came would have come at that rate
 
     def wait(self, now: float) -> float:
@@ -177,8 +179,8 @@ class Pace:
         self._free = max(self._free, now) + 1.0 / self._rate
         pause = max(0.0, self._free - now - 2.0)
         words = f"wanted at most {self._rate:g} messages a second; more are read later {raises('max_rate')}"
-        self.news = words if pause and not self._held else None
-        self._held = bool(pause)
+        self.notice = words if pause and not self._was_limited else None
+        self._was_limited = bool(pause)
         return pause
 
 

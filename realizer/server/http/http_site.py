@@ -27,7 +27,7 @@ POLICY = (
 
 
 @dataclass(frozen=True)
-class Answer:
+class HttpResponse:
     """One HTTP answer."""
 
     status: int
@@ -36,7 +36,7 @@ class Answer:
     headers: tuple[tuple[str, str], ...] = ()
 
 
-class Site:
+class HttpSite:
     """Answers GET requests; what is costly is made once.
 
     Args:
@@ -49,20 +49,20 @@ class Site:
         self._settings = settings or Settings()
         self._static = files("realizer.server").joinpath("static")
 
-    def answer(self, target: str) -> Answer:
+    def answer(self, target: str) -> HttpResponse:
         """The answer to `GET target`. May block: reading a face takes a moment the first time."""
         path, _, query = target.partition("?")
         path = unquote(path)
         if path == "/healthz":
-            return Answer(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
+            return HttpResponse(200, JSON, json.dumps({"status": "ok", **self._health()}).encode())
         if path == "/asyncapi.json":
-            return Answer(200, JSON, files("realizer.server").joinpath("asyncapi.json").read_bytes())
+            return HttpResponse(200, JSON, files("realizer.server").joinpath("asyncapi.json").read_bytes())
         if path == "/examples.json":
-            return Answer(200, JSON, _examples())
+            return HttpResponse(200, JSON, _examples())
         if path == "/vocabulary.json":
             from realizer.server.http.vocabulary import vocabulary
 
-            return Answer(200, JSON, vocabulary())
+            return HttpResponse(200, JSON, vocabulary())
         if path in ("/feeling.json", "/pose.fap"):
             return self._desk(path, {name: values[-1] for name, values in parse_qs(query).items()})
         if path == "/look.json":
@@ -71,33 +71,33 @@ class Site:
             return self._face(path.removeprefix("/faces/").removesuffix(".glb"))
         return self._file("index.html" if path == "/" else path[1:])
 
-    def _desk(self, path: str, query: dict[str, str]) -> Answer:
+    def _desk(self, path: str, query: dict[str, str]) -> HttpResponse:
         from realizer.server.http import page_tools
 
         try:
             if path == "/feeling.json":
-                return Answer(200, JSON, page_tools.feeling(query.get("of", "")).encode())
-            pose = page_tools.pose(query.get("set", ""), query.get("face"), self._settings)
+                return HttpResponse(200, JSON, page_tools.preview_emotion(query.get("of", "")).encode())
+            pose = page_tools.export_pose(query.get("set", ""), query.get("face"), self._settings)
             named = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
-            return Answer(200, "text/x-fap", pose.encode(), named)
-        except page_tools.DeskError as error:
-            return Answer(400, TEXT, f"{error}\n".encode())
+            return HttpResponse(200, "text/x-fap", pose.encode(), named)
+        except page_tools.ToolError as error:
+            return HttpResponse(400, TEXT, f"{error}\n".encode())
 
-    def _face(self, name: str) -> Answer:
+    def _face(self, name: str) -> HttpResponse:
         try:
-            return Answer(200, "model/gltf-binary", _glb(name), (("Cache-Control", "no-cache"),))
+            return HttpResponse(200, "model/gltf-binary", _glb(name), (("Cache-Control", "no-cache"),))
         except FaceError as error:
-            return Answer(404, TEXT, f"{error}\n".encode())
+            return HttpResponse(404, TEXT, f"{error}\n".encode())
         except RealizerError as error:
-            return Answer(500, TEXT, f"{error}\n".encode())
+            return HttpResponse(500, TEXT, f"{error}\n".encode())
 
-    def _look(self, name: str) -> Answer:
+    def _look(self, name: str) -> HttpResponse:
         try:
-            return Answer(200, JSON, _look(name, self._settings.light, self._settings.background))
+            return HttpResponse(200, JSON, _look(name, self._settings.light, self._settings.background))
         except FaceError as error:
-            return Answer(404, TEXT, f"{error}\n".encode())
+            return HttpResponse(404, TEXT, f"{error}\n".encode())
 
-    def _file(self, name: str) -> Answer:
+    def _file(self, name: str) -> HttpResponse:
         """A file of the bundle; only names in its one folder, so nothing else can be asked for."""
         names = {f.name for f in self._static.iterdir()} if self._static.is_dir() else set()
         if name in names and not name.startswith("."):
@@ -105,10 +105,12 @@ class Site:
             if media_type.startswith("text/") or media_type.endswith("svg+xml"):
                 media_type += "; charset=utf-8"
             headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", POLICY))
-            return Answer(200, media_type, self._static.joinpath(name).read_bytes(), headers)
+            return HttpResponse(200, media_type, self._static.joinpath(name).read_bytes(), headers)
         if name == "index.html":
-            return Answer(503, TEXT, NOT_BUILT.encode())
-        return Answer(404, TEXT, f"/{name} is not here; there are / /ws /faces/NAME /healthz\n".encode())
+            return HttpResponse(503, TEXT, NOT_BUILT.encode())
+        return HttpResponse(
+            404, TEXT, f"/{name} is not here; there are / /ws /faces/NAME /healthz\n".encode()
+        )
 
 
 @functools.cache

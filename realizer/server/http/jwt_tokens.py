@@ -15,12 +15,12 @@ BITS = 2048  # of RSA; shorter keys are broken
 CURVES = {"secp256r1": "ES256", "secp384r1": "ES384", "secp521r1": "ES512"}
 
 
-class PassError(RealizerError):
+class TokenError(RealizerError):
     """A token that lets nobody in; the text says why, and nothing of what is in it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Pass:
+class Grant:
     """What somebody may do who has come in.
 
     Attributes:
@@ -32,12 +32,12 @@ class Pass:
     until: float | None = None
 
     @property
-    def left(self) -> float | None:
+    def seconds_left(self) -> float | None:
         """Seconds until it ends; None where it does not."""
         return None if self.until is None else max(0.0, self.until + LEEWAY - time.time())
 
 
-class Passes:
+class TokenVerifier:
     """Reads tokens that are signed with one key, by the algorithm of that key and no other.
 
     Args:
@@ -58,7 +58,7 @@ class Passes:
         read: tuple[Any, Sequence[str]] = _public(key) if "-----BEGIN" in key else (key, ["HS256"])
         self._key, self._algorithms = read
 
-    def read(self, token: str) -> Pass:
+    def verify(self, token: str) -> Grant:
         """What a token lets its bearer do.
 
         Raises:
@@ -70,17 +70,17 @@ class Passes:
                 token, self._key, algorithms=self._algorithms, audience=self._audience, leeway=LEEWAY
             )
             until = claims.get("exp")
-            return Pass(_sessions(claims), None if until is None else float(until))
+            return Grant(_sessions(claims), None if until is None else float(until))
         except jwt.ExpiredSignatureError:
-            raise PassError("one that has expired") from None
+            raise TokenError("one that has expired") from None
         except (jwt.ImmatureSignatureError, jwt.InvalidIssuedAtError):
-            raise PassError("one that is not valid yet") from None
+            raise TokenError("one that is not valid yet") from None
         except (jwt.InvalidAudienceError, jwt.MissingRequiredClaimError):
-            raise PassError("one for somebody else (REALIZER_JWT_AUDIENCE)") from None
+            raise TokenError("one for somebody else (REALIZER_JWT_AUDIENCE)") from None
         except (jwt.InvalidSignatureError, jwt.InvalidAlgorithmError):
-            raise PassError("one that is not signed with it") from None
+            raise TokenError("one that is not signed with it") from None
         except (jwt.InvalidTokenError, ValueError, TypeError, OverflowError):
-            raise PassError("another one") from None
+            raise TokenError("another one") from None
 
 
 def _sessions(claims: dict[str, Any]) -> frozenset[str] | None:
@@ -90,7 +90,7 @@ def _sessions(claims: dict[str, Any]) -> frozenset[str] | None:
     named = claims["session"]
     names = [named] if isinstance(named, str) else named
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise PassError("one whose claim session is no name, and no list of names")
+        raise TokenError("one whose claim session is no name, and no list of names")
     return frozenset(names)
 
 

@@ -90,7 +90,7 @@ _SAMPLE = re.compile(r"(\w+)(?:\{([^}]*)\})? (\S+)")
 _WORKER = re.compile(r'worker="[^"]*",?')
 
 
-def summed(texts: Mapping[int, str]) -> str:
+def sum_samples(texts: Mapping[int, str]) -> str:
     """What several workers have counted as what all of them have: each sample is the sum of theirs.
 
     Args:

@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from realizer.checking.finding import Finding
 
 # A text of this length is checked in a tenth of a second; longer ones have `realizer check`.
-MOST_TEXT = 50_000  # characters
-MOST_FINDINGS = 100
+MAX_TEXT = 50_000  # characters
+MAX_FINDINGS = 100
 # By then whatever was set has settled; 25 frames a second.
 SETTLED = 10.0  # s
 FPS = 25.0
 
 
-class DeskError(RealizerError):
+class ToolError(RealizerError):
     """What was asked cannot be answered; the text says what was wanted."""
 
 
-def faults(text: str, settings: Settings) -> str:
+def lint(text: str, settings: Settings) -> str:
     """Faults and advice of BML as JSON: {"faults": [{type, id, text, notes, spots}]}.
 
     A spot is {line, column, length, text, primary}, from 1, in characters; the first primary one is where the
@@ -37,8 +37,8 @@ def faults(text: str, settings: Settings) -> str:
     from realizer.checking.document import checked
     from realizer.playback.player import Player
 
-    if len(text) > MOST_TEXT:
-        said = f"wanted at most {MOST_TEXT} characters, got {len(text)}: `realizer check` reads more"
+    if len(text) > MAX_TEXT:
+        said = f"wanted at most {MAX_TEXT} characters, got {len(text)}: `realizer check` reads more"
         return json.dumps({"faults": [], "skipped": said})
     source = Source(text)
     found: list[Finding] = []
@@ -46,11 +46,13 @@ def faults(text: str, settings: Settings) -> str:
     for part in checked("document", source, text, player):
         found += part.findings
         if part.block is not None and part.schedule is not None:
-            found += islice(advice("document", source, part.block, part.schedule, player), MOST_FINDINGS)
-    return json.dumps({"faults": [_told(finding) for finding in found[:MOST_FINDINGS]]}, ensure_ascii=False)
+            found += islice(advice("document", source, part.block, part.schedule, player), MAX_FINDINGS)
+    return json.dumps(
+        {"faults": [_finding_json(finding) for finding in found[:MAX_FINDINGS]]}, ensure_ascii=False
+    )
 
 
-def _told(finding: Finding) -> dict[str, Any]:
+def _finding_json(finding: Finding) -> dict[str, Any]:
     spots = [
         {**label.spot._asdict(), "text": label.text, "primary": label.primary} for label in finding.labels
     ]
@@ -63,7 +65,7 @@ def _told(finding: Finding) -> dict[str, Any]:
     }
 
 
-def feeling(asked: str) -> str:
+def preview_emotion(asked: str) -> str:
     """A place on the wheel, or a profile, as what it moves.
 
     Args:
@@ -85,11 +87,11 @@ def feeling(asked: str) -> str:
     try:
         wrong = node.fault() or next((fault.text for fault in emotion.check(node, PlanningContext())), "")
         if wrong:
-            raise DeskError(wrong)
+            raise ToolError(wrong)
         values = emotion.values_of(node)
         mixed = shares(node.angle, node.profile or "own") if node.angle is not None else {}
     except (TypeError, ValueError) as error:
-        raise DeskError(f"feeling: {error}") from None
+        raise ToolError(f"feeling: {error}") from None
     return json.dumps(
         {
             "values": {target.name: round(float(value), 4) for target, value in values.items()},
@@ -98,7 +100,7 @@ def feeling(asked: str) -> str:
     )
 
 
-def pose(asked: str, face: str | None, settings: Settings) -> str:
+def export_pose(asked: str, face: str | None, settings: Settings) -> str:
     """The face that a `set` message holds, as a FAP file of one frame.
 
     Args:
@@ -114,19 +116,19 @@ def pose(asked: str, face: str | None, settings: Settings) -> str:
     from realizer.server.session.session import Session
 
     if _object(asked).get("type") != "set":
-        raise DeskError("wanted a message of the type set")
+        raise ToolError("wanted a message of the type set")
     # The session itself answers, so that the file holds what the page shows, less what moves by itself.
     session = Session("pose", replace(settings, idle=False), 0.0)
     session.connect(1, 0.0)
     if face is not None:
         session.receive(1, json.dumps({"type": "character", "face": face}), 0.0)
     session.receive(1, asked, 0.0)
-    for effect in session.outgoing():
+    for effect in session.take_effects():
         data = getattr(effect, "data", None)
         if isinstance(data, str) and data.startswith("{"):
             told = json.loads(data)
             if told["type"] == "error":
-                raise DeskError(f"{told.get('where', 'set')}: {told['message']}")
+                raise ToolError(f"{told.get('where', 'set')}: {told['message']}")
     timeline = session.broadcast.timeline(0, FPS)
     frame = round(SETTLED * FPS)
     frames = timeline.window(frame, frame).faps
@@ -138,7 +140,7 @@ def _object(text: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise DeskError(f"wanted a JSON object: {error}") from None
+        raise ToolError(f"wanted a JSON object: {error}") from None
     if not isinstance(found, dict):
-        raise DeskError(f"wanted a JSON object, got {type(found).__name__}")
+        raise ToolError(f"wanted a JSON object, got {type(found).__name__}")
     return found

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Log, Lost, Recorder
+from realizer.server.journal.entry import Entry, Journal, JournalError, Log, Recorder, SavedSession, TakenOver
 
-__all__ = ["Entry", "Journal", "JournalError", "Kept", "Log", "Lost", "Recorder", "journal_at"]
+__all__ = ["Entry", "Journal", "JournalError", "Log", "Recorder", "SavedSession", "TakenOver", "journal_at"]
 
 
 def journal_at(where: str) -> Journal:
@@ -14,13 +14,13 @@ def journal_at(where: str) -> Journal:
         JournalError: it cannot be opened, or something must be installed.
     """
     if where.startswith(("redis://", "rediss://", "unix://")):
-        from realizer.server.journal.redis_journal import SharedJournal
+        from realizer.server.journal.redis_journal import RedisJournal
 
-        return SharedJournal(where)
+        return RedisJournal(where)
     if "://" in where.removeprefix("sqlite://"):  # as it came it may have a password in it
         raise JournalError(
             "the journal: wanted a file, or redis://HOST:PORT/NUMBER, got an address of another kind"
         )
-    from realizer.server.journal.sqlite_journal import LocalJournal
+    from realizer.server.journal.sqlite_journal import SqliteJournal
 
-    return LocalJournal(where.removeprefix("sqlite://"))
+    return SqliteJournal(where.removeprefix("sqlite://"))

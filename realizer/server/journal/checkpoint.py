@@ -10,7 +10,12 @@ from realizer.behaviours.kind import Position
 from realizer.playback.character import Character
 from realizer.scheduling.timing import Schedule
 from realizer.server.journal.entry import JournalError
-from realizer.server.journal.serialization import character_of, plain_character, plain_schedule, schedule_of
+from realizer.server.journal.serialization import (
+    character_from_json,
+    character_to_json,
+    schedule_from_json,
+    schedule_to_json,
+)
 from realizer.server.speech.audio_clips import Clip
 
 VERSION = 1
@@ -25,10 +30,10 @@ class SessionState:
         at: seconds on the session clock.
         connections: ids of its clients.
         seq: of the last feedback.
-        told: the last feedback messages, the oldest first.
+        last_messages: the last feedback messages, the oldest first.
         faces, voices: index of a character -> the name of what a client chose for it.
         past, expected: schedules of blocks that have ended, and of what is anticipated.
-        spoken: how many requests its voices got.
+        request_count: how many requests its voices got.
         fault: why a voice failed last.
         clips: ids of its sound clips, the oldest first.
     """
@@ -36,14 +41,14 @@ class SessionState:
     at: float
     connections: Sequence[int]
     seq: int
-    told: Sequence[str]
+    last_messages: Sequence[str]
     scene: Mapping[str, Position] | None
     characters: Sequence[Character]
     faces: Mapping[int, str]
     voices: Mapping[int, str]
     past: Sequence[Schedule]
     expected: Schedule
-    spoken: int
+    request_count: int
     fault: str | None
     clips: Sequence[str]
 
@@ -59,14 +64,14 @@ def write(state: SessionState, clips: Mapping[str, str | None]) -> dict[str, str
         "at": state.at,
         "connections": list(state.connections),
         "seq": state.seq,
-        "told": list(state.told),
+        "told": list(state.last_messages),
         "scene": None if state.scene is None else {name: list(place) for name, place in state.scene.items()},
-        "characters": [plain_character(character) for character in state.characters],
+        "characters": [character_to_json(character) for character in state.characters],
         "faces": {str(index): face for index, face in state.faces.items()},
         "voices": {str(index): voice for index, voice in state.voices.items()},
-        "past": [plain_schedule(schedule) for schedule in state.past],
-        "expected": plain_schedule(state.expected),
-        "spoken": state.spoken,
+        "past": [schedule_to_json(schedule) for schedule in state.past],
+        "expected": schedule_to_json(state.expected),
+        "spoken": state.request_count,
         "fault": state.fault,
         "clips": list(state.clips),
     }
@@ -93,18 +98,18 @@ def read(session: str, parts: Mapping[str, str]) -> tuple[SessionState, dict[str
             at=float(told["at"]),
             connections=[int(connection) for connection in told["connections"]],
             seq=int(told["seq"]),
-            told=[str(text) for text in told["told"]],
+            last_messages=[str(text) for text in told["told"]],
             scene=None if scene is None else {name: (x, y, z) for name, (x, y, z) in scene.items()},
-            characters=[character_of(character) for character in told["characters"]],
+            characters=[character_from_json(character) for character in told["characters"]],
             faces={int(index): face for index, face in told["faces"].items()},
             voices={int(index): voice for index, voice in told["voices"].items()},
-            past=[schedule_of(schedule) for schedule in told["past"]],
-            expected=schedule_of(told["expected"]),
-            spoken=int(told["spoken"]),
+            past=[schedule_from_json(schedule) for schedule in told["past"]],
+            expected=schedule_from_json(told["expected"]),
+            request_count=int(told["spoken"]),
             fault=told["fault"],
             clips=told["clips"],
         )
-        return state, {id: Clip.of(json.loads(parts[CLIP + id])) for id in state.clips}
+        return state, {id: Clip.from_json(json.loads(parts[CLIP + id])) for id in state.clips}
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         fault = f"{type(error).__name__}: {error}"
         raise JournalError(f"the checkpoint of session {session} cannot be read: {fault}") from None

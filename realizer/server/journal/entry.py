@@ -11,7 +11,7 @@ from typing import Literal, Protocol, get_args
 from realizer.core.errors import RealizerError
 
 # Sessions whose process died and that nobody came back to are forgotten after so long.
-KEPT = 7 * 24 * 3600  # s
+RETENTION = 7 * 24 * 3600  # s
 
 # join, leave: of a connection. text, sound: a message of one. spoken: a voice answered. tick: something that
 # waited was read or planned.
@@ -22,7 +22,7 @@ class JournalError(RealizerError):
     """A journal that cannot be written or read; the text says why."""
 
 
-class Lost(JournalError):
+class TakenOver(JournalError):
     """Another process has taken the session over."""
 
 
@@ -72,7 +72,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class SavedSession:
     """What there is of a session.
 
     Attributes:
@@ -121,7 +121,7 @@ class Log(Protocol):
 class Journal(Log, Protocol):
     """Where sessions are kept until they end, so that another process can go on with them."""
 
-    def take(self, session: str) -> Kept | None:
+    def claim(self, session: str) -> SavedSession | None:
         """Take a session over, to be gone on with; None where it is not there.
 
         Raises:
@@ -129,7 +129,7 @@ class Journal(Log, Protocol):
         """
         ...
 
-    def taken(self, sessions: Collection[str]) -> set[str]:
+    def taken_over(self, sessions: Collection[str]) -> set[str]:
         """Those of them that another process has taken over. May be called in another thread, and wait.
 
         Raises:
@@ -153,7 +153,7 @@ class Journal(Log, Protocol):
 class Recorder(Log, Protocol):
     """Where sessions are written to be played again."""
 
-    def resume(self, session: str, kept: Kept) -> None:
+    def resume(self, session: str, saved: SavedSession) -> None:
         """Go on with the record of a session that was taken over. May read a long file.
 
         Raises:

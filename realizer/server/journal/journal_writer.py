@@ -5,7 +5,15 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 
-from realizer.server.journal.entry import Entry, Journal, JournalError, Kept, Kind, Lost, Recorder
+from realizer.server.journal.entry import (
+    Entry,
+    Journal,
+    JournalError,
+    Kind,
+    Recorder,
+    SavedSession,
+    TakenOver,
+)
 
 log = logging.getLogger(__name__)
 
@@ -20,7 +28,7 @@ ENDLESS = 10_000
 AGAIN = 25
 
 
-class Notes:
+class JournalWriter:
     """The hand that writes for a session.
 
     Args:
@@ -28,7 +36,7 @@ class Notes:
         journal: what another process would go on from; None: none does.
         record: what is played again to look at it. It may fail: nobody waits for it.
         stopped: is called when a record has failed; nothing more is written of it.
-        kept: what is in the journal already.
+        saved: what is in the journal already.
     """
 
     def __init__(
@@ -38,24 +46,24 @@ class Notes:
         record: Recorder | None = None,
         *,
         stopped: Callable[[], None] = lambda: None,
-        kept: Kept | None = None,
+        saved: SavedSession | None = None,
     ) -> None:
         self._session = session
         self._journal = journal
-        self._record = record
+        self._recorder = record
         self._stopped = stopped
         self._failing = False
-        entries = [] if kept is None else kept.entries
+        entries = [] if saved is None else saved.entries
         self._entries = len(entries)
         self._bytes = sum(len(entry.body) for entry in entries)
 
     @property
-    def grown(self) -> bool:
+    def needs_checkpoint(self) -> bool:
         """A checkpoint is due."""
         return self._entries >= ENTRIES or self._bytes >= BYTES
 
     @property
-    def overgrown(self) -> bool:
+    def is_far_too_long(self) -> bool:
         """A checkpoint was due long ago."""
         return self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
 
@@ -67,13 +75,13 @@ class Notes:
         """
         if self._journal is not None:
             self._journal.begin(self._session, epoch)
-        self._recorded(lambda record: record.begin(self._session, epoch))
+        self._record(lambda record: record.begin(self._session, epoch))
 
-    def resume(self, kept: Kept) -> None:
+    def resume(self, saved: SavedSession) -> None:
         """The session was taken over: its record goes on."""
-        self._recorded(lambda record: record.resume(self._session, kept))
+        self._record(lambda record: record.resume(self._session, saved))
 
-    def keep(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
+    def append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
         """What must not be done unless it is kept.
 
         Raises:
@@ -81,10 +89,10 @@ class Notes:
             JournalError: it cannot be kept.
         """
         entry = Entry(at, kind, number, body)
-        self._kept(entry)
-        self._recorded(lambda record: record.add(self._session, entry))
+        self._append_to_journal(entry)
+        self._record(lambda record: record.add(self._session, entry))
 
-    def tell(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
+    def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
         """What happens all the same. A fault is logged once, until it is over.
 
         Raises:
@@ -92,13 +100,13 @@ class Notes:
         """
         entry = Entry(at, kind, number, body)
         try:
-            self._kept(entry)
-        except Lost:
+            self._append_to_journal(entry)
+        except TakenOver:
             raise
         except JournalError as error:
-            self._fails(error)
+            self._log_failure(error)
             self._entries = ENTRIES  # what the journal lacks now, a checkpoint gives it back
-        self._recorded(lambda record: record.add(self._session, entry))
+        self._record(lambda record: record.add(self._session, entry))
 
     def compact(self, parts: Mapping[str, str | None]) -> bool:
         """A checkpoint; False where it cannot be kept: then it is due again soon.
@@ -109,10 +117,10 @@ class Notes:
         try:
             if self._journal is not None:
                 self._journal.compact(self._session, parts)
-        except Lost:
+        except TakenOver:
             raise
         except JournalError as error:
-            self._fails(error)
+            self._log_failure(error)
             self._entries, self._bytes = ENTRIES - AGAIN, 0
             return False
         self._entries = self._bytes = 0
@@ -120,11 +128,11 @@ class Notes:
 
     def end(self) -> None:
         """The session is over."""
-        for one in (self._journal, self._record):
+        for one in (self._journal, self._recorder):
             if one is not None:
                 one.end(self._session)
 
-    def _kept(self, entry: Entry) -> None:
+    def _append_to_journal(self, entry: Entry) -> None:
         if self._journal is None:
             return
         self._journal.add(self._session, entry)
@@ -138,19 +146,19 @@ class Notes:
                 self._entries,
             )
 
-    def _recorded(self, write: Callable[[Recorder], None]) -> None:
+    def _record(self, write: Callable[[Recorder], None]) -> None:
         """A record has all or ends: one with a hole would be played otherwise than the session was."""
-        if self._record is None:
+        if self._recorder is None:
             return
         try:
-            write(self._record)
+            write(self._recorder)
         except JournalError as error:
             log.warning("session %s is recorded no further: %s", self._session, error)
-            self._record.end(self._session)
-            self._record = None
+            self._recorder.end(self._session)
+            self._recorder = None
             self._stopped()
 
-    def _fails(self, error: JournalError) -> None:
+    def _log_failure(self, error: JournalError) -> None:
         if not self._failing:
             log.error("session %s: %s", self._session, error)
         self._failing = True

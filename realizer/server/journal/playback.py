@@ -13,21 +13,21 @@ from realizer.realization import Realization, frames_until, merge_warnings
 from realizer.server.journal.entry import JournalError
 from realizer.server.journal.recordings import Record
 from realizer.server.journal.replay import replay
-from realizer.server.journal.replay_viewer import Viewer
-from realizer.server.runtime.engines import Studio
+from realizer.server.journal.replay_viewer import ReplayViewer
+from realizer.server.runtime.engines import Engines
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.session import Session
 from realizer.server.speech.speech_streams import OPEN
 
 
-def told(record: Record, **changed: Any) -> list[str]:
-    """The feedback of a session that is played again, XML texts with their `seq`; as `played`."""
-    again = _Again(record, changed)
+def replay_feedback(record: Record, **changed: Any) -> list[str]:
+    """The feedback of a session that is played again, XML texts with their `seq`; as `replay_recording`."""
+    again = _Replay(record, changed)
     again.play()
     return [text for _, text in again.log.told]
 
 
-def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
+def replay_recording(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
     """Play a record again, as it was seen: to its end, or until nothing moves that was planned or held.
 
     What was only planned before something else was done is not in it; nor is what is past changed by what
@@ -44,13 +44,13 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         FaceError: its face is not there.
         RealizerError: it lasts too long.
     """
-    again = _Again(record, changed)
+    again = _Replay(record, changed)
     session, settings = again.session, again.session.settings
-    viewer = Viewer(session, settings.fps, again.begin)
+    viewer = ReplayViewer(session, settings.fps, again.begin)
     begin = viewer.first / settings.fps
     frames_until(again.last - begin, settings.fps)
-    again.play(viewer.look)
-    end = max(again.last, viewer.still) - begin
+    again.play(viewer.capture)
+    end = max(again.last, viewer.idle_from) - begin
     characters = viewer.performances(frames_until(end, settings.fps))
     feedback = [feedback for feedback, _ in again.log.told]
     schedules = [playing.latest for playing in viewer.blocks]
@@ -59,7 +59,7 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
         fps=settings.fps,
         duration=end,
         face_name=session.faces.name(0),
-        face_changes=viewer.worn,
+        face_changes=viewer.face_changes,
         characters=characters,
         schedules=tuple(replace(one, start=one.start - begin) for one in schedules),
         feedback_events=tuple(feedback),
@@ -71,7 +71,7 @@ def played(record: Record, **changed: Any) -> tuple[Realization, list[str]]:
     return realization, [text for _, text in again.log.told]
 
 
-class _Again:
+class _Replay:
     """A session that is to be what was recorded.
 
     Attributes:
@@ -86,7 +86,7 @@ class _Again:
             settings = Settings.read({**_settings(head), **asked})
         except SettingsError as error:
             raise JournalError(f"the record of {head['session']}: {error}") from None
-        self.log = _Whole(head["epoch"])
+        self.log = _FullLog(head["epoch"])
         self.session = Session(head["session"], settings, 0.0, named=True, scene=_scene(head), log=self.log)
         self.begin = self.session.restore(record.parts) if record.parts else 0.0
         self._entries = record.entries
@@ -95,7 +95,7 @@ class _Again:
     def play(self, look: Callable[[float], None] = lambda t: None) -> None:
         """Do all of it, and let what plays then come to its end; `look` as in `replay`."""
         session = self.session
-        studio = Studio(session.settings.deformer)
+        studio = Engines(session.settings.deformer)
         try:
             replay(session, self._entries, studio.speak, look)
         finally:
@@ -103,13 +103,13 @@ class _Again:
         # What was being said when the record broke off has no end of its own: it ends with what is planned.
         ends = [playing.end for playing in session.player.blocks.active()]
         end = max((end for end in ends if end < self.last + OPEN / 2), default=self.last)
-        session.pass_time(end, look, since=self.last)
+        session.replay_until(end, look, since=self.last)
         look(end)
-        session.player.stop(end, session.intake.speeches.open)
-        session.pass_time(float("inf"), look, since=end)
+        session.player.stop(end, session.submission.speeches.open_ids)
+        session.replay_until(float("inf"), look, since=end)
 
 
-class _Whole(FeedbackLog):
+class _FullLog(FeedbackLog):
     """All that a session ever tells, with its text."""
 
     def __init__(self, epoch: float | None) -> None:

@@ -15,14 +15,14 @@ from typing import Any
 
 from realizer.behaviours.kind import Position
 from realizer.core.settings import Settings
-from realizer.server.journal.entry import Entry, JournalError, Kept
+from realizer.server.journal.entry import Entry, JournalError, SavedSession
 
 SUFFIX = ".jsonl"
 SHOWN_RECORDS = 20  # of those one can choose from
 ROUNDING = 1e-6  # s; of times that went from one clock to another
 
 
-class FolderJournal:
+class RecordingFolder:
     """Records every session, of which nothing is taken back: `SESSION-TIME.jsonl`, the head first.
 
     Args:
@@ -46,7 +46,7 @@ class FolderJournal:
         self.end(session)
         self._begin(session, epoch)
 
-    def resume(self, session: str, kept: Kept) -> None:
+    def resume(self, session: str, saved: SavedSession) -> None:
         """Go on with the record of a session that was taken over; what it lacks is written first.
 
         Where there is none here that only lacks something at its end, or another process still writes it, a
@@ -56,11 +56,11 @@ class FolderJournal:
             JournalError: it cannot be written.
         """
         self.end(session)
-        there = itertools.takewhile(os.path.exists, self._paths(session, kept.epoch))
-        joined = (self._join(session, path, kept) for path in there)
+        there = itertools.takewhile(os.path.exists, self._paths(session, saved.epoch))
+        joined = (self._join(session, path, saved) for path in there)
         if (lacks := next((one for one in joined if one is not None), None)) is None:
-            self._begin(session, kept.epoch, kept.parts)
-            lacks = kept.entries
+            self._begin(session, saved.epoch, saved.parts)
+            lacks = saved.entries
         for entry in lacks:
             self.add(session, entry)
 
@@ -76,7 +76,7 @@ class FolderJournal:
         try:
             path = next(path for path in self._paths(session, epoch) if not path.exists())
             file = self._files[session] = path.open("xb", buffering=0)
-            _taken(file)
+            _lock(file)
             _write(file, json.dumps(told | {"parts": dict(parts)} if parts else told))
         except OSError as error:
             if session in self._files:
@@ -85,14 +85,14 @@ class FolderJournal:
                     path.unlink()  # an empty file is no record
             raise JournalError(f"the record {path}: {error.strerror}") from None
 
-    def _join(self, session: str, path: Path, kept: Kept) -> list[Entry] | None:
+    def _join(self, session: str, path: Path, kept: SavedSession) -> list[Entry] | None:
         """Open a record behind its last whole line; what it lacks, or None where it must not grow."""
         try:
             file = path.open("r+b", buffering=0)
         except OSError:
             return None
         try:
-            if _taken(file) and (lacks := self._lacks(read_record(path), kept)) is not None:
+            if _lock(file) and (lacks := self._missing_entries(read_record(path), kept)) is not None:
                 file.seek(path.read_bytes().rfind(b"\n") + 1)
                 file.truncate()
                 self._files[session] = file
@@ -102,7 +102,7 @@ class FolderJournal:
         file.close()
         return None
 
-    def _lacks(self, record: Record, kept: Kept) -> list[Entry] | None:
+    def _missing_entries(self, record: Record, kept: SavedSession) -> list[Entry] | None:
         """What was done last and is not in a record; None where that is not all that it lacks."""
         if any(record.head.get(name) != told for name, told in self._head.items()):
             return None  # it is gone on with under other settings
@@ -132,7 +132,7 @@ class FolderJournal:
             self.end(session)
 
 
-def _taken(file: FileIO) -> bool:
+def _lock(file: FileIO) -> bool:
     """Let nobody else go on with a file as long as it is open; False where another process has it."""
     try:
         import fcntl
@@ -183,7 +183,7 @@ class Record:
 
     Attributes:
         head: what was told first: `session`, `epoch`, `settings`, `scene`.
-        parts: what the session was where the record begins, as `Kept` has them; {}: it was new.
+        parts: what the session was where the record begins, as `SavedSession` has them; {}: it was new.
     """
 
     head: Mapping[str, Any]
@@ -212,7 +212,7 @@ def read_record(path: Path) -> Record:
         head["session"] + ""
         parts = {name + "": text + "" for name, text in head.pop("parts", {}).items()}
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise JournalError(f"{path}:1: wanted the head of a record, got {_shown(first)!r}") from None
+        raise JournalError(f"{path}:1: wanted the head of a record, got {_quoted(first)!r}") from None
     entries: list[Entry] = []
     # What is behind the last line feed was not written to its end.
     for number, line in enumerate(lines[:-1], 2):
@@ -221,7 +221,7 @@ def read_record(path: Path) -> Record:
             _time(entry.at, entries[-1].at if entries else 0.0)
             entries.append(entry)
         except UnicodeDecodeError:
-            raise JournalError(f"{path}:{number}: wanted UTF-8, got {_shown(line)!r}") from None
+            raise JournalError(f"{path}:{number}: wanted UTF-8, got {_quoted(line)!r}") from None
         except (JournalError, ValueError) as error:
             raise JournalError(f"{path}:{number}: {error}") from None
     return Record(head, tuple(entries), parts)
@@ -241,5 +241,5 @@ def _only(folder: Path) -> Path:
     return found[0]
 
 
-def _shown(line: bytes) -> str:
+def _quoted(line: bytes) -> str:
     return line[:80].decode(errors="replace")

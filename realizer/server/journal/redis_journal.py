@@ -9,7 +9,7 @@ import time
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
+from realizer.server.journal.entry import RETENTION, Entry, JournalError, SavedSession, TakenOver
 
 PATIENCE = 1.0  # s for an answer
 # Everybody waits for it meanwhile: who has not answered in that time is not asked again before so long.
@@ -54,7 +54,7 @@ if redis.call('HGET', KEYS[1], 'owner') == ARGV[1] then redis.call('DEL', unpack
 """
 
 
-class SharedJournal:
+class RedisJournal:
     """The store at a URL such as redis://HOST:6379/0. An entry is one round trip.
 
     Raises:
@@ -97,39 +97,39 @@ class SharedJournal:
             raise JournalError(f"the journal {self._url}: {error}") from None
         scripts = map(self._store.register_script, (ADD, TAKE, COMPACT, END))
         self._add, self._take, self._compact, self._end = scripts
-        with self._told():
+        with self._translate_errors():
             self._store.ping()
 
     def begin(self, session: str, epoch: float) -> None:
         head, *rest = _keys(session)
-        with self._told():
+        with self._translate_errors():
             pipe = self._store.pipeline()
             pipe.delete(*rest)
             pipe.hset(head, mapping={"owner": self._owner, "epoch": repr(epoch)})
-            pipe.expire(head, KEPT)
+            pipe.expire(head, RETENTION)
             pipe.execute()
         self._counts[session] = 0
 
     def add(self, session: str, entry: Entry) -> None:
-        with self._told():
+        with self._translate_errors():
             known = self._counts.get(session, 0)
-            count = self._add(_keys(session), [self._owner, KEPT, known, entry.line()])
+            count = self._add(_keys(session), [self._owner, RETENTION, known, entry.line()])
         if not count:
-            raise _lost(session)
+            raise _taken_over_error(session)
         self._counts[session] = count
 
-    def take(self, session: str) -> Kept | None:
-        with self._told():
+    def claim(self, session: str) -> SavedSession | None:
+        with self._translate_errors():
             there = self._take(_keys(session), [self._owner])
         if there is None:
             return None
         epoch, lines, parts = there
         texts = dict(zip(parts[::2], parts[1::2], strict=True))
         self._counts[session] = len(lines)
-        return Kept(float(epoch), [Entry.read(line) for line in lines], texts)
+        return SavedSession(float(epoch), [Entry.read(line) for line in lines], texts)
 
-    def taken(self, sessions: Collection[str]) -> set[str]:
-        with self._told():
+    def taken_over(self, sessions: Collection[str]) -> set[str]:
+        with self._translate_errors():
             pipe = self._store.pipeline(transaction=False)
             for session in sessions:
                 pipe.hget(_keys(session)[0], "owner")
@@ -139,15 +139,15 @@ class SharedJournal:
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         gone = [name for name, text in parts.items() if text is None]
         new = [word for name, text in parts.items() if text is not None for word in (name, text)]
-        with self._told():
-            done = self._compact(_keys(session), [self._owner, KEPT, len(gone), *gone, *new])
+        with self._translate_errors():
+            done = self._compact(_keys(session), [self._owner, RETENTION, len(gone), *gone, *new])
         if not done:
-            raise _lost(session)
+            raise _taken_over_error(session)
         self._counts[session] = 0
 
     def end(self, session: str) -> None:
         self._counts.pop(session, None)
-        with contextlib.suppress(JournalError), self._told():
+        with contextlib.suppress(JournalError), self._translate_errors():
             self._end(_keys(session), [self._owner])
 
     def close(self) -> None:
@@ -155,7 +155,7 @@ class SharedJournal:
             self._store.close()
 
     @contextlib.contextmanager
-    def _told(self) -> Iterator[None]:
+    def _translate_errors(self) -> Iterator[None]:
         if time.monotonic() < self._pause_ends:
             raise JournalError(f"the journal {self._url}: it did not answer, and is asked again in a moment")
         try:
@@ -173,5 +173,5 @@ def _keys(session: str) -> list[str]:
     return [head, f"{head}:entries", f"{head}:parts"]
 
 
-def _lost(session: str) -> Lost:
-    return Lost(f"session {session} is another node's now")
+def _taken_over_error(session: str) -> TakenOver:
+    return TakenOver(f"session {session} is another node's now")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.server.journal.entry import Entry, Kept
+from realizer.server.journal.entry import Entry, SavedSession
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.session.session import Session
 from realizer.speech.utterance import Utterance
@@ -29,7 +29,7 @@ def replay(
     """
     owed: dict[int, Speak] = {}
     for entry in entries:
-        session.pass_time(entry.at, look)
+        session.replay_until(entry.at, look)
         look(entry.at)
         match entry.kind:
             case "join":
@@ -42,17 +42,17 @@ def replay(
                 order = owed.pop(entry.number, None)
                 # What was asked for before a checkpoint nobody waits for any more.
                 said = None if order is None or entry.body else speak(order)
-                session.spoken(entry.number, said or VoiceError(str(entry.body)), entry.at)
+                session.on_speech(entry.number, said or VoiceError(str(entry.body)), entry.at)
             case "tick":
                 session.tick(entry.at)
-        for effect in session.outgoing():
+        for effect in session.take_effects():
             if isinstance(effect, Speak):
                 owed[effect.id] = effect
     return list(owed.values())
 
 
-def restored(
-    session: Session, kept: Kept, speak: Callable[[Speak], Utterance | RealizerError]
+def restore_session(
+    session: Session, saved: SavedSession, speak: Callable[[Speak], Utterance | RealizerError]
 ) -> tuple[float, list[Effect]]:
     """Let a new session be what a journal has kept, up to the last entry; as `replay`.
 
@@ -62,12 +62,12 @@ def restored(
     Raises:
         JournalError: its checkpoint cannot be read.
     """
-    at = session.restore(kept.parts) if kept.parts else 0.0
-    owed = replay(session, kept.entries, speak)
-    return kept.entries[-1].at if kept.entries else at, owed
+    at = session.restore(saved.parts) if saved.parts else 0.0
+    owed = replay(session, saved.entries, speak)
+    return saved.entries[-1].at if saved.entries else at, owed
 
 
-def caught_up(session: Session, now: float, seen: int) -> float:
+def catch_up(session: Session, now: float, seen: int) -> float:
     """Let time pass until a session has told again what somebody has seen of it already.
 
     The clock that says how much has passed may be another machine's, or have been set back.
@@ -79,7 +79,7 @@ def caught_up(session: Session, now: float, seen: int) -> float:
     Returns:
         Seconds on that clock, as late as it must be.
     """
-    while session.log.newest < seen and not session.closed:
+    while session.feedback_log.newest < seen and not session.closed:
         if (due := session.player.next_deadline()) is None:
             break
         now = max(now, session.opened + due)

@@ -17,7 +17,7 @@ from realizer.scheduling.timing import Schedule
 CHANNELS = {"channel": Channel, "fewer": BlinkReduction}
 
 
-def plain_character(character: Character) -> dict[str, Any]:
+def character_to_json(character: Character) -> dict[str, Any]:
     """A face with all that it holds beyond any block."""
     return {
         "id": character.id,
@@ -26,17 +26,17 @@ def plain_character(character: Character) -> dict[str, Any]:
                 "begin": shift.begin,
                 "end": shift.end,
                 "regions": sorted(shift.regions),
-                "channels": [_plain_channel(channel) for channel in shift.channels],
+                "channels": [_channel_to_json(channel) for channel in shift.channels],
             }
             for shift in character.shifts
         ],
-        "direct": {name: _plain_channel(channel) for name, channel in character.direct.items()},
-        "feeling": {name: _plain_channel(channel) for name, channel in character.emotion.items()},
+        "direct": {name: _channel_to_json(channel) for name, channel in character.direct.items()},
+        "feeling": {name: _channel_to_json(channel) for name, channel in character.emotion.items()},
     }
 
 
-def character_of(told: Mapping[str, Any]) -> Character:
-    """What `plain_character` told of.
+def character_from_json(told: Mapping[str, Any]) -> Character:
+    """What `character_to_json` told of.
 
     Raises:
         KeyError, TypeError, ValueError: it is none.
@@ -46,17 +46,17 @@ def character_of(told: Mapping[str, Any]) -> Character:
             float(shift["begin"]),
             float(shift["end"]),
             frozenset(shift["regions"]),
-            tuple(map(_channel, shift["channels"])),
+            tuple(map(_channel_from_json, shift["channels"])),
         )
         for shift in told["shifts"]
     ]
     direct, feeling = (
-        {name: _channel(one) for name, one in told[of].items()} for of in ("direct", "feeling")
+        {name: _channel_from_json(one) for name, one in told[of].items()} for of in ("direct", "feeling")
     )
     return Character(told["id"], shifts, direct, feeling)
 
 
-def plain_schedule(schedule: Schedule) -> dict[str, Any]:
+def schedule_to_json(schedule: Schedule) -> dict[str, Any]:
     """When the sync points of a block were: what references to it may still ask."""
     return {
         "block": schedule.block,
@@ -66,8 +66,8 @@ def plain_schedule(schedule: Schedule) -> dict[str, Any]:
     }
 
 
-def schedule_of(told: Mapping[str, Any]) -> Schedule:
-    """What `plain_schedule` told of.
+def schedule_from_json(told: Mapping[str, Any]) -> Schedule:
+    """What `schedule_to_json` told of.
 
     Raises:
         KeyError, TypeError, ValueError: it is none.
@@ -77,7 +77,7 @@ def schedule_of(told: Mapping[str, Any]) -> Schedule:
     return Schedule(told["block"], points, times, start=float(told["start"]))
 
 
-def _plain_channel(channel: Channel) -> dict[str, Any]:
+def _channel_to_json(channel: Channel) -> dict[str, Any]:
     """Its attributes, but those that are as they are where nobody says anything."""
     kind = next(name for name, one in CHANNELS.items() if one is type(channel))
     told: dict[str, Any] = {
@@ -101,7 +101,7 @@ def _plain_channel(channel: Channel) -> dict[str, Any]:
     return told
 
 
-def _channel(told: Mapping[str, Any]) -> Channel:
+def _channel_from_json(told: Mapping[str, Any]) -> Channel:
     there = told.get("there")
     return CHANNELS[told["kind"]](
         axis()[told["target"]],

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from time import time
 
-from realizer.server.journal.entry import KEPT, Entry, JournalError, Kept, Lost
+from realizer.server.journal.entry import RETENTION, Entry, JournalError, SavedSession, TakenOver
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS sessions (id TEXT PRIMARY KEY, owner TEXT NOT NULL, epoch REAL NOT NULL);
@@ -34,7 +34,7 @@ TAKEN = "SELECT id FROM sessions WHERE owner != ? AND id IN (SELECT value FROM j
 BUSY = 2.0  # s
 
 
-class LocalJournal:
+class SqliteJournal:
     """The file of that name, made where it is not there; several workers of one machine may share it.
 
     A killed process loses nothing of it; a machine that loses power may lose its last moments. What sessions
@@ -47,33 +47,33 @@ class LocalJournal:
     def __init__(self, path: str | Path) -> None:
         self._path = path
         self._owner = secrets.token_hex(8)
-        with self._told():
+        with self._translate_errors():
             # Each statement by itself: what is added is safe at once.
             self._file = sqlite3.connect(path, timeout=BUSY, isolation_level=None)
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
             self._file.executescript(TABLES)
-        with self._at_once():
+        with self._transaction():
             for session, last in self._file.execute(LAST).fetchall():
-                if last < time() - KEPT:
+                if last < time() - RETENTION:
                     self._forget(session)
 
     def begin(self, session: str, epoch: float) -> None:
-        with self._at_once():
+        with self._transaction():
             self._forget(session)
             self._file.execute("REPLACE INTO sessions VALUES (?, ?, ?)", (session, self._owner, epoch))
 
     def add(self, session: str, entry: Entry) -> None:
-        with self._told():
+        with self._translate_errors():
             done = self._file.execute(
                 "INSERT INTO entries (session, line) SELECT id, ? FROM sessions WHERE id = ? AND owner = ?",
                 (entry.line(), session, self._owner),
             )
         if not done.rowcount:
-            raise _lost(session)
+            raise _taken_over_error(session)
 
-    def take(self, session: str) -> Kept | None:
-        with self._at_once():
+    def claim(self, session: str) -> SavedSession | None:
+        with self._transaction():
             mine = self._file.execute(
                 "UPDATE sessions SET owner = ? WHERE id = ? RETURNING epoch", (self._owner, session)
             ).fetchone()
@@ -83,17 +83,21 @@ class LocalJournal:
             parts = self._file.execute(
                 "SELECT name, text FROM parts WHERE session = ?", (session,)
             ).fetchall()
-        return None if mine is None else Kept(mine[0], [Entry.read(line) for (line,) in lines], dict(parts))
+        return (
+            None
+            if mine is None
+            else SavedSession(mine[0], [Entry.read(line) for (line,) in lines], dict(parts))
+        )
 
-    def taken(self, sessions: Collection[str]) -> set[str]:
+    def taken_over(self, sessions: Collection[str]) -> set[str]:
         # A connection of its own: the other one is of the thread that writes.
-        with self._told(), contextlib.closing(sqlite3.connect(self._path, timeout=BUSY)) as file:
+        with self._translate_errors(), contextlib.closing(sqlite3.connect(self._path, timeout=BUSY)) as file:
             return {id for (id,) in file.execute(TAKEN, (self._owner, json.dumps(list(sessions))))}
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
-        with self._at_once():
-            if not self._mine(session):
-                raise _lost(session)
+        with self._transaction():
+            if not self._owns(session):
+                raise _taken_over_error(session)
             self._file.execute("DELETE FROM entries WHERE session = ?", (session,))
             for name, text in parts.items():
                 if text is None:
@@ -102,15 +106,15 @@ class LocalJournal:
                     self._file.execute("REPLACE INTO parts VALUES (?, ?, ?)", (session, name, text))
 
     def end(self, session: str) -> None:
-        with contextlib.suppress(JournalError), self._at_once():
-            if self._mine(session):
+        with contextlib.suppress(JournalError), self._transaction():
+            if self._owns(session):
                 self._forget(session)
 
     def close(self) -> None:
         with contextlib.suppress(sqlite3.Error):
             self._file.close()
 
-    def _mine(self, session: str) -> bool:
+    def _owns(self, session: str) -> bool:
         found = self._file.execute(
             "SELECT 1 FROM sessions WHERE id = ? AND owner = ?", (session, self._owner)
         ).fetchone()
@@ -121,9 +125,9 @@ class LocalJournal:
             self._file.execute(f"DELETE FROM {table} WHERE {column} = ?", (session,))
 
     @contextlib.contextmanager
-    def _at_once(self) -> Iterator[None]:
+    def _transaction(self) -> Iterator[None]:
         """All that is done inside, or nothing of it."""
-        with self._told():
+        with self._translate_errors():
             self._file.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -133,12 +137,12 @@ class LocalJournal:
                 raise
 
     @contextlib.contextmanager
-    def _told(self) -> Iterator[None]:
+    def _translate_errors(self) -> Iterator[None]:
         try:
             yield
         except (sqlite3.Error, OSError) as error:
             raise JournalError(f"the journal {self._path}: {error}") from None
 
 
-def _lost(session: str) -> Lost:
-    return Lost(f"session {session} is another process's now")
+def _taken_over_error(session: str) -> TakenOver:
+    return TakenOver(f"session {session} is another process's now")

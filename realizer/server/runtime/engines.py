@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
-from realizer.server.session.effects import Draw, Look, Speak
+from realizer.server.session.effects import Draw, RenderOptions, Speak
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
 
@@ -25,7 +25,7 @@ IDLE = 5.0  # s
 
 
 @dataclass(slots=True)
-class _Place:
+class _RendererSlot:
     """A renderer, how many draw with it just now, and when one last did."""
 
     renderer: Renderer
@@ -34,8 +34,8 @@ class _Place:
     begun: bool = False
 
 
-class Studio:
-    """The engines. `speakers` and `drawers` are the threads that may call `speak` and `draw`.
+class Engines:
+    """The engines. `speech_pool` and `render_pool` are the threads that may call `speak` and `draw`.
 
     Args:
         deformer: what moves faces, in spite of what they say themselves.
@@ -46,31 +46,31 @@ class Studio:
         self._deformer = deformer
         self._clock = clock
         # Two texts can be spoken at a time: one long text must not hold up the short ones of all others.
-        self.speakers = ThreadPoolExecutor(2, "voice")
+        self.speech_pool = ThreadPoolExecutor(2, "voice")
         # And a process that starts must not hold up the pictures of all others.
-        self.drawers = ThreadPoolExecutor(2, "renderer")
+        self.render_pool = ThreadPoolExecutor(2, "renderer")
         self._voices: dict[str | None, Voice] = {}
-        self._places: dict[tuple[str, Look], _Place] = {}
+        self._slots: dict[tuple[str, RenderOptions], _RendererSlot] = {}
         self._begun = clock()  # when one last had started: all the others waited for their turn until then
         self._lock = threading.Lock()
-        self._said: set[str] = set()
+        self._reported: set[str] = set()
 
     def speak(self, order: Speak) -> Utterance | RealizerError:
         """What a voice made of it; or why it could not, which is also said once on stderr."""
         try:
             # The name is the whole of what chooses the voice; an engine would take it for one of its own.
-            return speak_to_length(self._voice(order.say.voice), replace(order.say, voice=None))
+            return speak_to_length(self._voice(order.request.voice), replace(order.request, voice=None))
         except VoiceError as error:
-            self._tell(str(error))
+            self._report(str(error))
             return error
         except Exception as error:
-            self._tell(f"{type(error).__name__}: {error}")
+            self._report(f"{type(error).__name__}: {error}")
             return VoiceError(f"the voice failed: {error}")
 
     def draw(self, order: Draw) -> bytes | RealizerError:
         """Bytes of the picture; or why there are none."""
         try:
-            place, look = self._place(order), order.look
+            place, look = self._acquire(order), order.options
             try:
                 try:
                     return place.renderer.encoded(order.pose, look.form, look.quality)
@@ -78,7 +78,7 @@ class Studio:
                     # A process that died is started anew by the next call; one that cannot fails again.
                     return place.renderer.encoded(order.pose, look.form, look.quality)
             finally:
-                self._leave(place)
+                self._release(place)
         except RealizerError as error:
             return error
         except Exception as error:
@@ -86,11 +86,11 @@ class Studio:
 
     def close(self) -> None:
         """End all engines; what waits for them is dropped."""
-        self.speakers.shutdown(wait=False, cancel_futures=True)
-        self.drawers.shutdown(wait=False, cancel_futures=True)
+        self.speech_pool.shutdown(wait=False, cancel_futures=True)
+        self.render_pool.shutdown(wait=False, cancel_futures=True)
         for voice in self._voices.values():
             voice.close()
-        for place in self._places.values():
+        for place in self._slots.values():
             place.renderer.close()
 
     def _voice(self, name: str | None) -> Voice:
@@ -101,23 +101,23 @@ class Studio:
                 self._voices[name] = find_voice(name)
             return self._voices[name]
 
-    def _place(self, order: Draw) -> _Place:
-        """The renderer of a face and a look, until `_leave`.
+    def _acquire(self, order: Draw) -> _RendererSlot:
+        """The renderer of a face and a look, until `_release`.
 
         Raises:
             RenderError: there are too many that somebody looks at.
         """
         from realizer.render import Renderer
 
-        look = replace(order.look, quality=0, form="jpeg")  # which need no other process
+        look = replace(order.options, quality=0, form="jpeg")  # which need no other process
         key, left = (order.face, look), None
         with self._lock:
             now = self._clock()
-            place = self._places.get(key)
+            place = self._slots.get(key)
             if place is None:
-                if len(self._places) >= RENDERERS:
-                    left = self._places.pop(self._unseen(now))
-                place = self._places[key] = _Place(
+                if len(self._slots) >= RENDERERS:
+                    left = self._slots.pop(self._least_recent(now))
+                place = self._slots[key] = _RendererSlot(
                     Renderer(
                         order.face,
                         look.size,
@@ -134,7 +134,7 @@ class Studio:
             left.renderer.close()
         return place
 
-    def _unseen(self, now: float) -> tuple[str, Look]:
+    def _least_recent(self, now: float) -> tuple[str, RenderOptions]:
         """Of what nobody has looked at for a while, that of the longest ago.
 
         Raises:
@@ -142,7 +142,7 @@ class Studio:
         """
         unseen = [
             (place.used, key)
-            for key, place in self._places.items()
+            for key, place in self._slots.items()
             if not place.busy and now - max(place.used, self._begun) >= IDLE
         ]
         if not unseen:
@@ -152,14 +152,14 @@ class Studio:
             )
         return min(unseen, key=lambda one: one[0])[1]
 
-    def _leave(self, place: _Place) -> None:
+    def _release(self, place: _RendererSlot) -> None:
         with self._lock:
             place.busy -= 1
             place.used = self._clock()
             if not place.begun:
                 place.begun, self._begun = True, place.used
 
-    def _tell(self, fault: str) -> None:
-        if fault not in self._said:
-            self._said.add(fault)
+    def _report(self, fault: str) -> None:
+        if fault not in self._reported:
+            self._reported.add(fault)
             print(f"realizer: {fault}; going on without sound", file=sys.stderr)

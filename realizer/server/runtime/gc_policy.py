@@ -13,7 +13,7 @@ ENDED = 100
 GROWN, MORE = 1.5, 100e6  # bytes
 
 
-def leave_to_shell() -> None:
+def disable_automatic_gc() -> None:
     """Let Python look for no cycles of its own accord.
 
     What plays leaves none behind; among the objects of a thousand sessions a search takes a quarter of a
@@ -24,18 +24,18 @@ def leave_to_shell() -> None:
     gc.disable()
 
 
-class Cycles:
+class GcPolicy:
     """Looks for cycles where there may be many.
 
     Attributes:
-        ended: connections that have ended since.
+        ended_connections: connections that have ended since.
     """
 
     def __init__(self) -> None:
-        self.ended = 0
+        self.ended_connections = 0
         self._least = memory()
 
-    def look(self, alive: int) -> bool:
+    def collect_if_needed(self, alive: int) -> bool:
         """Free what nothing else holds, if it is time; whether it was.
 
         Args:
@@ -43,8 +43,8 @@ class Cycles:
         """
         used = memory()
         self._least = min(self._least, used)
-        if self.ended < max(ENDED, alive) and used < GROWN * self._least + MORE:
+        if self.ended_connections < max(ENDED, alive) and used < GROWN * self._least + MORE:
             return False
         gc.collect()
-        self.ended, self._least = 0, memory()
+        self.ended_connections, self._least = 0, memory()
         return True

@@ -14,11 +14,11 @@ from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.face.fap_mapping import mapping_of
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import Journal, JournalError, Kept, Recorder, journal_at
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.recordings import FolderJournal, head
-from realizer.server.journal.replay import caught_up, restored
-from realizer.server.runtime.session_registry import HubError
+from realizer.server.journal import Journal, JournalError, Recorder, SavedSession, journal_at
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.recordings import RecordingFolder, head
+from realizer.server.journal.replay import catch_up, restore_session
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Effect, Speak
 from realizer.server.session.session import Session
 from realizer.server.session.welcome import capabilities_of
@@ -27,7 +27,7 @@ from realizer.speech.utterance import Utterance
 log = logging.getLogger(__name__)
 
 
-class Origin:
+class SessionFactory:
     """Makes the sessions of one process.
 
     Args:
@@ -48,7 +48,7 @@ class Origin:
         self._capabilities: dict[str, Any] = {}
 
     async def load(self) -> None:
-        """What every session shares; raises as `Shell.start`."""
+        """What every session shares; raises as `SessionHost.start`."""
         settings, loop = self._settings, asyncio.get_running_loop()
         if settings.journal is not None:
             self.journal = journal_at(settings.journal)
@@ -57,7 +57,7 @@ class Origin:
 
             self._scene = parse_scene(settings.scene.read_text("utf-8"))
         if settings.record is not None:
-            self._record = FolderJournal(settings.record, head(settings, self._scene))
+            self._record = RecordingFolder(settings.record, head(settings, self._scene))
         # A face that is not there is said before a door opens.
         from realizer.face.load import load_face
 
@@ -80,14 +80,14 @@ class Origin:
         """
         epoch = time.time()
         session = self._session(id, now, named=named, epoch=epoch)
-        session.notes = self._notes(id, self.journal if named else None)
+        session.journal = self._journal_writer(id, self.journal if named else None)
         try:
-            session.notes.begin(epoch)
+            session.journal.begin(epoch)
         except JournalError as error:
-            raise HubError(503, str(error)) from None
+            raise JoinError(503, str(error)) from None
         return session
 
-    async def brought_back(
+    async def restore(
         self, name: str, seen: int, speak: Callable[[Speak], Utterance | RealizerError]
     ) -> tuple[Session, list[Effect]] | None:
         """A session as the journal has it, without its connections; None where it has none of that name.
@@ -102,21 +102,21 @@ class Origin:
         Raises:
             JournalError: the journal cannot be read.
         """
-        if self.journal is None or (kept := self.journal.take(name)) is None:
+        if self.journal is None or (kept := self.journal.claim(name)) is None:
             return None
         loop = asyncio.get_running_loop()
         session = self._session(name, 0.0, named=True, epoch=kept.epoch)
         try:
-            at, owed = await loop.run_in_executor(None, restored, session, kept, speak)
+            at, owed = await loop.run_in_executor(None, restore_session, session, kept, speak)
         except JournalError:
             raise
         except Exception:
             log.exception("session %s cannot be gone on with", name)
             raise JournalError(f"session {name} cannot be gone on with: internal error") from None
-        session.notes = self._notes(name, self.journal, kept)
-        await loop.run_in_executor(None, session.notes.resume, kept)
-        at = caught_up(session, at, seen)
-        owed += [effect for effect in session.outgoing() if isinstance(effect, Speak)]
+        session.journal = self._journal_writer(name, self.journal, kept)
+        await loop.run_in_executor(None, session.journal.resume, kept)
+        at = catch_up(session, at, seen)
+        owed += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
         now = loop.time()
         session.opened = now - max(at, time.time() - kept.epoch)
         for connection in session.connections:  # which went with the other process
@@ -137,5 +137,7 @@ class Origin:
         session.ending = self.ending
         return session
 
-    def _notes(self, id: str, journal: Journal | None, kept: Kept | None = None) -> Notes:
-        return Notes(id, journal, self._record, stopped=self._metrics.record_stopped, kept=kept)
+    def _journal_writer(
+        self, id: str, journal: Journal | None, kept: SavedSession | None = None
+    ) -> JournalWriter:
+        return JournalWriter(id, journal, self._record, stopped=self._metrics.record_stopped, saved=kept)

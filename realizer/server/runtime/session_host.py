@@ -11,26 +11,26 @@ from typing import Any
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import Journal, Lost
-from realizer.server.journal.replay import caught_up
-from realizer.server.runtime.engines import Studio
-from realizer.server.runtime.gc_policy import Cycles
-from realizer.server.runtime.session_factory import Origin
-from realizer.server.runtime.session_registry import ANYBODY, Hub, Visitor, worker_of
+from realizer.server.journal import Journal, TakenOver
+from realizer.server.journal.replay import catch_up
+from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.gc_policy import GcPolicy
+from realizer.server.runtime.session_factory import SessionFactory
+from realizer.server.runtime.session_registry import ANYBODY, SessionRegistry, Visitor, worker_of
 from realizer.server.runtime.takeovers import taken_over
-from realizer.server.runtime.timer_wheel import Alarms
+from realizer.server.runtime.timer_wheel import TimerWheel
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
 from realizer.server.streams.connection import SLOW
-from realizer.server.transports.transport import Client
+from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
 # How often sessions that nobody visits are looked for.
-SWEEP = 5.0  # s
+EXPIRY_INTERVAL = 5.0  # s
 
 
-class Shell:
+class SessionHost:
     """All sessions of the service with their timers and engines. Doors let their clients `join` here.
 
     It is told what comes from a connection by the number that `join` gave, and hands what goes to it to the
@@ -44,21 +44,21 @@ class Shell:
         self.settings = settings
 
         def ours(session: str) -> bool:
-            if self._origin.journal is not None and not self._lives(session):
+            if self._factory.journal is not None and not self._is_live(session):
                 return False  # another process may have it: only `restore` asks, before somebody joins
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
         self.metrics = Metrics(worker)
-        self._origin = Origin(settings, self.metrics)
-        self._hub = Hub(self._origin.new, settings, ours)
-        self._studio = Studio(settings.deformer)
-        self._clients: dict[int, Client] = {}
+        self._factory = SessionFactory(settings, self.metrics)
+        self._registry = SessionRegistry(self._factory.new, settings, ours)
+        self._engines = Engines(settings.deformer)
+        self._clients: dict[int, Outbound] = {}
         self._reading: dict[Session, None] = {}  # those with documents to read or plan, in turn
         self._numbers = itertools.count(1)
-        self._sweeper: asyncio.TimerHandle | None = None
-        self._cycles = Cycles()
+        self._expiry_timer: asyncio.TimerHandle | None = None
+        self._gc_policy = GcPolicy()
         self._closed = False
-        self._looking: asyncio.Task[None] | None = None
+        self._takeover_check: asyncio.Task[None] | None = None
         self._restoring: dict[str, asyncio.Task[None]] = {}
         self._taken_over: dict[str, float] = {}  # session -> until when clients come back to it; loop time
 
@@ -72,49 +72,49 @@ class Shell:
             JournalError: a journal that cannot be had.
         """
         self._loop = asyncio.get_running_loop()
-        self._alarms = Alarms(self._loop, self._tick)
-        await self._origin.load()
-        self._sweeper = self._loop.call_later(SWEEP, self._sweep)
+        self._timers = TimerWheel(self._loop, self._tick)
+        await self._factory.load()
+        self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
 
-    def end(self) -> None:
+    def stop_accepting(self) -> None:
         """Sessions take no more documents from now on."""
-        self._origin.ending = True
-        for session in self._hub.sessions.values():
+        self._factory.ending = True
+        for session in self._registry.sessions.values():
             session.ending = True
 
     @property
     def busy(self) -> bool:
         """Something plays, waits or is being prepared."""
-        return any(session.busy for session in self._hub.sessions.values())
+        return any(session.busy for session in self._registry.sessions.values())
 
     async def close(self) -> None:
         """End every session and every engine."""
         self._closed = True
-        self._alarms.close()
+        self._timers.close()
         self._reading.clear()
-        for waiting in (self._sweeper, self._looking):
+        for waiting in (self._expiry_timer, self._takeover_check):
             if waiting is not None:
                 waiting.cancel()
-        for session in self._hub.sessions.values():
+        for session in self._registry.sessions.values():
             session.close()
-        self._origin.close()
-        await self._loop.run_in_executor(None, self._studio.close)
+        self._factory.close()
+        await self._loop.run_in_executor(None, self._engines.close)
 
     def health(self) -> dict[str, object]:
         """How many there are."""
-        return {"sessions": len(self._hub.sessions), "connections": len(self._clients)}
+        return {"sessions": len(self._registry.sessions), "connections": len(self._clients)}
 
-    def measured(self) -> str:
+    def metrics_text(self) -> str:
         """What Prometheus reads."""
-        sessions = self._hub.sessions.values()
-        dropped = sum(session.dropped(number) for session in sessions for number in session.connections)
+        sessions = self._registry.sessions.values()
+        dropped = sum(session.dropped_count(number) for session in sessions for number in session.connections)
         return self.metrics.text(
             {
                 "sessions": len(sessions),
                 "connections": len(self._clients),
-                "blocks_waiting": sum(len(session.intake.preparation) for session in sessions),
+                "blocks_waiting": sum(len(session.submission.pending) for session in sessions),
                 "blocks_playing": sum(session.player.active_count for session in sessions),
-                "unsent_bytes": sum(client.waiting for client in self._clients.values()),
+                "unsent_bytes": sum(client.unsent_bytes for client in self._clients.values()),
                 "memory_bytes": memory(),
             },
             {"frames_dropped": dropped},
@@ -128,7 +128,7 @@ class Shell:
         Raises:
             HubError: a bad name, one that is not for it, or too many sessions.
         """
-        self._hub.check(name, visitor)
+        self._registry.check(name, visitor)
 
     async def restore(self, name: str | None, seen: int | None = None) -> None:
         """Go on with a session that another process has had, before somebody joins it.
@@ -139,40 +139,40 @@ class Shell:
         Raises:
             JournalError: the journal cannot be read.
         """
-        if self._origin.journal is None or name is None:
+        if self._factory.journal is None or name is None:
             return
-        if not self._lives(name):
+        if not self._is_live(name):
             if name not in self._restoring:
                 self._restoring[name] = self._loop.create_task(self._restore(name, seen or 0))
             await asyncio.shield(self._restoring[name])
-        session = self._hub.sessions.get(name)
-        if session is not None and name in self._taken_over and session.log.newest < (seen or 0):
+        session = self._registry.sessions.get(name)
+        if session is not None and name in self._taken_over and session.feedback_log.newest < (seen or 0):
             now = self._loop.time()
-            session.opened -= caught_up(session, now, seen or 0) - now
-            self._pump(session)
+            session.opened -= catch_up(session, now, seen or 0) - now
+            self._apply_effects(session)
 
-    def _lives(self, name: str) -> bool:
+    def _is_live(self, name: str) -> bool:
         """A session of that name is here; one that another process has may only still be known."""
-        known = self._hub.sessions.get(name)
+        known = self._registry.sessions.get(name)
         return known is not None and not known.closed
 
     async def _restore(self, name: str, seen: int) -> None:
         try:
-            found = await self._origin.brought_back(name, seen, self._studio.speak)
+            found = await self._factory.restore(name, seen, self._engines.speak)
             if found is None:
                 return
             session, owed = found
-            self._hub.sessions[name] = session
+            self._registry.sessions[name] = session
             self._taken_over[name] = self._loop.time() + self.settings.keep
             for effect in owed:
-                self._do(session, effect)
-            self._pump(session)
+                self._apply_effect(session, effect)
+            self._apply_effects(session)
         finally:
             del self._restoring[name]
 
     def join(
         self,
-        client: Client,
+        client: Outbound,
         name: str | None = None,
         seen: int | None = None,
         visitor: Visitor = ANYBODY,
@@ -183,51 +183,51 @@ class Shell:
             HubError: as `check`.
         """
         number = next(self._numbers)
-        session = self._hub.open(number, name, self._loop.time(), seen, visitor)
+        session = self._registry.open(number, name, self._loop.time(), seen, visitor)
         self._clients[number] = client
-        self._pump(session)
+        self._apply_effects(session)
         return number
 
     def receive(self, number: int, message: str | bytes) -> bool:
         """A message from a connection; False where it is in no session any more."""
-        session = self._hub.session_of(number)
+        session = self._registry.session_of(number)
         if session is None or session.closed:
             return False
         self.metrics.counts["messages"] += 1
         try:
             # Who asks and never reads the answers is found here: nothing else may ever be due.
-            session.backlog(number, self._clients[number].waiting)
+            session.update_backlog(number, self._clients[number].unsent_bytes)
             session.receive(number, message, self._loop.time())
         except Exception:
             self._fail(session)
-        self._pump(session)
+        self._apply_effects(session)
         return True
 
     def leave(self, number: int) -> None:
         """A connection is gone."""
-        left = self._hub.session_of(number)
+        left = self._registry.session_of(number)
         if left is not None:
-            self.metrics.counts["frames_dropped"] += left.dropped(number)
-        self._hub.leave(number, self._loop.time())
+            self.metrics.counts["frames_dropped"] += left.dropped_count(number)
+        self._registry.leave(number, self._loop.time())
         self._clients.pop(number, None)
-        self._cycles.ended += 1
+        self._gc_policy.ended_connections += 1
         if left is not None:
-            self._arm(left)
+            self._schedule_wakeup(left)
 
     # sessions -----------------------------------------------------------------------------------
 
-    def _pump(self, session: Session) -> None:
+    def _apply_effects(self, session: Session) -> None:
         """Do what a session wants done, then wake it when it next has something."""
-        for effect in self._hub.effects(session, self._loop.time()):
-            self._do(session, effect)
-        self._arm(session)
+        for effect in self._registry.take_effects(session, self._loop.time()):
+            self._apply_effect(session, effect)
+        self._schedule_wakeup(session)
 
-    def _arm(self, session: Session) -> None:
+    def _schedule_wakeup(self, session: Session) -> None:
         """Wake it when something is due; what it has to read waits for its turn."""
         if self._closed:
             return
-        self._alarms.set(session, session.next_due())
-        if session.reads:
+        self._timers.schedule(session, session.next_due())
+        if session.has_documents:
             if not self._reading:
                 self._loop.call_soon(self._read)
             self._reading.setdefault(session)
@@ -236,13 +236,13 @@ class Shell:
         """Frames, feedback and whatever else is due."""
         now = self._loop.time()
         self.metrics.late.observe(now - when)
-        run = session.run
-        if run is not None and (data := run.take(now)) is not None:
+        run = session.fast_path
+        if run is not None and (data := run.next_message(now)) is not None:
             client = self._clients[run.connection]
             client.send(data)
-            if (waiting := client.waiting) > SLOW:
-                session.backlog(run.connection, waiting)
-            self._alarms.set(session, run.wakes)
+            if (waiting := client.unsent_bytes) > SLOW:
+                session.update_backlog(run.connection, waiting)
+            self._timers.schedule(session, run.wake_at)
             return
         try:
             found = session.frames(now)
@@ -250,15 +250,15 @@ class Shell:
             self._fail(session)
             return
         if found is None:
-            self._work(session, now, reads=False)
+            self._work(session, now, read_documents=False)
             return
         effects, due = found
         for effect in effects:
-            self._do(session, effect)
+            self._apply_effect(session, effect)
         for number in session.connections:
-            if (waiting := self._clients[number].waiting) > SLOW:
-                session.backlog(number, waiting)
-        self._alarms.set(session, due)
+            if (waiting := self._clients[number].unsent_bytes) > SLOW:
+                session.update_backlog(number, waiting)
+        self._timers.schedule(session, due)
 
     def _read(self) -> None:
         """Read or plan one document of one session; whatever is due in others comes before the next."""
@@ -269,73 +269,79 @@ class Shell:
         if self._reading:
             self._loop.call_soon(self._read)
         began, plans = self._loop.time(), session.player.version
-        self._work(session, began, reads=True)
+        self._work(session, began, read_documents=True)
         if session.player.version != plans:
             self.metrics.planning.observe(self._loop.time() - began)
 
-    def _work(self, session: Session, now: float, *, reads: bool) -> None:
+    def _work(self, session: Session, now: float, *, read_documents: bool) -> None:
         for number in session.connections:
-            session.backlog(number, self._clients[number].waiting)
+            session.update_backlog(number, self._clients[number].unsent_bytes)
         try:
-            session.tick(now, reads=reads)
+            session.tick(now, read_documents=read_documents)
         except Exception:
             self._fail(session)
-        self._pump(session)
+        self._apply_effects(session)
 
     def _fail(self, session: Session) -> None:
         """A bug: the traceback is ours, this session ends, the others play on."""
         log.exception("session %s ends: it failed", session.id)
         self.metrics.counts["failures"] += 1
         for number in session.connections:
-            self._do(session, Close(number, 1011, "internal error"))
+            self._apply_effect(session, Close(number, 1011, "internal error"))
         session.close()
-        session.notes.end()  # who does the same again from the journal would fail again
-        self._hub.forget(session)
+        session.journal.end()  # who does the same again from the journal would fail again
+        self._registry.remove(session)
 
-    def _do(self, session: Session, effect: Effect) -> None:
+    def _apply_effect(self, session: Session, effect: Effect) -> None:
         match effect:
             case Send(connection, data):
                 if (client := self._clients.get(connection)) is not None:
                     client.send(data)
             case Speak(id):
-                future = self._loop.run_in_executor(self._studio.speakers, self._studio.speak, effect)
-                future.add_done_callback(functools.partial(self._answered, session, session.spoken, id))
+                future = self._loop.run_in_executor(self._engines.speech_pool, self._engines.speak, effect)
+                future.add_done_callback(
+                    functools.partial(self._deliver_result, session, session.on_speech, id)
+                )
             case Draw(id):
-                drawing = self._loop.run_in_executor(self._studio.drawers, self._studio.draw, effect)
-                drawing.add_done_callback(functools.partial(self._answered, session, session.drawn, id))
+                drawing = self._loop.run_in_executor(self._engines.render_pool, self._engines.draw, effect)
+                drawing.add_done_callback(
+                    functools.partial(self._deliver_result, session, session.on_picture, id)
+                )
             case Close(connection, code, reason):
                 if (client := self._clients.get(connection)) is not None:
-                    client.end(code, reason)
+                    client.disconnect(code, reason)
 
-    def _answered(self, session: Session, tell: Any, id: int, future: asyncio.Future[Any]) -> None:
+    def _deliver_result(self, session: Session, tell: Any, id: int, future: asyncio.Future[Any]) -> None:
         if not future.cancelled() and not self._closed:
             tell(id, future.result(), self._loop.time())
-            self._pump(session)
+            self._apply_effects(session)
 
-    def _rest(self, session: Session) -> None:
+    def _compact_journal(self, session: Session) -> None:
         if self._closed:
             return
         try:
-            session.rest(self._loop.time())
+            session.compact_journal(self._loop.time())
         except Exception:
             self._fail(session)
-        self._pump(session)
+        self._apply_effects(session)
 
-    async def _look(self, journal: Journal) -> None:
+    async def _check_takeovers(self, journal: Journal) -> None:
         """Let go of who watches a session that plays elsewhere now."""
-        for session in await taken_over(journal, self._hub.sessions.values()):
-            session.lose(Lost(f"session {session.id} is another process's now"))
-            self._pump(session)
+        for session in await taken_over(journal, self._registry.sessions.values()):
+            session.hand_over(TakenOver(f"session {session.id} is another process's now"))
+            self._apply_effects(session)
 
-    def _sweep(self) -> None:
-        self._cycles.look(len(self._clients))
+    def _expire_sessions(self) -> None:
+        self._gc_policy.collect_if_needed(len(self._clients))
         now = self._loop.time()
-        self._hub.sweep(now)
+        self._registry.remove_expired(now)
         self._taken_over = {name: end for name, end in self._taken_over.items() if end > now}
         # What is written for all of them is written one after the other, until the next sweep.
-        grown = [session for session in self._hub.sessions.values() if session.notes.grown]
+        grown = [session for session in self._registry.sessions.values() if session.journal.needs_checkpoint]
         for place, session in enumerate(grown):
-            self._loop.call_later(SWEEP * place / len(grown), self._rest, session)
-        if self._origin.journal is not None and (self._looking is None or self._looking.done()):
-            self._looking = self._loop.create_task(self._look(self._origin.journal))
-        self._sweeper = self._loop.call_later(SWEEP, self._sweep)
+            self._loop.call_later(EXPIRY_INTERVAL * place / len(grown), self._compact_journal, session)
+        if self._factory.journal is not None and (
+            self._takeover_check is None or self._takeover_check.done()
+        ):
+            self._takeover_check = self._loop.create_task(self._check_takeovers(self._factory.journal))
+        self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)

@@ -27,7 +27,7 @@ async def taken_over(journal: Journal, sessions: Iterable[Session]) -> list[Sess
     found: list[Session] = []
     while batch := {session.id: session for session in islice(named, BATCH)}:
         try:
-            gone = await loop.run_in_executor(None, journal.taken, batch.keys())
+            gone = await loop.run_in_executor(None, journal.taken_over, batch.keys())
         except JournalError as error:
             log.warning("who has which session is not known: %s", error)
             break

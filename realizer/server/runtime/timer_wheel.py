@@ -31,7 +31,7 @@ class Timers(Protocol):
         ...
 
 
-class Alarms(Generic[T]):
+class TimerWheel(Generic[T]):
     """Wakes each thing once for each time it was set.
 
     Args:
@@ -52,7 +52,7 @@ class Alarms(Generic[T]):
         self._ringing = False
         self._closed = False
 
-    def set(self, thing: T, when: float) -> None:
+    def schedule(self, thing: T, when: float) -> None:
         """Wake it at `when` instead of whatever was set before; infinite: not at all.
 
         One that is due already is left alone: who is set anew in quick succession is not put off for ever.
@@ -100,9 +100,9 @@ class Alarms(Generic[T]):
         if self._timer is not None:
             self._timer.cancel()
         self._rings = step
-        self._timer = self._loop.call_at(step * STEP, self._ring)
+        self._timer = self._loop.call_at(step * STEP, self._fire)
 
-    def _ring(self) -> None:
+    def _fire(self) -> None:
         """Wake all that are due, as long as it is our turn."""
         self._timer, self._rings, self._ringing = None, math.inf, True
         now = self._loop.time()

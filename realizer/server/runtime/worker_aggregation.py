@@ -10,7 +10,7 @@ import socket
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 
-from realizer.server.http.metrics import summed
+from realizer.server.http.metrics import sum_samples
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ UNAVAILABLE = (
 )
 
 
-def _well(texts: Mapping[int, str], workers: int) -> str:
+def _combined_health(texts: Mapping[int, str], workers: int) -> str:
     """What `/healthz` tells of all: the sums, and who does not serve; it is well while one does."""
     sums: Counter[str] = Counter()
     for text in texts.values():
@@ -40,25 +40,25 @@ def _well(texts: Mapping[int, str], workers: int) -> str:
 
 # What is asked of all workers -> what their answers come to.
 _SUMS: Mapping[str, Callable[[Mapping[int, str], int], str]] = {
-    "/metrics": lambda texts, workers: summed(texts),
-    "/healthz": _well,
+    "/metrics": lambda texts, workers: sum_samples(texts),
+    "/healthz": _combined_health,
 }
 
 
-def is_for_all(line: str) -> bool:
+def is_for_all_workers(line: str) -> bool:
     """Whether the first line of a request asks what all workers can tell, and not one that it names."""
-    path, query = _asked_for(line)
+    path, query = _request_target(line)
     return path in _SUMS and not re.search(r"(^|&)worker=", query)
 
 
-def _asked_for(line: str) -> tuple[str, str]:
+def _request_target(line: str) -> tuple[str, str]:
     """Path and query of the first line of a request; ("", "") of one that does not only look."""
     method, _, rest = line.partition(" ")
     path, _, query = rest.partition(" ")[0].partition("?")
     return (path, query) if method == "GET" else ("", "")
 
 
-async def gathered(
+async def aggregate(
     client: socket.socket, workers: int, give: Callable[[int, socket.socket], Awaitable[None]]
 ) -> None:
     """Answer a request for the metrics, or the health, of all workers.
@@ -77,22 +77,24 @@ async def gathered(
             return
         request += data
 
-    path, _ = _asked_for(request.partition(b"\r\n")[0].decode("latin-1"))
+    path, _ = _request_target(request.partition(b"\r\n")[0].decode("latin-1"))
 
     async def ask(number: int) -> bytes | None:
         try:
             async with asyncio.timeout(HASTE if path == "/healthz" else PATIENCE):
-                return await _asked(request, number, give)
+                return await _ask_worker(request, number, give)
         except (OSError, TimeoutError) as error:
             log.warning("worker %d tells nothing for %s: %s", number, path, str(error) or "it takes too long")
             return None
 
     answers = await asyncio.gather(*map(ask, range(workers)))
     told = {k: answer for k, answer in enumerate(answers) if answer}
-    await loop.sock_sendall(client, _one(told, lambda texts: _SUMS[path](texts, workers)))
+    await loop.sock_sendall(client, _combine(told, lambda texts: _SUMS[path](texts, workers)))
 
 
-async def _asked(request: bytes, number: int, give: Callable[[int, socket.socket], Awaitable[None]]) -> bytes:
+async def _ask_worker(
+    request: bytes, number: int, give: Callable[[int, socket.socket], Awaitable[None]]
+) -> bytes:
     """What one worker answers."""
     loop = asyncio.get_running_loop()
     ours, theirs = socket.socketpair()
@@ -107,7 +109,7 @@ async def _asked(request: bytes, number: int, give: Callable[[int, socket.socket
     return answer
 
 
-def _one(answers: Mapping[int, bytes], come_to: Callable[[Mapping[int, str]], str]) -> bytes:
+def _combine(answers: Mapping[int, bytes], come_to: Callable[[Mapping[int, str]], str]) -> bytes:
     """The answers of workers, by their numbers, as one; the first refusal where there is one."""
     if not answers:
         return UNAVAILABLE

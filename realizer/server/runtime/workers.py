@@ -22,7 +22,7 @@ from realizer.core.errors import RealizerError
 from realizer.core.logs import write_words
 from realizer.core.settings import Settings
 from realizer.server.runtime.session_registry import worker_of
-from realizer.server.runtime.worker_aggregation import gathered, is_for_all
+from realizer.server.runtime.worker_aggregation import aggregate, is_for_all_workers
 
 log = logging.getLogger(__name__)
 
@@ -85,9 +85,9 @@ class Workers:
         self.port = self._sockets[0].getsockname()[1]
         try:
             for number in range(self._settings.workers):
-                self._children.append(self._begin(number))
+                self._children.append(self._start_worker(number))
             for _, control in self._children:
-                if (words := await _lacks(control)) is not None:
+                if (words := await _startup_error(control)) is not None:
                     raise WorkerError(words)
         except BaseException:
             await self.close()
@@ -103,7 +103,7 @@ class Workers:
         """Their numbers, in order."""
         return [child.pid for child, _ in self._children if child.pid is not None]
 
-    def end(self) -> None:
+    def stop_accepting(self) -> None:
         """Take no more connections; each worker gives what plays its time, and ends."""
         self._ending = True
         for here in self._sockets:
@@ -113,8 +113,8 @@ class Workers:
                 child.terminate()
 
     async def close(self) -> None:
-        """`end`, and wait for the workers; one that hangs is killed."""
-        self.end()
+        """`stop_accepting`, and wait for the workers; one that hangs is killed."""
+        self.stop_accepting()
         for task in self._tasks:
             task.cancel()
         loop = asyncio.get_running_loop()
@@ -134,7 +134,7 @@ class Workers:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _begin(self, number: int) -> tuple[BaseProcess, socket.socket]:
+    def _start_worker(self, number: int) -> tuple[BaseProcess, socket.socket]:
         ours, theirs = socket.socketpair()
         child = multiprocessing.get_context("spawn").Process(
             target=_work,
@@ -160,8 +160,8 @@ class Workers:
             fate = "are lost" if self._settings.journal is None else "go on when their clients come back"
             log.error("worker %d ended with status %s: its sessions %s", number, child.exitcode, fate)
             control.close()
-            self._children[number] = child, control = self._begin(number)
-            if (words := await _lacks(control)) is not None:
+            self._children[number] = child, control = self._start_worker(number)
+            if (words := await _startup_error(control)) is not None:
                 log.error("worker %d: %s", number, words)
                 await asyncio.sleep(1.0)  # no more than one try a second
 
@@ -176,19 +176,19 @@ class Workers:
                 log.error("a connection could not be taken: %s", error)
                 await asyncio.sleep(0.1)
                 continue
-            self._keep(self._hand(client))
+            self._keep(self._route(client))
 
-    async def _hand(self, client: socket.socket) -> None:
+    async def _route(self, client: socket.socket) -> None:
         """Look who it is for, and give it away."""
         with client, contextlib.suppress(TimeoutError, OSError):
             async with asyncio.timeout(PATIENCE):
                 line = await _first_line(client)
-                if is_for_all(line):
-                    await gathered(client, len(self._children), self._give)
+                if is_for_all_workers(line):
+                    await aggregate(client, len(self._children), self._pass_socket)
                 else:
-                    await self._give(self._number(line), client)
+                    await self._pass_socket(self._number(line), client)
 
-    async def _give(self, number: int, client: socket.socket) -> None:
+    async def _pass_socket(self, number: int, client: socket.socket) -> None:
         """Hand a connection over."""
         while True:
             try:
@@ -225,7 +225,7 @@ async def _first_line(client: socket.socket) -> str:
         await asyncio.sleep(STEP)
 
 
-async def _lacks(control: socket.socket) -> str | None:
+async def _startup_error(control: socket.socket) -> str | None:
     """Why a worker does not become ready; None once it is."""
     loop = asyncio.get_running_loop()
     if (first := await loop.sock_recv(control, 1)) == READY:
@@ -236,7 +236,7 @@ async def _lacks(control: socket.socket) -> str | None:
     return words.decode() or "a worker ended before it was ready"
 
 
-def handed(control: socket.socket) -> list[socket.socket]:
+def receive_sockets(control: socket.socket) -> list[socket.socket]:
     """The sockets that the parent has handed over since; none where it has ended."""
     data, numbers, _, _ = socket.recv_fds(control, 64, 64)
     if not data:

@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     from realizer.face.model import Face
 
 
-class Faces:
+class CharacterFaces:
     """The faces of characters, which are told by their index.
 
     Args:
         settings: the face of who has been given none, and what moves faces.
 
     Attributes:
-        given: index -> the face a client asked for, as it named it.
+        assigned: index -> the face a client asked for, as it named it.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self.given: dict[int, str] = {}
+        self.assigned: dict[int, str] = {}
 
     def check(self, name: str) -> None:
         """Whether it could be given: it is one of those that are listed.
@@ -46,7 +46,7 @@ class Faces:
     def name(self, index: int) -> str:
         from realizer.face.load import face_name
 
-        return face_name(self.given.get(index, self._settings.face))
+        return face_name(self.assigned.get(index, self._settings.face))
 
     def of(self, index: int) -> Face:
         """

@@ -9,12 +9,12 @@ from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import PlanningContext
 from realizer.playback.player import Player
-from realizer.protocol.messages.requests import Feeling, SetMessage
+from realizer.protocol.messages.requests import EmotionFields, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.tables import faps
 
 
-class Wrong(Exception):
+class FieldError(Exception):
     """A control message whose field `where` cannot be followed."""
 
     def __init__(self, where: str, text: str) -> None:
@@ -22,7 +22,7 @@ class Wrong(Exception):
         self.where = where
 
 
-def index_of(player: Player, character: str | None) -> int:
+def character_index(player: Player, character: str | None) -> int:
     """Return the index of a character of the session, which is added if it is new.
 
     Raises:
@@ -30,11 +30,11 @@ def index_of(player: Player, character: str | None) -> int:
     """
     known = player.characters
     if character not in (None, *known) and len(known) >= MAX_CHARACTERS:
-        raise Wrong("character", f"wanted at most {MAX_CHARACTERS} characters in a session")
+        raise FieldError("character", f"wanted at most {MAX_CHARACTERS} characters in a session")
     return player.character_index(character)
 
 
-def held(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:
+def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:
     """AUs (0..1) and FAPs (FAPU) by name, as a message holds them; None lets go.
 
     Args:
@@ -52,19 +52,19 @@ def held(message: SetMessage, before: Collection[str]) -> dict[str, float | None
     for name, value in (message.aus or {}).items():
         names = [n for n in (name, f"{name}L", f"{name}R") if n in AU_NAMES()]
         if not names:
-            raise Wrong("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
+            raise FieldError("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
         values |= dict.fromkeys(names, value)
     movable = {row.name for row in rows[2:]}
     for name, value in (message.faps or {}).items():
         if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
             name = rows[int(name) - 1].name
         if name not in movable:
-            raise Wrong("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
+            raise FieldError("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
         values[name] = value
     return values
 
 
-def feeling_of(asked: Feeling | None) -> dict[str, float]:
+def emotion_values(asked: EmotionFields | None) -> dict[str, float]:
     """Name of AU -> 0..1; {} for none.
 
     Raises:
@@ -80,4 +80,6 @@ def feeling_of(asked: Feeling | None) -> dict[str, float]:
         except ValueError as off:
             said = str(off)
     field, _, rest = said.partition(": ")
-    raise Wrong(*((f"emotion.{field}", rest) if field in Feeling.model_fields else ("emotion", said)))
+    raise FieldError(
+        *((f"emotion.{field}", rest) if field in EmotionFields.model_fields else ("emotion", said))
+    )

@@ -19,11 +19,11 @@ from realizer.protocol.messages.requests import (
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
-from realizer.server.documents.document_queue import Intake
-from realizer.server.session.character_faces import Faces
-from realizer.server.session.control_fields import Wrong, feeling_of, held, index_of
+from realizer.server.documents.document_queue import Submission
+from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 from realizer.server.session.subscriptions import Subscriptions
-from realizer.server.speech.audio_clips import ClipError, Clips
+from realizer.server.speech.audio_clips import AudioClips, ClipError
 from realizer.server.speech.speech_streams import SpeechError
 from realizer.server.streams.connection import Connection
 
@@ -38,16 +38,16 @@ class ControlHandlers:
     def __init__(
         self,
         player: Player,
-        faces: Faces,
-        clips: Clips,
-        intake: Intake,
+        faces: CharacterFaces,
+        clips: AudioClips,
+        submission: Submission,
         subscriptions: Subscriptions,
         reply: Callable[[int, Reply], None],
     ) -> None:
         self._player = player
         self._faces = faces
         self._clips = clips
-        self._intake = intake
+        self._submission = submission
         self._subscriptions = subscriptions
         self._reply = reply
 
@@ -59,7 +59,7 @@ class ControlHandlers:
         """
         try:
             self._handle(connection, message, t)
-        except (Wrong, SpeechError) as error:
+        except (FieldError, SpeechError) as error:
             where = f"{message.type}.{error.where}"
             id = message.id if isinstance(message, SpeechMessage) else None
             self._error(connection, "invalid", error, where, id)
@@ -98,28 +98,28 @@ class ControlHandlers:
 
     def _stop(self, message: Stop, t: float) -> None:
         """End what is known of these blocks; one that has ended by itself has only been quicker."""
-        intake, wanted = self._intake, None if message.blocks is None else set(message.blocks)
+        submission, wanted = self._submission, None if message.blocks is None else set(message.blocks)
         # What is not read may hold any of them.
-        unread = bool(intake.inbox)
-        known = intake.stop(wanted, t)
+        unread = bool(submission.queue)
+        known = submission.stop(wanted, t)
         self._player.stop(t, wanted)
         strange = [
             repr(id[:80])
             for id in message.blocks or ()
-            if not (unread or id in known or id in intake.speeches or self._player.blocks.has_seen(id))
+            if not (unread or id in known or id in submission.speeches or self._player.blocks.has_seen(id))
         ]
         if strange:
-            raise Wrong("blocks", f"wanted blocks that play or wait, got {', '.join(strange[:10])}")
+            raise FieldError("blocks", f"wanted blocks that play or wait, got {', '.join(strange[:10])}")
 
     def _speech(self, connection: Connection, message: SpeechMessage, t: float) -> None:
-        if message.clip is not None and (message.id is None or _annotates(message)):
-            self._clips.tell(message)
+        if message.clip is not None and (message.id is None or _has_annotation(message)):
+            self._clips.annotate(message)
         if message.id is None:
             return
         if message.clip is not None and message.clip not in self._clips.recordings:
-            raise Wrong("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
-        index_of(self._player, message.character)
-        self._intake.speeches.hear(message, connection.id, t)
+            raise FieldError("clip", f"wanted a clip that was sent to its last piece, got {message.clip!r}")
+        character_index(self._player, message.character)
+        self._submission.speeches.handle(message, connection.id, t)
 
     def _character(self, message: CharacterMessage) -> None:
         if message.face is not None:
@@ -128,21 +128,21 @@ class ControlHandlers:
             from realizer.speech.registry import find_voice
 
             find_voice(message.voice).close()  # one that is not there is said before anything is spoken
-        index = index_of(self._player, message.id)
+        index = character_index(self._player, message.id)
         if message.face is not None:
-            self._faces.given[index] = message.face
+            self._faces.assigned[index] = message.face
             self._subscriptions.announce_face_change(index)
         if message.voice is not None:
-            self._intake.voices[index] = message.voice
+            self._submission.voices[index] = message.voice
 
     def _set(self, message: SetMessage, t: float) -> None:
-        index = index_of(self._player, message.character)
-        values = held(message, self._player.direct_names(index))
+        index = character_index(self._player, message.character)
+        values = direct_values(message, self._player.direct_names(index))
         if "emotion" in message.model_fields_set:
-            self._player.set_emotion(feeling_of(message.emotion), t, index)
+            self._player.set_emotion(emotion_values(message.emotion), t, index)
         self._player.set_direct(values, t, index)
 
 
-def _annotates(message: SpeechMessage) -> bool:
+def _has_annotation(message: SpeechMessage) -> bool:
     """Whether it says what is in its clip; one that only names it changes nothing of that."""
     return bool(message.text is not None or message.words or message.phonemes or message.visemes)

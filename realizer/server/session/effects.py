@@ -21,11 +21,11 @@ class Speak:
     """Let a voice say it and answer `session.spoken(id, utterance or error, now)`."""
 
     id: int
-    say: SpeechRequest
+    request: SpeechRequest
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RenderOptions:
     """How pictures are drawn: `size` is width, height; the rest as `realizer.render.Renderer` takes it.
 
     Attributes:
@@ -43,7 +43,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draw:
-    """Draw one picture and answer `session.drawn(id, its bytes or error, now)`.
+    """Draw one picture and answer `session.on_picture(id, its bytes or error, now)`.
 
     `pose` is (k,) float32, a column for each thing the face takes.
     """
@@ -51,11 +51,11 @@ class Draw:
     id: int
     face: str
     pose: Float32
-    look: Look
+    options: RenderOptions
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class MoveConnection:
     """Take a connection to another session and let it have the feedback after `seen`; then say welcome."""
 
     connection: int
@@ -72,4 +72,4 @@ class Close:
     reason: str
 
 
-Effect = Send | Speak | Draw | Move | Close
+Effect = Send | Speak | Draw | MoveConnection | Close

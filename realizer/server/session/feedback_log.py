@@ -28,7 +28,7 @@ class _Pack(NamedTuple):
 
     messages: int
     characters: int
-    told: float
+    last_time: float
     data: bytes
 
 
@@ -44,7 +44,7 @@ class FeedbackFilter:
     elements: frozenset[str] | None = None
     character: str | None = None
 
-    def takes(self, text: str) -> bool:
+    def accepts(self, text: str) -> bool:
         """Whether a message is to be sent."""
         if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
             return False
@@ -86,14 +86,14 @@ class FeedbackLog:
         """
         self.newest += 1
         text = feedback.to_xml(self.newest, self._epoch)
-        self._keep(text, now)
+        self._store(text, now)
         return text
 
     def restore(self, newest: int, texts: Iterable[str], now: float) -> None:
         """Have told these messages, the last of which has the number `newest`."""
         self.newest = newest
         for text in texts:
-            self._keep(text, now)
+            self._store(text, now)
 
     def last(self) -> list[str]:
         """Return the newest messages, the oldest first: as many as a checkpoint has room for."""
@@ -106,7 +106,7 @@ class FeedbackLog:
             found.append(text)
         return found[::-1]
 
-    def _keep(self, text: str, now: float) -> None:
+    def _store(self, text: str, now: float) -> None:
         self._recent.append(text)
         self._count += 1
         self._size += len(text)
@@ -114,7 +114,7 @@ class FeedbackLog:
         if self._unpacked > 2 * PACK:
             self._pack(now)
         packs = self._packs
-        while packs and (self._count > MOST or (self._size > ROOM and packs[0].told < now - FRESH)):
+        while packs and (self._count > MOST or (self._size > ROOM and packs[0].last_time < now - FRESH)):
             self._count -= packs[0].messages
             self._size -= packs.popleft().characters
 

@@ -38,21 +38,21 @@ from realizer.protocol.messages.replies import (
 )
 from realizer.protocol.messages.requests import Hello, Ping, StateQuery, Subscribe, Unsubscribe
 from realizer.protocol.wire import WireError, unpack_clip
-from realizer.server.documents.document_queue import Intake, name_of
-from realizer.server.documents.limits import too_long
-from realizer.server.journal import JournalError, Lost, checkpoint
+from realizer.server.documents.document_queue import Submission, block_id_of
+from realizer.server.documents.limits import duration_error
+from realizer.server.journal import JournalError, TakenOver, checkpoint
 from realizer.server.journal.checkpoint import SessionState
 from realizer.server.journal.entry import Kind
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.session.character_faces import Faces
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.control_handlers import ControlHandlers
-from realizer.server.session.effects import Close, Effect, Move, Send
+from realizer.server.session.effects import Close, Effect, MoveConnection, Send
 from realizer.server.session.feedback_log import FeedbackLog
 from realizer.server.session.subscriptions import Subscriptions
-from realizer.server.session.wakeup_plan import Rhythm
-from realizer.server.session.welcome import greeting
-from realizer.server.speech.audio_clips import ClipError, Clips
-from realizer.server.streams.broadcast import Broadcast, Run
+from realizer.server.session.wakeup_plan import WakeupPlan
+from realizer.server.session.welcome import build_welcome
+from realizer.server.speech.audio_clips import AudioClips, ClipError
+from realizer.server.streams.broadcast import Broadcast, FrameRun
 from realizer.server.streams.connection import SLOW, STUCK, Connection
 from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
@@ -72,16 +72,17 @@ class Session:
         now: seconds on the caller's clock; the session's own clock starts here.
         named: it was asked for by name, and outlives its last connection by `settings.keep`.
         scene: where targets are, to begin with.
-        capabilities: what `welcome` tells.
+        capabilities: what `send_welcome` tells.
         epoch: POSIX seconds at `now`, told with every time; None leaves them out.
         log: the feedback log, in place of a new one.
 
     Attributes:
         ending: no more documents are taken.
-        log: the feedback that it has published.
+        feedback_log: the feedback that it has published.
 
-    `receive`, `spoken`, `drawn` and `tick` do the work; `outgoing` gives what the shell has to do after each
-    of them. `tick` is wanted when something is due (`next_due`), and at once while the session `reads`.
+    `receive`, `on_speech`, `on_picture` and `tick` do the work; `take_effects` gives what the shell has to do
+    after each of them. `tick` is wanted when something is due (`next_due`), and at once while the session
+    `has_documents`.
     """
 
     def __init__(
@@ -103,28 +104,28 @@ class Session:
         self.closed = False
         self.ending = False
         self.empty_since: float | None = now
-        self.notes = Notes(id)
-        self.faces = Faces(settings)
-        self.clips = Clips()
+        self.journal = JournalWriter(id)
+        self.faces = CharacterFaces(settings)
+        self.clips = AudioClips()
         self.player = Player(
             settings.play_options(scene),
             kinds=KINDS,
             clips=self.clips.recordings,
             face_inputs=lambda index: self.faces.of(index).inputs,
-            veto=lambda block, schedule: too_long(block, schedule, settings),
+            veto=lambda block, schedule: duration_error(block, schedule, settings),
         )
         self.capabilities = dict(capabilities or {})
         self.broadcast = Broadcast(self.player, self.faces)
-        self.intake = Intake(id, settings, self.player, self._owe)
+        self.submission = Submission(id, settings, self.player, self._add_effects)
         self._connections: dict[int, Connection] = {}
-        self.log = log or FeedbackLog(epoch)
+        self.feedback_log = log or FeedbackLog(epoch)
         self._effects: list[Effect] = []
-        self._rhythm = Rhythm(self.player, self.intake, self.broadcast, self._connections)
+        self._wakeups = WakeupPlan(self.player, self.submission, self.broadcast, self._connections)
         self.subscriptions = Subscriptions(
             settings, self.player, self.faces, self.broadcast, self._connections, self.reply
         )
         self._controls = ControlHandlers(
-            self.player, self.faces, self.clips, self.intake, self.subscriptions, self.reply
+            self.player, self.faces, self.clips, self.submission, self.subscriptions, self.reply
         )
 
     # connections --------------------------------------------------------------------------------
@@ -136,49 +137,49 @@ class Session:
 
     def connect(self, connection: int, now: float, seen: int | None = None) -> None:
         """A client joins; with `seen` it gets the feedback that followed, otherwise what is to come."""
-        self._rhythm.stir()
-        self._connections[connection] = Connection(connection, self.log.newest + 1)
-        if not self.note(now - self.opened, "join", connection):
+        self._wakeups.invalidate()
+        self._connections[connection] = Connection(connection, self.feedback_log.newest + 1)
+        if not self.log_entry(now - self.opened, "join", connection):
             return
         self.empty_since = None
         if seen is not None:
-            self.resume(connection, seen)
+            self.send_missed_feedback(connection, seen)
 
     def disconnect(self, connection: int, now: float) -> None:
         """A client is gone. A session nobody named ends with it."""
         if self._connections.pop(connection, None) is not None:
-            self.note(now - self.opened, "leave", connection)
-        self.intake.speeches.leave(connection)
-        self._rhythm.unsettled = True
-        self._rhythm.stir()
+            self.log_entry(now - self.opened, "leave", connection)
+        self.submission.speeches.on_disconnect(connection)
+        self._wakeups.unsettled = True
+        self._wakeups.invalidate()
         if not self._connections:
             self.empty_since = now
             if not self.named:
                 self.close()
 
-    def dropped(self, connection: int) -> int:
+    def dropped_count(self, connection: int) -> int:
         """How many frames, pictures and packets a client did not get because it was slow."""
         known = self._connections.get(connection)
         return 0 if known is None else known.dropped
 
-    def expired(self, now: float) -> bool:
+    def is_expired(self, now: float) -> bool:
         """Nobody has been here for `settings.keep` seconds."""
         return self.empty_since is not None and now >= self.empty_since + self.settings.keep
 
     def close(self) -> None:
         """End: nothing is done and nothing is sent after it."""
         self.closed = True
-        self._rhythm.stir()
+        self._wakeups.invalidate()
         self._connections.clear()
-        self.intake.inbox.clear()
+        self.submission.queue.clear()
         self._effects.clear()
 
-    def backlog(self, connection: int, waiting: int) -> None:
+    def update_backlog(self, connection: int, waiting: int) -> None:
         """How many bytes wait to be sent to a client: a slow one loses frames, a stuck one is closed."""
         if (known := self._connections.get(connection)) is not None:
-            known.slow = waiting > SLOW
-            if known.slow:
-                self._rhythm.stir()
+            known.is_slow = waiting > SLOW
+            if known.is_slow:
+                self._wakeups.invalidate()
             if waiting > STUCK:
                 reason = f"{waiting} bytes wait to be read; come back with the session's name and seen"
                 self._effects.append(Close(connection, 1013, reason))
@@ -196,11 +197,11 @@ class Session:
         self._publish(t)
         if self.broadcast.active:
             self._effects += self.broadcast.frames_due(t)[0]
-        if self.notes.grown and not self._compact(t):
+        if self.journal.needs_checkpoint and not self._compact(t):
             return
         kept = self._dispatch(self._connections[connection], message, t)
         if not self.closed and self._work(t) and not kept:
-            self.note(t, "tick")
+            self.log_entry(t, "tick")
 
     def _dispatch(self, connection: Connection, message: str | bytes, t: float) -> bool:
         """Do what a message asks for, or reply why not; returns whether it is in the journal."""
@@ -217,12 +218,12 @@ class Session:
         else:
             words = self._write_journal(t, "text", connection, message)
         if words is None:
-            self.intake.put(message, t)
+            self.submission.enqueue(message, t)
         else:
             # Not by the player, which would number it: it is not in the journal, and who goes on with the
             # session from there would number all else otherwise.
-            told = WarningFeedback(id=name_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words)
-            self.tell(told.to_xml())
+            told = WarningFeedback(id=block_id_of(message), type="CANNOT_CREATE_BEHAVIOR", text=words)
+            self.send_unnumbered(told.to_xml())
         return words is None
 
     def _receive_sound(self, connection: Connection, message: bytes, t: float) -> bool:
@@ -230,7 +231,7 @@ class Session:
             self.reply(connection.id, ErrorMessage(code="journal", message=words))
             return False
         try:
-            self.clips.take(unpack_clip(message))
+            self.clips.add_chunk(unpack_clip(message))
         except WireError as error:
             self.reply(connection.id, ErrorMessage(code="unsupported", message=str(error)))
         except ClipError as error:
@@ -243,7 +244,7 @@ class Session:
             self._handle(connection, control, t)
             for name in self.player.characters:
                 if name not in known:  # who is named first is who moves where nobody is named
-                    self.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
+                    self.log_entry(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
             return False
         if (words := self._write_journal(t, "text", connection, message)) is not None:
             self.reply(connection.id, ErrorMessage(code="journal", message=words))
@@ -268,20 +269,20 @@ class Session:
             self.reply(connection.id, ErrorMessage(code="version", message=words, where="hello.version"))
         elif message.session not in (None, self.id):
             assert message.session is not None
-            self._effects.append(Move(connection.id, message.session, message.seen))
+            self._effects.append(MoveConnection(connection.id, message.session, message.seen))
         else:
-            self.welcome(connection.id, t + self.opened)
+            self.send_welcome(connection.id, t + self.opened)
             if message.seen is not None:
-                self.resume(connection.id, message.seen)
+                self.send_missed_feedback(connection.id, message.seen)
 
     def _state(self, connection: Connection, t: float) -> StateMessage:
         state = self.player.state(t)
         preparing = [
             BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
-            for w in self.intake.preparation.waiting
+            for w in self.submission.pending.blocks
         ]
         faces = [
-            CharacterState(face=self.faces.name(index), voice=self.intake.voices.get(index), **face)
+            CharacterState(face=self.faces.name(index), voice=self.submission.voices.get(index), **face)
             for index, face in enumerate(state["characters"])
         ]
         return StateMessage(
@@ -289,7 +290,7 @@ class Session:
             time=t,
             blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
             characters=faces,
-            voice=VoiceState(name=self.settings.voice, fault=self.intake.orders.fault),
+            voice=VoiceState(name=self.settings.voice, fault=self.submission.tts.fault),
             connections=len(self._connections),
             dropped=connection.dropped,
         )
@@ -301,21 +302,21 @@ class Session:
     ) -> str | None:
         """Write a message to the journal; returns why it is not taken, or None once it is there."""
         try:
-            self.notes.keep(t, kind, connection.id, message)
-        except Lost as error:
-            self.lose(error)
+            self.journal.append(t, kind, connection.id, message)
+        except TakenOver as error:
+            self.hand_over(error)
             return str(error)
         except JournalError as error:
             log.error("session %s: %s", self.id, error)
             return f"this could not be kept, so it is not taken: {error}"
         return None
 
-    def note(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
+    def log_entry(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
         """Write into the journal what has happened; False where the session is another process's now."""
         try:
-            self.notes.tell(t, kind, number, body)
-        except Lost as error:
-            self.lose(error)
+            self.journal.try_append(t, kind, number, body)
+        except TakenOver as error:
+            self.hand_over(error)
             return False
         return True
 
@@ -328,31 +329,34 @@ class Session:
         Args:
             t: seconds on the session clock; what was due until then was told.
         """
-        if not (self.intake.resting and self.player.is_idle(t if self.notes.overgrown else float("-inf"))):
+        if not (
+            self.submission.is_idle
+            and self.player.is_idle(t if self.journal.is_far_too_long else float("-inf"))
+        ):
             return True
         try:
-            if self.notes.compact(checkpoint.write(self._saved(t), self.clips.changes())):
+            if self.journal.compact(checkpoint.write(self._state_to_save(t), self.clips.changes())):
                 self.clips.settle()
-        except Lost as error:
-            self.lose(error)
+        except TakenOver as error:
+            self.hand_over(error)
             return False
         return True
 
-    def _saved(self, t: float) -> SessionState:
+    def _state_to_save(self, t: float) -> SessionState:
         past, expected = self.player.blocks.snapshot()
         return SessionState(
             at=t,
             connections=self.connections,
-            seq=self.log.newest,
-            told=self.log.last(),
+            seq=self.feedback_log.newest,
+            last_messages=self.feedback_log.last(),
             scene=self.player.context.scene,
             characters=self.player.character_states,
-            faces=self.faces.given,
-            voices=self.intake.voices,
+            faces=self.faces.assigned,
+            voices=self.submission.voices,
             past=past,
             expected=expected,
-            spoken=self.intake.orders.placed,
-            fault=self.intake.orders.fault,
+            request_count=self.submission.tts.request_count,
+            fault=self.submission.tts.fault,
             clips=self.clips.ids,
         )
 
@@ -371,23 +375,23 @@ class Session:
         state, clips = checkpoint.read(self.id, parts)
         self.player.set_scene(state.scene)
         self.player.restore(state.characters, state.past, state.expected)
-        self.faces.given.update(state.faces)
-        self.intake.voices.update(state.voices)
-        self.intake.orders.placed, self.intake.orders.fault = state.spoken, state.fault
+        self.faces.assigned.update(state.faces)
+        self.submission.voices.update(state.voices)
+        self.submission.tts.request_count, self.submission.tts.fault = state.request_count, state.fault
         self.clips.restore(clips)
-        self.log.restore(state.seq, state.told, state.at)
+        self.feedback_log.restore(state.seq, state.last_messages, state.at)
         for connection in state.connections:
             self.connect(connection, state.at)
         return state.at
 
-    def lose(self, error: Lost) -> None:
+    def hand_over(self, error: TakenOver) -> None:
         """Another process has the session: let everybody go, to come back there."""
         log.warning("%s", error)
         closing: list[Effect] = [Close(connection, 1012, str(error)) for connection in self._connections]
         self.close()
         self._effects = closing
 
-    def spoken(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
+    def on_speech(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
         """The voice's answer to a Speak. Where it failed, the silent voice takes over."""
         if self.closed:
             return
@@ -395,17 +399,17 @@ class Session:
         self._publish(t)
         if self.broadcast.active:
             self._effects += self.broadcast.frames_due(t)[0]
-        if self.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
-            self._effects += self.intake.orders.answer(speak, result, t)
+        if self.log_entry(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
+            self._effects += self.submission.tts.answer(speak, result, t)
             self._work(t)
 
-    def drawn(self, draw: int, result: bytes | RealizerError, now: float) -> None:
+    def on_picture(self, draw: int, result: bytes | RealizerError, now: float) -> None:
         """The renderer's answer to a Draw: a picture. Where it failed, pictures end with an error."""
         if self.closed:
             return
-        self._rhythm.stir()
+        self._wakeups.invalidate()
         picture = result if isinstance(result, bytes) else None
-        effects, lookers = self.broadcast.pictures.drawn(draw, picture, self._connections.values())
+        effects, lookers = self.broadcast.video.on_picture(draw, picture, self._connections.values())
         self._effects += effects
         if not isinstance(result, bytes):
             for connection in lookers:
@@ -416,15 +420,15 @@ class Session:
 
     # time ---------------------------------------------------------------------------------------
 
-    def tick(self, now: float, *, reads: bool = True) -> None:
+    def tick(self, now: float, *, read_documents: bool = True) -> None:
         """Do what is due: feedback, sound and frames first, then read or plan one document at most.
 
         Args:
-            reads: or leave documents for another time.
+            read_documents: or leave documents for another time.
         """
         t = now - self.opened
-        if not self.closed and self._work(t, reads):
-            self.note(t, "tick")
+        if not self.closed and self._work(t, read_documents):
+            self.log_entry(t, "tick")
 
     def frames(self, now: float) -> tuple[list[Effect], float] | None:
         """These, and feedback, and the `next_due` after them where nothing else is due.
@@ -433,30 +437,30 @@ class Session:
             None where `tick` is wanted, which does the same and more.
         """
         t = now - self.opened
-        rhythm = self._rhythm
-        if not rhythm.calm(t):
+        rhythm = self._wakeups
+        if not rhythm.only_frames_due(t):
             return None
-        if rhythm.tells(t):
+        if rhythm.feedback_due(t):
             plans = self.player.version
             self._publish(t)
-            rhythm.told(plans)
+            rhythm.feedback_sent(plans)
         sends, following = self.broadcast.frames_due(t)
         effects, self._effects = [*self._effects, *sends], []
-        return effects, rhythm.go_on(following, self.opened) + self.opened
+        return effects, rhythm.next_after_frames(following, self.opened) + self.opened
 
     @property
-    def run(self) -> Run | None:
+    def fast_path(self) -> FrameRun | None:
         """The frames of its only client for which nobody need ask it; None where there is more to it."""
-        return self._rhythm.run
+        return self._wakeups.fast_path
 
-    def rest(self, now: float) -> None:
+    def compact_journal(self, now: float) -> None:
         """Keep the journal short, where it has grown; what is due is told first."""
-        if self.notes.grown and not self.closed:
-            self._rhythm.stir()
+        if self.journal.needs_checkpoint and not self.closed:
+            self._wakeups.invalidate()
             self._publish(now - self.opened)
             self._compact(now - self.opened)
 
-    def pass_time(
+    def replay_until(
         self, t: float, look: Callable[[float], None] = lambda t: None, *, since: float = 0.0
     ) -> None:
         """Tell what comes due before `t` on the session clock, each at its own time; for who replays it.
@@ -470,46 +474,46 @@ class Session:
             look(due)
             self._publish(due)
 
-    def _work(self, t: float, reads: bool = True) -> bool:
+    def _work(self, t: float, read_documents: bool = True) -> bool:
         """What `tick` does; False where nothing came of it but what plays."""
-        self._rhythm.unsettled = False
-        self._rhythm.stir()
+        self._wakeups.unsettled = False
+        self._wakeups.invalidate()
         self._publish(t)
         if self.broadcast.active or any(one.subscriptions for one in self._connections.values()):
-            self.broadcast.gets(self._connections.values())
-            self.broadcast.due(t, self._effects)
-        if self.intake.preparation.waiting:
-            self._effects += self.intake.orders.overdue(t + EPSILON)
+            self.broadcast.set_subscribers(self._connections.values())
+            self.broadcast.send_due(t, self._effects)
+        if self.submission.pending.blocks:
+            self._effects += self.submission.tts.expire(t + EPSILON)
         # Reading and planning are ticks of their own: the acknowledgement is on its way before planning
         # begins, and frames that are due come in between.
-        if not reads:
+        if not read_documents:
             return False
-        done = self.intake.submit_ready(t) or self.intake.read_one(t)
-        if self.intake.speeches.settle(t) or done:
+        done = self.submission.plan_next(t) or self.submission.parse_next(t)
+        if self.submission.speeches.advance(t) or done:
             self._publish(t)
             return True
         return False
 
     @property
-    def reads(self) -> bool:
+    def has_documents(self) -> bool:
         """A document can be read or planned at once."""
-        return not self.closed and self._rhythm.reads
+        return not self.closed and self._wakeups.has_documents
 
     def next_due(self) -> float:
         """When something is due that is no document, on the caller's clock; infinite where nothing is."""
-        return float("inf") if self.closed else self._rhythm.next() + self.opened
+        return float("inf") if self.closed else self._wakeups.next() + self.opened
 
     @property
     def busy(self) -> bool:
         """A block plays, waits or is being prepared."""
         return bool(
-            self.intake.inbox or len(self.intake.preparation) or self.player.next_deadline() is not None
+            self.submission.queue or len(self.submission.pending) or self.player.next_deadline() is not None
         )
 
-    def _owe(self, effects: Iterable[Effect]) -> None:
+    def _add_effects(self, effects: Iterable[Effect]) -> None:
         self._effects += effects
 
-    def outgoing(self) -> list[Effect]:
+    def take_effects(self) -> list[Effect]:
         """What the shell has to do, in order; each is told once."""
         effects, self._effects = self._effects, []
         return effects
@@ -521,39 +525,39 @@ class Session:
         texts: list[str] = []
         while due := self.player.due(t + EPSILON):
             for feedback in due:
-                told, ends = self.intake.speeches.told(feedback)
-                texts.append(self.log.add(told, t))
+                told, ends = self.submission.speeches.process_feedback(feedback)
+                texts.append(self.feedback_log.add(told, t))
                 if ends:
-                    self.intake.end(ends, t)
+                    self.submission.end(ends, t)
         if texts:
             for connection in self._connections.values():
                 self._send_feedback(connection, texts)
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
-        connection.place = self.log.newest + 1
+        connection.next_seq = self.feedback_log.newest + 1
         if (wanted := connection.feedback) is not None:
-            self._effects += [Send(connection.id, text) for text in texts if wanted.takes(text)]
+            self._effects += [Send(connection.id, text) for text in texts if wanted.accepts(text)]
 
-    def tell(self, feedback: str) -> None:
+    def send_unnumbered(self, feedback: str) -> None:
         """Send everybody who takes it feedback that has no number: nobody who comes back gets it again."""
         for one in self._connections.values():
-            if one.feedback is not None and one.feedback.takes(feedback):
+            if one.feedback is not None and one.feedback.accepts(feedback):
                 self._effects.append(Send(one.id, feedback))
 
-    def resume(self, connection: int, seen: int) -> None:
+    def send_missed_feedback(self, connection: int, seen: int) -> None:
         """Send what followed `seen`, after a `gap` where some of it is gone or was never there."""
-        first = self.log.first
-        if seen + 1 < first or seen > self.log.newest:
+        first = self.feedback_log.first
+        if seen + 1 < first or seen > self.feedback_log.newest:
             self.reply(connection, Gap(seen=seen, first=first))
             seen = first - 1
         known = self._connections[connection]
-        known.place = seen + 1
-        self._send_feedback(known, self.log.since(known.place))
+        known.next_seq = seen + 1
+        self._send_feedback(known, self.feedback_log.since(known.next_seq))
 
-    def welcome(self, connection: int, now: float) -> None:
+    def send_welcome(self, connection: int, now: float) -> None:
         """Tell a client where it is and what there is."""
-        t, seq = now - self.opened, self.log.newest
-        self.reply(connection, greeting(self.id, t, seq, self.settings, self.capabilities))
+        t, seq = now - self.opened, self.feedback_log.newest
+        self.reply(connection, build_welcome(self.id, t, seq, self.settings, self.capabilities))
 
     def reply(self, connection: int, reply: Reply) -> None:
         if not self.closed:

@@ -9,23 +9,23 @@ from typing import Any
 from realizer.core.settings import Settings, raises
 from realizer.playback.player import Player
 from realizer.protocol.messages.common import PICTURES, Reply
-from realizer.protocol.messages.replies import Changed, Subscribed
+from realizer.protocol.messages.replies import FaceChanged, Subscribed
 from realizer.protocol.messages.requests import Subscribe, Unsubscribe
 from realizer.protocol.streams import STREAMS
-from realizer.server.documents.limits import MAX_CHARACTERS, too_many_pixels
-from realizer.server.session.character_faces import Faces
-from realizer.server.session.control_fields import Wrong, index_of
-from realizer.server.session.effects import Look
+from realizer.server.documents.limits import MAX_CHARACTERS, pixel_rate_error
+from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.control_fields import FieldError, character_index
+from realizer.server.session.effects import RenderOptions
 from realizer.server.session.feedback_log import FeedbackFilter
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.connection import (
+    AudioSubscription,
     Connection,
     FrameSubscription,
-    PictureSubscription,
-    PlanSubscription,
-    SoundSubscription,
+    ScheduleSubscription,
     Subscription,
-    View,
+    VideoSubscription,
+    VideoView,
 )
 from realizer.server.streams.frame_windows import SOURCES
 
@@ -66,7 +66,7 @@ class Subscriptions:
         self,
         settings: Settings,
         player: Player,
-        faces: Faces,
+        faces: CharacterFaces,
         broadcast: Broadcast,
         connections: Mapping[int, Connection],
         reply: Callable[[int, Reply], None],
@@ -89,14 +89,14 @@ class Subscriptions:
         encodings = STREAMS[stream].encodings
         encoding = message.encoding or encodings[0]
         if encoding not in encodings:
-            raise Wrong("encoding", f"wanted {' or '.join(encodings)} for {stream}, got {encoding}")
+            raise FieldError("encoding", f"wanted {' or '.join(encodings)} for {stream}, got {encoding}")
         told: dict[str, Any]
         if stream == "feedback":
             elements = None if message.elements is None else frozenset(message.elements)
             connection.feedback = FeedbackFilter(elements, message.character)
             told = {"elements": message.elements}
         else:
-            index = index_of(self._player, message.character)
+            index = character_index(self._player, message.character)
             key = self._key(message)
             fps, old = message.fps or self._settings.fps, connection.subscriptions.get(key)
             request = _Request(connection, message, encoding, index, fps, old, t)
@@ -118,12 +118,12 @@ class Subscriptions:
         """Tell the subscribers of a character's meshes what these mean from now on."""
         for connection, mesh in self._broadcast.face_changed(index):
             told = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
-            self._reply(connection, Changed(**told, **self._mesh(index)))
+            self._reply(connection, FaceChanged(**told, **self._mesh(index)))
 
-    def views(self, but: Subscription | None = None) -> list[View]:
+    def views(self, but: Subscription | None = None) -> list[VideoView]:
         """Return the pictures that are drawn, each once, without those of one subscription."""
         subscriptions = [s for c in self._connections.values() for s in c.subscriptions.values()]
-        looking = [s for s in subscriptions if isinstance(s, PictureSubscription) and s is not but]
+        looking = [s for s in subscriptions if isinstance(s, VideoSubscription) and s is not but]
         return list({s.view.key: s.view for s in looking}.values())
 
     # one method for each kind of stream -----------------------------------------------------------
@@ -131,18 +131,18 @@ class Subscriptions:
     def _audio(self, request: _Request) -> _Answer:
         message, old = request.message, request.old
         one = None if message.character is None else request.index
-        made = self._broadcast.sound(one, message.rate, request.t)
-        if isinstance(old, SoundSubscription) and old.sound is made.sound:
+        made = self._broadcast.subscribe_audio(one, message.rate, request.t)
+        if isinstance(old, AudioSubscription) and old.sound is made.sound:
             made = old  # what was sent ahead is not sent again
         return made, {"index": request.index, "rate": message.rate, "frame": made.next, "fps": 50.0}
 
     def _video(self, request: _Request) -> _Answer:
         message, index, fps = request.message, request.index, request.fps
-        made = self._broadcast.look(index, fps, self._look(message, index), request.t)
+        made = self._broadcast.subscribe_video(index, fps, self._look(message, index), request.t)
         views = [view for view in self.views(but=request.old) if view is not made.view]
-        beside = sum(view.look.size[0] * view.look.size[1] * view.timeline.fps for view in views)
-        if (beyond := too_many_pixels(message.size, fps, self._settings, beside)) is not None:
-            raise Wrong("fps", beyond)
+        beside = sum(view.options.size[0] * view.options.size[1] * view.timeline.fps for view in views)
+        if (beyond := pixel_rate_error(message.size, fps, self._settings, beside)) is not None:
+            raise FieldError("fps", beyond)
         if message.view is not None:
             made.index = _index_of_view(request)
         return made, {
@@ -159,13 +159,15 @@ class Subscriptions:
         message, index, old, fps = request.message, request.index, request.old, request.fps
         stream = message.stream
         told = self._mesh(index) if stream == "mesh" else {"names": SOURCES[stream].names()}
-        made = self._broadcast.frames(stream, request.encoding, index, message.character, fps, request.t)
-        made.asked = message.asked
+        made = self._broadcast.subscribe_frames(
+            stream, request.encoding, index, message.character, fps, request.t
+        )
+        made.raw = message.asked
         if isinstance(old, FrameSubscription) and old.timeline is made.timeline:
             made.next = max(made.next, old.next)  # no frame twice
         return made, told | {"index": index, "fps": fps, "frame": made.next}
 
-    def _look(self, message: Subscribe, index: int) -> Look:
+    def _look(self, message: Subscribe, index: int) -> RenderOptions:
         from realizer.render.cameras import camera_names
         from realizer.render.light import presets
 
@@ -173,18 +175,22 @@ class Subscriptions:
         largest = settings.max_size
         if not all(16 <= side <= largest for side in message.size):
             words = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {raises('max_size')}"
-            raise Wrong("size", words)
+            raise FieldError("size", words)
         if message.light is not None and message.light not in presets():
-            raise Wrong("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
+            raise FieldError("light", f"wanted one of {', '.join(presets())}, got {message.light!r}")
         face = self._faces.of(index)
         if message.camera is not None and message.camera not in camera_names(face):
-            raise Wrong("camera", f"wanted one of {', '.join(camera_names(face))}, got {message.camera!r}")
+            raise FieldError(
+                "camera", f"wanted one of {', '.join(camera_names(face))}, got {message.camera!r}"
+            )
         behind = message.background or settings.background
         if message.format == "jpeg" and behind == "transparent":
             if message.background is not None:
-                raise Wrong("background", "wanted the format png or webp for what is transparent, got jpeg")
+                raise FieldError(
+                    "background", "wanted the format png or webp for what is transparent, got jpeg"
+                )
             behind = None  # the service's own: a JPEG has the light's backdrop instead
-        return Look(
+        return RenderOptions(
             size=message.size,
             camera=message.camera or settings.camera,
             light=message.light or settings.light,
@@ -218,15 +224,15 @@ class Subscriptions:
 
 def _schedule(request: _Request) -> _Answer:
     name = request.message.character
-    return PlanSubscription(None if name is None else request.index, name), {}
+    return ScheduleSubscription(None if name is None else request.index, name), {}
 
 
 def _index_of_view(request: _Request) -> int:
     """Return the index of a view's pictures, which no other view of its connection has."""
-    if isinstance(request.old, PictureSubscription):
+    if isinstance(request.old, VideoSubscription):
         return request.old.index
     others = request.connection.subscriptions.values()
-    free = set(range(MAX_CHARACTERS, 256)) - {s.index for s in others if isinstance(s, PictureSubscription)}
+    free = set(range(MAX_CHARACTERS, 256)) - {s.index for s in others if isinstance(s, VideoSubscription)}
     if not free:
-        raise Wrong("view", f"wanted at most {256 - MAX_CHARACTERS} views")
+        raise FieldError("view", f"wanted at most {256 - MAX_CHARACTERS} views")
     return min(free)

@@ -13,7 +13,7 @@ from realizer.protocol.streams import STREAMS
 from realizer.server.documents.limits import MAX_CHARACTERS
 
 
-def greeting(id: str, t: float, seq: int, s: Settings, capabilities: Mapping[str, Any]) -> Welcome:
+def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mapping[str, Any]) -> Welcome:
     """Return the answer to `hello`.
 
     Args:

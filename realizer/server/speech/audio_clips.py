@@ -14,14 +14,14 @@ import numpy as np
 from realizer.behaviours.sound_file import RATES, read_sound
 from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError
-from realizer.protocol.messages.speech import SpeechMessage, Timed
+from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
 from realizer.speech.recorded.viseme_names import sound_of
 from realizer.speech.utterance import Phoneme, Recording, Word
 
-MOST_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest go
-MOST_CLIPS = 1000  # of a session
-MOST_TIMES = 20_000  # words, or phonemes, of one clip
+MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest go
+MAX_CLIPS = 1000  # of a session
+MAX_TIMES = 20_000  # words, or phonemes, of one clip
 
 
 class ClipError(RealizerError):
@@ -40,15 +40,15 @@ class Clip:
     rate: int = 0
     sound: tuple[int, Int16] | None = None
     text: str | None = None
-    words: list[Timed] = field(default_factory=list)
-    phonemes: list[Timed] = field(default_factory=list)
-    told: bool = True
+    words: list[TimedText] = field(default_factory=list)
+    phonemes: list[TimedText] = field(default_factory=list)
+    is_annotated: bool = True
 
     @property
     def size(self) -> int:
         return sum(map(len, self.pieces)) if self.sound is None else self.sound[1].nbytes
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """All of it, as JSON can hold it."""
         sound = None
         if self.sound is not None:
@@ -60,12 +60,12 @@ class Clip:
             "text": self.text,
             "words": [one.model_dump() for one in self.words],
             "phonemes": [one.model_dump() for one in self.phonemes],
-            "told": self.told,
+            "told": self.is_annotated,
         }
 
     @classmethod
-    def of(cls, told: Mapping[str, Any]) -> Clip:
-        """Return the clip that `plain` wrote.
+    def from_json(cls, told: Mapping[str, Any]) -> Clip:
+        """Return the clip that `to_json` wrote.
 
         Raises:
             KeyError, TypeError, ValueError: it is none.
@@ -74,12 +74,12 @@ class Clip:
         if told["sound"] is not None:
             pcm = np.frombuffer(base64.b64decode(told["sound"]["pcm"]), "<i2")
             sound = int(told["sound"]["rate"]), pcm.astype(np.int16, copy=False)
-        words, phonemes = ([Timed(**one) for one in told[of]] for of in ("words", "phonemes"))
+        words, phonemes = ([TimedText(**one) for one in told[of]] for of in ("words", "phonemes"))
         pieces = [base64.b64decode(piece) for piece in told["pieces"]]
         return cls(pieces, told["rate"], sound, told["text"], words, phonemes, told["told"])
 
 
-class Clips:
+class AudioClips:
     """The sound clips of one session.
 
     Attributes:
@@ -99,7 +99,7 @@ class Clips:
     def changes(self) -> dict[str, str | None]:
         """Id -> JSON of each clip that has changed since `settle`, None of one that is gone."""
         return {
-            id: json.dumps(clip.plain(), ensure_ascii=False) if (clip := self._clips.get(id)) else None
+            id: json.dumps(clip.to_json(), ensure_ascii=False) if (clip := self._clips.get(id)) else None
             for id in sorted(self._changed)
         }
 
@@ -113,7 +113,7 @@ class Clips:
             self._clips[id] = clip
             self._publish(id, clip)
 
-    def take(self, piece: ClipPiece) -> None:
+    def add_chunk(self, piece: ClipPiece) -> None:
         """One more piece of a clip.
 
         Raises:
@@ -137,14 +137,14 @@ class Clips:
             raise ClipError(where, f"wanted {RATES[0]}..{RATES[1]} Hz, or 0 for a file, got {piece.rate}")
         if piece.rate and len(piece.sound) % 2:
             raise ClipError(where, f"wanted samples of two bytes, got {len(piece.sound)} bytes")
-        if clip.size + len(piece.sound) > MOST_BYTES:
-            raise ClipError(where, f"wanted at most {MOST_BYTES} bytes, got {clip.size + len(piece.sound)}")
+        if clip.size + len(piece.sound) > MAX_BYTES:
+            raise ClipError(where, f"wanted at most {MAX_BYTES} bytes, got {clip.size + len(piece.sound)}")
         clip.pieces.append(piece.sound)
         if piece.final:
-            self._whole(piece.id, clip)
+            self._complete(piece.id, clip)
         self._make_room(piece.id)
 
-    def tell(self, message: SpeechMessage) -> None:
+    def annotate(self, message: SpeechMessage) -> None:
         """What is said in a clip, and when.
 
         Raises:
@@ -154,18 +154,18 @@ class Clips:
         phonemes = [*message.phonemes, *_sounds(message)]
         self._changed.add(message.clip)
         clip = self._clips.get(message.clip) or Clip()
-        before: tuple[list[Timed], list[Timed], str | None]
-        before = ([], [], None) if clip.told else (clip.words, clip.phonemes, clip.text)
+        before: tuple[list[TimedText], list[TimedText], str | None]
+        before = ([], [], None) if clip.is_annotated else (clip.words, clip.phonemes, clip.text)
         for name, old, new in (("words", before[0], message.words), ("phonemes", before[1], phonemes)):
             times = [one.start for one in (*old[-1:], *new)]
             if any(later < sooner for sooner, later in pairwise(times)):
                 raise ClipError(f"speech.{name}", "wanted times that rise, got some that go back")
-            if len(old) + len(new) > MOST_TIMES:
-                raise ClipError(f"speech.{name}", f"wanted at most {MOST_TIMES}, got more")
+            if len(old) + len(new) > MAX_TIMES:
+                raise ClipError(f"speech.{name}", f"wanted at most {MAX_TIMES}, got more")
         clip.words = [*before[0], *message.words]
         clip.phonemes = [*before[1], *phonemes]
         clip.text = before[2] if message.text is None else message.text
-        clip.told = message.final
+        clip.is_annotated = message.final
         self._clips[message.clip] = clip
         self._publish(message.clip, clip)
         self._make_room(message.clip)
@@ -175,7 +175,7 @@ class Clips:
         self._clips[id] = Clip()
         return self._clips[id]
 
-    def _whole(self, id: str, clip: Clip) -> None:
+    def _complete(self, id: str, clip: Clip) -> None:
         content, clip.pieces = b"".join(clip.pieces), []
         try:
             if clip.rate:
@@ -192,7 +192,7 @@ class Clips:
 
     def _publish(self, id: str, clip: Clip) -> None:
         self.recordings.pop(id, None)
-        if clip.sound is None or not clip.told:
+        if clip.sound is None or not clip.is_annotated:
             return
         rate, pcm = clip.sound
         whole = len(pcm) / rate
@@ -206,7 +206,7 @@ class Clips:
     def _make_room(self, newest: str) -> None:
         """Forget the oldest clips where there are too many; what plays has its sound already."""
         sizes = {id: clip.size for id, clip in self._clips.items()}
-        while sum(sizes.values()) > MOST_BYTES or len(sizes) > MOST_CLIPS:
+        while sum(sizes.values()) > MAX_BYTES or len(sizes) > MAX_CLIPS:
             oldest = next(id for id in sizes if id != newest)
             del sizes[oldest], self._clips[oldest]
             self._changed.add(oldest)
@@ -217,7 +217,7 @@ def _text(data: bytes) -> str:
     return base64.b64encode(data).decode()
 
 
-def _sounds(message: SpeechMessage) -> list[Timed]:
+def _sounds(message: SpeechMessage) -> list[TimedText]:
     """Visemes as sounds with such mouths."""
     try:
         return [
@@ -227,7 +227,7 @@ def _sounds(message: SpeechMessage) -> list[Timed]:
         raise ClipError("speech.visemes", str(error.args[0])) from None
 
 
-def _spans(timed: Sequence[Timed], whole: float) -> list[tuple[float, float, str]]:
+def _spans(timed: Sequence[TimedText], whole: float) -> list[tuple[float, float, str]]:
     """(start, end, text): without an end up to the next one's start."""
     starts = [*(one.start for one in timed[1:]), whole]
     return [

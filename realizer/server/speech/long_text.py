@@ -11,7 +11,7 @@ import numpy as np
 
 from realizer.core.array_types import Int16
 from realizer.playback.audio_mix import resample
-from realizer.server.speech.sentence_splitter import TAG, Clauses, whole
+from realizer.server.speech.sentence_splitter import TAG, SentenceSplitter, is_sentence
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 
@@ -31,21 +31,21 @@ COMMA = 0.15  # s
 QUOTES: Mapping[str, str] = {"&quot;": '"', "&apos;": "'"}
 
 
-class Growing:
+class LongText:
     """A text that is said part by part.
 
     Args:
-        say: the whole of it.
+        request: the whole of it.
 
     Attributes:
-        made: seconds of sound that are there.
+        ready_until: seconds of sound that are there.
     """
 
-    def __init__(self, say: SpeechRequest) -> None:
-        self.made = 0.0
-        self._say = say
+    def __init__(self, request: SpeechRequest) -> None:
+        self.ready_until = 0.0
+        self._say = request
         # Taken apart as it is said: that of a long text takes a while too.
-        self._parts = _parts(say.ssml)
+        self._parts = _parts(request.ssml)
         self._coming = next(self._parts, None)
         self._asked: str | None = None
         self._characters = 0  # that are there
@@ -58,9 +58,9 @@ class Growing:
         self._rate = 0
 
     @staticmethod
-    def suits(say: SpeechRequest) -> bool:
+    def is_applicable(request: SpeechRequest) -> bool:
         """Whether it is better said in parts."""
-        return len(say.ssml) > SHORT and say.seconds is None and say.recording is None
+        return len(request.ssml) > SHORT and request.seconds is None and request.recording is None
 
     def next(self) -> SpeechRequest | None:
         """The next part, which is to be said now; None where there is no more."""
@@ -71,11 +71,11 @@ class Growing:
         return replace(self._say, ssml=self._asked, marks=tuple(m for m in self._say.marks if m in names))
 
     @property
-    def whole(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether `next` has given the last part."""
         return self._coming is None
 
-    def take(self, part: Utterance, soonest: float = 0.0) -> Utterance:
+    def add_part(self, part: Utterance, soonest: float = 0.0) -> Utterance:
         """What a voice made of the last `next`, behind all the others.
 
         Args:
@@ -85,9 +85,9 @@ class Growing:
             All of it; its end and the marks that are still to come are guessed.
         """
         assert self._asked is not None
-        if self._coming is not None and not whole(self._asked):
-            part = shortened(part)
-        start = max(self.made, soonest) if self._joined else 0.0
+        if self._coming is not None and not is_sentence(self._asked):
+            part = trim_final_pause(part)
+        start = max(self.ready_until, soonest) if self._joined else 0.0
         self._sound(part, start)
         if self._rate:
             # The parts follow each other to the sample.
@@ -96,11 +96,11 @@ class Growing:
         self._words += [Word(w.start + start, w.end + start, w.text) for w in part.words]
         self._phonemes += [replace(p, start=p.start + start, end=p.end + start) for p in part.phonemes]
         self._marks |= {name: time + start for name, time in part.marks.items()}
-        self.made = start + part.duration
+        self.ready_until = start + part.duration
         self._characters += len(TAG.sub("", self._asked))
-        guessed, left = self._guessed()
+        guessed, left = self._estimate()
         return Utterance(
-            duration=self.made + left,
+            duration=self.ready_until + left,
             words=tuple(self._words),
             phonemes=tuple(self._phonemes),
             marks={**guessed, **self._marks},
@@ -128,7 +128,7 @@ class Growing:
         self._room[first:last] = pcm
         self._length = last
 
-    def _guessed(self) -> tuple[dict[str, float], float]:
+    def _estimate(self) -> tuple[dict[str, float], float]:
         """The marks of what is left, and how long that is."""
         spoken = sum(part.duration for _, part in self._joined)
         pace = (spoken + WEIGHT / PACE) / (self._characters + WEIGHT)  # s a character
@@ -136,7 +136,9 @@ class Growing:
             return {}, 0.0
         text, there = self._say.ssml, self._characters
         marks = {
-            name: self.made + (before - there) * pace for name, before in _marks(text) if before >= there
+            name: self.ready_until + (before - there) * pace
+            for name, before in _marks(text)
+            if before >= there
         }
         return marks, max(0, len(TAG.sub("", text)) - there) * pace
 
@@ -155,7 +157,7 @@ def _parts(text: str) -> Iterator[str]:
 
 def _pieces(text: str) -> Iterator[str]:
     """Sentences and clauses; a long element that only says how to speak is around each part in it."""
-    clauses = Clauses()
+    clauses = SentenceSplitter()
     for at in range(0, len(text), CHUNK):
         for piece in clauses.feed(text[at : at + CHUNK], close=at + CHUNK >= len(text)):
             around = ELEMENT.fullmatch(piece) if len(piece) > PART else None
@@ -180,7 +182,7 @@ def _marks(text: str) -> Iterator[tuple[str, int]]:
             yield unescape(named[1] if named[1] is not None else named[2], QUOTES), length
 
 
-def shortened(part: Utterance) -> Utterance:
+def trim_final_pause(part: Utterance) -> Utterance:
     """With the pause of a comma at its end, where the voice has made that of a full stop."""
     last = part.phonemes[-1] if part.phonemes else None
     if last is None or last.ipa or last.end - last.start <= COMMA:

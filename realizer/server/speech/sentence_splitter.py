@@ -16,7 +16,7 @@ LONGEST_TAG = 2000  # characters; what is longer is no tag
 MOST = 20_000  # characters; what waits no longer for its end tag
 
 
-class Clauses:
+class SentenceSplitter:
     """What has come of a text and is not spoken yet."""
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Clauses:
         return [piece for piece in pieces if piece.strip()]
 
 
-def whole(piece: str) -> bool:
+def is_sentence(piece: str) -> bool:
     """Whether a piece ends as a sentence does."""
     said = TAG.sub("", piece).rstrip()
     return bool(_ending().search(said)) and not _abbreviated(said)

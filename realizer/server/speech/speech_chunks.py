@@ -26,7 +26,7 @@ QUOTES = {"&quot;": '"', "&apos;": "'"}
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class Chunk:
     """What is the same for all pieces of a speech, and the number of this one.
 
     Attributes:
@@ -52,7 +52,7 @@ class Piece:
         return f'<bml xmlns="{CORE}"{declared} id="{self.block}"{who}>{inside}</bml>'
 
 
-def text_block(text: str, piece: Piece) -> Block:
+def text_block(text: str, chunk: Chunk) -> Block:
     """The block that says a text.
 
     <sync id="m"/> is a sync point of the behaviour, other SSML is handed to the voice. A behaviour needs no
@@ -60,15 +60,15 @@ def text_block(text: str, piece: Piece) -> Block:
     `ID:m`, also to those of earlier pieces. What is no XML, or has syncs that cannot be, is spoken without
     its tags. A tag that breaks off at the end is left out.
     """
-    work = _Text(piece)
+    work = _Text(chunk)
     work.read(sanitized(text))
-    found = list(read(piece.document(work.inside()), VOCABULARY))
+    found = list(read(chunk.document(work.inside()), VOCABULARY))
     block = found[0] if len(found) == 1 and isinstance(found[0], Block) else None
-    if block is not None and (not work.spoken or any(node.id == piece.speech for node in block.behaviours)):
+    if block is not None and (not work.spoken or any(node.id == chunk.speech for node in block.behaviours)):
         return block
-    plain = _Text(piece)
+    plain = _Text(chunk)
     plain.say(TAG.sub(" ", sanitized(text)))
-    (spoken,) = read(piece.document(plain.inside()), VOCABULARY)
+    (spoken,) = read(chunk.document(plain.inside()), VOCABULARY)
     assert isinstance(spoken, Block)
     if block is None:
         return spoken
@@ -77,11 +77,11 @@ def text_block(text: str, piece: Piece) -> Block:
     return replace(block, children=children, places={**block.places, **spoken.places})
 
 
-def clip_block(clip: str, piece: Piece) -> Block:
+def clip_block(clip: str, chunk: Chunk) -> Block:
     """The block that plays a clip as speech."""
     sound = f"<bmlt:audiofile fileName={quoteattr('clip:' + clip)}/>"
     said = f'<description priority="1" type="audio/x-clip">{sound}</description>'
-    (block,) = read(piece.document(f'<speech id="{piece.speech}">{said}</speech>'), VOCABULARY)
+    (block,) = read(chunk.document(f'<speech id="{chunk.speech}">{said}</speech>'), VOCABULARY)
     assert isinstance(block, Block)
     return block
 
@@ -89,8 +89,8 @@ def clip_block(clip: str, piece: Piece) -> Block:
 class _Text:
     """A text while it is read."""
 
-    def __init__(self, piece: Piece) -> None:
-        self.piece = piece
+    def __init__(self, chunk: Chunk) -> None:
+        self.chunk = chunk
         self.core: list[str] = []  # <text>
         self.ssml: list[str] = []  # <speak>
         self.behaviours: list[str] = []
@@ -132,14 +132,14 @@ class _Text:
         """What stands in the block."""
         if not self.spoken and not self.marked:
             return "".join(self.behaviours)
-        language = self.piece.language
+        language = self.chunk.language
         spoken_in = "" if language is None else f" xml:lang={quoteattr(language)}"
         said = f"<text{spoken_in}>{''.join(self.core)}</text>"
         ssml = "".join(self.ssml)
         if re.search(r"<(?!mark\b)", ssml):
             speak = f'<speak xmlns=""{spoken_in}>{ssml}</speak>'
             said += f'<description priority="1" type="application/ssml+xml">{speak}</description>'
-        return f'<speech id="{self.piece.speech}">{said}</speech>' + "".join(self.behaviours)
+        return f'<speech id="{self.chunk.speech}">{said}</speech>' + "".join(self.behaviours)
 
     def _mark(self, name: str, more: str = "") -> None:
         self.marked = True
@@ -164,16 +164,16 @@ class _Text:
         """A reference to this place in the text."""
         if not self.spoken:
             return "0"
-        name = f"at-{self.piece.number}-{len(self.behaviours) + 1}"
+        name = f"at-{self.chunk.number}-{len(self.behaviours) + 1}"
         self._mark(name)
-        return f"{self.piece.speech}:{name}"
+        return f"{self.chunk.speech}:{name}"
 
     def _referring(self, value: str) -> str:
         """References to syncs of earlier pieces say in which block they are."""
-        speech = re.escape(self.piece.speech)
+        speech = re.escape(self.chunk.speech)
 
         def place(found: re.Match[str]) -> str:
-            block = self.piece.marks.get(found[1])
+            block = self.chunk.marks.get(found[1])
             return found[0] if block is None else f"{block}:{found[0]}"
 
         return re.sub(rf"(?<![\w:.-]){speech}:([\w.-]+)", place, value)

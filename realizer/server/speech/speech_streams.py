@@ -9,8 +9,8 @@ from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
 from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
-from realizer.server.speech.speech_chunks import Piece
-from realizer.server.speech.speech_stream import Turn
+from realizer.server.speech.speech_chunks import Chunk
+from realizer.server.speech.speech_stream import SpeechStream
 
 # An open speech ends so much later than now, as long as nobody knows when.
 OPEN = 1e6  # s
@@ -20,7 +20,7 @@ SAME = 1e-6  # s
 # So many pieces are made ahead of the one that is heard. More is work that an interruption makes useless.
 AHEAD = 6
 MOST = 500_000  # characters of one speech that wait; nine hours
-MOST_SPEECHES = 1_000  # of a session
+MAX_SPEECHES = 1_000  # of a session
 CUT_OFF = ("INTERRUPTED", "REVOKED")
 
 
@@ -32,7 +32,7 @@ class SpeechError(ValueError):
         self.where = where
 
 
-class Speeches:
+class SpeechStreams:
     """The speeches of a session.
 
     Block `ID` is a <wait> from the first piece to the last: others can follow, interrupt and replace it as
@@ -41,14 +41,14 @@ class Speeches:
 
     def __init__(self, player: Player) -> None:
         self._player = player
-        self._speeches: dict[str, Turn] = {}
+        self._speeches: dict[str, SpeechStream] = {}
 
     def __len__(self) -> int:
         return len(self._speeches)
 
     # from clients -------------------------------------------------------------------------------
 
-    def hear(self, message: SpeechMessage, connection: int, t: float) -> None:
+    def handle(self, message: SpeechMessage, connection: int, t: float) -> None:
         """More of a speech.
 
         What comes for one that was cut off is left out; its id is free again when it is closed.
@@ -59,32 +59,32 @@ class Speeches:
         assert message.id is not None
         speech = self._speeches.get(message.id)
         if speech is None:
-            if len(self._speeches) >= MOST_SPEECHES:
-                raise SpeechError("id", f"wanted at most {MOST_SPEECHES} speeches at a time")
-            piece = Piece(message.id, 0, message.character, message.language)
-            speech = Turn(message.id, connection, message.composition, piece, spoken=t)
+            if len(self._speeches) >= MAX_SPEECHES:
+                raise SpeechError("id", f"wanted at most {MAX_SPEECHES} speeches at a time")
+            chunk = Chunk(message.id, 0, message.character, message.language)
+            speech = SpeechStream(message.id, connection, message.composition, chunk, last_end=t)
             self._speeches[message.id] = speech
             self._anticipate(speech, t + OPEN, t)
-        elif speech.over:
+        elif speech.is_finished:
             if message.close:
                 self._forget(message.id)
             return
-        elif speech.closed:
+        elif speech.is_closed:
             raise SpeechError(
                 "id", f"wanted a speech that is open, {message.id!r} was closed and is being said"
             )
         text = message.append or ""
-        if speech.waiting + len(text) > MOST:
+        if speech.unspoken_length + len(text) > MOST:
             raise SpeechError("append", f"wanted at most {MOST} characters that wait to be said, got more")
         speech.add(text, message.clip)
         if message.close:
             speech.close()
 
-    def leave(self, connection: int) -> None:
+    def on_disconnect(self, connection: int) -> None:
         """Who spoke is gone: what is left is said, then its speeches end."""
-        for speech in [s for s in self._speeches.values() if s.connection == connection and not s.closed]:
+        for speech in [s for s in self._speeches.values() if s.connection == connection and not s.is_closed]:
             speech.close()
-            if speech.over:
+            if speech.is_finished:
                 self._forget(speech.id)
 
     def __contains__(self, block: str) -> bool:
@@ -98,59 +98,63 @@ class Speeches:
         speech = next(filter(self._has_next, self._speeches.values()), None)
         if speech is None:
             return None
-        return speech.next_piece() if speech.asked else speech.around()
+        return speech.next_chunk() if speech.is_announced else speech.own_block()
 
-    def held_back(self, blocks: Collection[str] | None) -> list[Block]:
+    def cancel(self, blocks: Collection[str] | None) -> list[Block]:
         """The own blocks of these speeches, or of all (None), that `next` would have given."""
         held = [
             s
             for s in self._speeches.values()
-            if not (s.asked or s.over) and (blocks is None or s.id in blocks)
+            if not (s.is_announced or s.is_finished) and (blocks is None or s.id in blocks)
         ]
-        return [speech.around() for speech in held]
+        return [speech.own_block() for speech in held]
 
     @property
     def has_next(self) -> bool:
         """Whether `next` would give a block."""
         return any(map(self._has_next, self._speeches.values()))
 
-    def placed(self, block: Block) -> Block:
+    def with_links(self, block: Block) -> Block:
         """A piece behind those before it; any other block with what it says of `ID:ID:m` of the piece."""
         speech = self._of(block.id)
         if speech is None or block.id == speech.id:
-            return with_references(block, self._found) if any(map(self._names, references(block))) else block
+            return (
+                with_references(block, self._chunk_reference)
+                if any(map(self._is_speech_sync, references(block)))
+                else block
+            )
         holder = self._player.blocks.find(speech.id)
-        before = [id for id in speech.left if id != block.id]
+        before = [id for id in speech.open_chunks if id != block.id]
         if holder is not None and holder.is_waiting:
             before += [wait.block.block.id for wait in holder.dependencies]
         return replace(block, append_after=tuple(before))
 
-    def flows(self, block: Block) -> bool:
+    def is_streaming(self, block: Block) -> bool:
         """Whether a piece is part of a sentence of which more has come."""
         speech = self._of(block.id)
-        return speech is not None and block.id in speech.parts
+        return speech is not None and block.id in speech.partial_chunks
 
-    def lacks(self, block: Block) -> bool:
+    def awaits_sync(self, block: Block) -> bool:
         """Whether it names a sync of a speech that may still come."""
-        named = filter(self._names, references(block))
-        return any(self._speeches[ref.block or ""].lacks(ref.sync or "") for ref in named)
+        named = filter(self._is_speech_sync, references(block))
+        return any(self._speeches[ref.block or ""].awaits_sync(ref.sync or "") for ref in named)
 
     # what became of them ------------------------------------------------------------------------
 
-    def planned(self, block: str) -> None:
+    def on_planned(self, block: str) -> None:
         """A block was taken in."""
         speech = self._of(block)
         if speech is not None:
-            speech.planned(block)
+            speech.on_planned(block)
 
-    def refused(self, block: str) -> None:
+    def on_refused(self, block: str) -> None:
         """A block will not play; without the one that holds it together a speech is over."""
         speech = self._of(block)
         if speech is not None:
-            speech.done(block)
-            speech.over |= block == speech.id
+            speech.on_done(block)
+            speech.is_finished |= block == speech.id
 
-    def told(self, feedback: Feedback) -> tuple[Feedback, frozenset[str]]:
+    def process_feedback(self, feedback: Feedback) -> tuple[Feedback, frozenset[str]]:
         """Feedback as it is to go out, and the blocks that end with what it tells of."""
         if not isinstance(feedback, BlockProgress) or not feedback.id.endswith(":end"):
             return feedback, frozenset()
@@ -159,43 +163,43 @@ class Speeches:
         if speech is None:
             return feedback, frozenset()
         if block != speech.id:
-            speech.said += self._words(block, feedback.global_time)
-            speech.done(block)
-            speech.spoken = max(speech.spoken, feedback.global_time)
+            speech.words += self._words(block, feedback.global_time)
+            speech.on_done(block)
+            speech.last_end = max(speech.last_end, feedback.global_time)
             return feedback, frozenset()
-        left = frozenset(speech.left)
+        left = frozenset(speech.open_chunks)
         if feedback.status not in CUT_OFF:
             self._forget(speech.id)
             return feedback, left
-        speech.over = True
-        if speech.closed:
+        speech.is_finished = True
+        if speech.is_closed:
             self._forget(speech.id)
-        words = [word for piece in speech.ahead for word in self._words(piece, feedback.global_time)]
-        return replace(feedback, said=" ".join([*speech.said, *words])), left
+        words = [word for chunk in speech.scheduled for word in self._words(chunk, feedback.global_time)]
+        return replace(feedback, said=" ".join([*speech.words, *words])), left
 
     @property
-    def open(self) -> list[str]:
+    def open_ids(self) -> list[str]:
         """Ids of those whose end nobody knows yet."""
-        return [speech.id for speech in self._speeches.values() if not speech.over]
+        return [speech.id for speech in self._speeches.values() if not speech.is_finished]
 
     @property
-    def lasting(self) -> bool:
-        """Whether `settle` may have something to do as time passes."""
-        return bool(self.open)
+    def has_open(self) -> bool:
+        """Whether `advance` may have something to do as time passes."""
+        return bool(self.open_ids)
 
-    def settle(self, t: float) -> bool:
+    def advance(self, t: float) -> bool:
         """Let the block of each speech end with its last piece; True where one ends at another time."""
         moved = False
         for speech in self._speeches.values():
-            if speech.over:
+            if speech.is_finished:
                 continue
             # Before its own block starts nobody knows when that is: it must not end before.
             placed = self._player.blocks.find(speech.id) is not None
-            if not (speech.closed and placed) or speech.owed or speech.unsaid:
+            if not (speech.is_closed and placed) or speech.unplanned or speech.unspoken:
                 end = t + OPEN if speech.end < t + OPEN / 2 else speech.end
             else:
-                last = (self._player.blocks.find(id) for id in speech.ahead)
-                end = max([speech.spoken, *(piece.end for piece in last if piece is not None)]) + BEHIND
+                last = (self._player.blocks.find(id) for id in speech.scheduled)
+                end = max([speech.last_end, *(chunk.end for chunk in last if chunk is not None)]) + BEHIND
                 end = max(t, end)
             if abs(end - speech.end) > SAME:
                 self._anticipate(speech, end, t)
@@ -204,40 +208,40 @@ class Speeches:
 
     # inside -------------------------------------------------------------------------------------
 
-    def _of(self, block: str) -> Turn | None:
+    def _of(self, block: str) -> SpeechStream | None:
         name, _, number = block.rpartition(".")
         return self._speeches.get(name if number.isdigit() and name in self._speeches else block)
 
-    def _has_next(self, speech: Turn) -> bool:
-        if speech.over:
+    def _has_next(self, speech: SpeechStream) -> bool:
+        if speech.is_finished:
             return False
-        if not speech.asked:
+        if not speech.is_announced:
             return True
-        ready = bool(speech.unsaid) and len(speech.left) < AHEAD
+        ready = bool(speech.unspoken) and len(speech.open_chunks) < AHEAD
         return ready and self._player.blocks.find(speech.id) is not None
 
-    def _names(self, ref: SyncRef) -> bool:
+    def _is_speech_sync(self, ref: SyncRef) -> bool:
         """Whether it is a sync in the text of a speech: `ID:ID:m`."""
         known = ref.block is not None and ref.block in self._speeches and ref.behaviour == ref.block
         return known and ref.sync not in ("start", "end")
 
-    def _found(self, ref: SyncRef) -> SyncRef:
+    def _chunk_reference(self, ref: SyncRef) -> SyncRef:
         """A reference to a sync of a speech, as one to the piece it stands in."""
-        if not self._names(ref):
+        if not self._is_speech_sync(ref):
             return ref
-        piece = self._speeches[ref.block or ""].marks.get(ref.sync or "")
-        return ref if piece is None else replace(ref, block=piece)
+        chunk = self._speeches[ref.block or ""].marks.get(ref.sync or "")
+        return ref if chunk is None else replace(ref, block=chunk)
 
     def _forget(self, id: str) -> None:
         self._player.forget_anticipator(self._speeches.pop(id).anticipator)
 
-    def _anticipate(self, speech: Turn, end: float, t: float) -> None:
+    def _anticipate(self, speech: SpeechStream, end: float, t: float) -> None:
         speech.end = end
         self._player.anticipate(speech.anticipator, {"end": end}, t)
 
-    def _words(self, piece: str, t: float) -> list[str]:
+    def _words(self, chunk: str, t: float) -> list[str]:
         """The words of a piece that have sounded."""
-        playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == piece), None)
+        playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == chunk), None)
         if playing is None:
             return []
         heard = playing.words_spoken(t)

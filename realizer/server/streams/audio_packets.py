@@ -7,15 +7,15 @@ import math
 from realizer.protocol.wire import pack
 from realizer.server.session.effects import Effect, Send
 from realizer.server.streams.audio_stream import AHEAD, PACKET
-from realizer.server.streams.connection import Connection, SoundSubscription
+from realizer.server.streams.connection import AudioSubscription, Connection
 from realizer.server.streams.frame_windows import EPSILON
 
 
-def send_packets(connection: Connection, s: SoundSubscription, now: float, effects: list[Effect]) -> None:
+def send_packets(connection: Connection, s: AudioSubscription, now: float, effects: list[Effect]) -> None:
     """Every packet whose time has come; those that a change of plans has made untrue are taken back."""
     sound, current = s.sound, math.floor((now + EPSILON) / PACKET)
-    if s.revision != sound.player.version:
-        s.revision = sound.player.version
+    if s.version != sound.player.version:
+        s.version = sound.player.version
         if (changed := _changed(s, current)) is not None:
             effects.append(Send(connection.id, _packet(s, changed, b"", forget=True)))
             s.next = changed
@@ -28,16 +28,16 @@ def send_packets(connection: Connection, s: SoundSubscription, now: float, effec
         s.sent.append((number, pcm))
         if pcm is None:
             continue
-        if connection.slow:
+        if connection.is_slow:
             connection.dropped += 1
             continue
         effects.append(Send(connection.id, _packet(s, number, pcm)))
     s.next = last + 1
 
 
-def packets_due(s: SoundSubscription) -> float:
+def packets_due(s: AudioSubscription) -> float:
     """When `send_packets` will next have something; infinite where nothing sounds."""
-    if s.revision != s.sound.player.version:
+    if s.version != s.sound.player.version:
         return -math.inf
     span = s.sound.span()
     if span is None or span[1] <= s.next * PACKET:
@@ -45,11 +45,11 @@ def packets_due(s: SoundSubscription) -> float:
     return max(s.next * PACKET, math.floor(span[0] / PACKET) * PACKET) - AHEAD
 
 
-def _changed(s: SoundSubscription, current: int) -> int | None:
+def _changed(s: AudioSubscription, current: int) -> int | None:
     """The first packet that was sent ahead and would be another one now."""
     ahead = sorted((number, pcm) for number, pcm in dict(s.sent).items() if number >= current)
     return next((number for number, pcm in ahead if s.sound.packet(number) != pcm), None)
 
 
-def _packet(s: SoundSubscription, number: int, pcm: bytes, *, forget: bool = False) -> bytes:
-    return pack("audio", number, number * PACKET, pcm, character=s.index, forget=forget)
+def _packet(s: AudioSubscription, number: int, pcm: bytes, *, forget: bool = False) -> bytes:
+    return pack("audio", number, number * PACKET, pcm, character=s.index, flush=forget)

@@ -18,7 +18,7 @@ AHEAD = 0.1  # s
 BLOCK, BLOCKS = 4, 16
 
 
-class Sound:
+class AudioStream:
     """What a player says, in packets of 20 ms; packet n begins at n x 0.02 s on the session clock."""
 
     def __init__(self, player: Player, rate: int, character: int | None) -> None:
@@ -28,7 +28,7 @@ class Sound:
         self._samples = round(PACKET * rate)
         self._cache: dict[tuple[int, int], tuple[ScheduledSpeech, Float32]] = {}  # the latest at the end
 
-    def speaking(self) -> list[ScheduledSpeech]:
+    def speeches(self) -> list[ScheduledSpeech]:
         """What sounds or will sound, in order of its start."""
         return [
             s
@@ -38,7 +38,7 @@ class Sound:
 
     def span(self) -> tuple[float, float] | None:
         """(first, last) seconds of all that sounds or will sound; None where nothing does."""
-        speaking = self.speaking()
+        speaking = self.speeches()
         if not speaking:
             return None
         return min(s.start for s in speaking), max(_end(s) for s in speaking)
@@ -47,7 +47,7 @@ class Sound:
         """The PCM of one packet; None in silence."""
         first = number * self._samples
         mix: Float32 | None = None
-        for speaking in self.speaking():
+        for speaking in self.speeches():
             if _end(speaking) * self.rate <= first or speaking.start * self.rate >= first + self._samples:
                 continue
             offset = round(speaking.start * self.rate)

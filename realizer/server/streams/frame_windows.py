@@ -70,17 +70,17 @@ SOURCES: Mapping[str, FrameSource] = {
 }
 
 
-def first_at(now: float, fps: float) -> int:
+def first_frame_at(now: float, fps: float) -> int:
     """The first frame whose time is not before `now`."""
     return math.ceil((now - EPSILON) * fps)
 
 
-def last_at(now: float, fps: float) -> int:
+def last_frame_at(now: float, fps: float) -> int:
     """The newest frame whose time has come."""
     return math.floor((now + EPSILON) * fps)
 
 
-class Strip:
+class PackedFrames:
     """The messages of frames `first` .. `end - 1`, which are numbers, made at once: each is a slice."""
 
     def __init__(
@@ -100,7 +100,7 @@ class Strip:
         return row
 
 
-class Window:
+class FrameWindow:
     """Frames `first` .. `first + n - 1` of one character; each kind of them is made when first asked for.
 
     Args:
@@ -123,7 +123,7 @@ class Window:
         self._aus: AUFrames | None = None
         self._face = face
         self._mapping = mapping
-        self._strips: dict[tuple[str, bool], Strip] = {}
+        self._packed: dict[tuple[str, bool], PackedFrames] = {}
         self._latest: dict[tuple[str, str, bool, str | None], tuple[int, str | bytes]] = {}
         self._meshes: Int16 | None = None
         self._meshes_from = 0
@@ -135,7 +135,7 @@ class Window:
             self._aus = self._make(np.arange(self.first, self.end) / self.fps)
         return self._aus
 
-    def settle(self) -> None:
+    def drop_source(self) -> None:
         """What is streamed has been made: let go of what it was made of, which is several times as large."""
         self._aus = None
 
@@ -161,35 +161,35 @@ class Window:
         """(n, k) float32: what the face is drawn by."""
         return poses(self.aus, self._face().inputs, self._mapping)
 
-    def message(self, wanted: Wanted, frame: int) -> str | bytes:
+    def message(self, request: StreamRequest, frame: int) -> str | bytes:
         """One of its frames as a WebSocket message."""
-        if wanted.encoding == "binary" and wanted.stream != "mesh":
-            return self.strip(wanted)[frame]
-        key = (wanted.stream, wanted.encoding, wanted.asked, wanted.name)
+        if request.encoding == "binary" and request.stream != "mesh":
+            return self.packed(request)[frame]
+        key = (request.stream, request.encoding, request.raw, request.name)
         number, message = self._latest.get(key, (None, b""))
         if number != frame:
-            message = self._made(wanted, frame)
+            message = self._encode(request, frame)
             self._latest[key] = (frame, message)
         return message
 
-    def strip(self, wanted: Wanted) -> Strip:
+    def packed(self, request: StreamRequest) -> PackedFrames:
         """All of its messages of fap, au or arkit."""
-        known = self._strips.get((wanted.stream, wanted.asked))
+        known = self._packed.get((request.stream, request.raw))
         if known is None:
-            rows = self.rows(wanted.stream, wanted.asked)
+            rows = self.rows(request.stream, request.raw)
             times = np.arange(self.first, self.end) / self.fps
-            known = Strip(wanted.stream, self.first, times, rows, wanted.index)
-            self._strips[wanted.stream, wanted.asked] = known
+            known = PackedFrames(request.stream, self.first, times, rows, request.index)
+            self._packed[request.stream, request.raw] = known
         return known
 
-    def _made(self, wanted: Wanted, frame: int) -> str | bytes:
+    def _encode(self, request: StreamRequest, frame: int) -> str | bytes:
         """What is not made for the whole window at once: meshes, and all that is JSON."""
         n, time = frame - self.first, frame / self.fps
-        row = self.mesh(n) if wanted.stream == "mesh" else self.strip(wanted).row(frame)
-        if wanted.encoding == "binary":
-            return pack(wanted.stream, frame, time, row.tobytes(), character=wanted.index)
+        row = self.mesh(n) if request.stream == "mesh" else self.packed(request).row(frame)
+        if request.encoding == "binary":
+            return pack(request.stream, frame, time, row.tobytes(), character=request.index)
         values = [v if isinstance(v, int) else round(v, 4) for v in row.tolist()]
-        return json_frame(wanted.stream, frame, time, values, wanted.name)
+        return json_frame(request.stream, frame, time, values, request.name)
 
     def mesh(self, row: int) -> Int16:
         """(n_vertices, 3) int16 of one frame, counted from the first."""
@@ -204,7 +204,7 @@ class Window:
         return mesh
 
 
-class Timeline:
+class FrameTimeline:
     """One character at one rate: frames in windows, dropped when the player's plan changes.
 
     Args:
@@ -226,13 +226,13 @@ class Timeline:
         self._face = face
         self._find_mapping = mapping
         self._mapping: FapMapping | None = None
-        self._window: Window | None = None
-        self._revision = -1
+        self._window: FrameWindow | None = None
+        self._version = -1
 
-    def window(self, first: int, last: int) -> Window:
+    def window(self, first: int, last: int) -> FrameWindow:
         """A window that holds frames first .. last, and more to come."""
         window = self._window
-        if window is None or not self.current or first < window.first or last >= window.end:
+        if window is None or not self.is_current or first < window.first or last >= window.end:
             count = max(math.ceil(WINDOW * self.fps), last - first + 1)
 
             def aus(times: Float64) -> AUFrames:
@@ -240,28 +240,28 @@ class Timeline:
 
             if self._mapping is None:
                 self._mapping = self._find_mapping()
-            window = self._window = Window(first, count, self.fps, aus, self._face, self._mapping)
-            self._revision = self.player.version
+            window = self._window = FrameWindow(first, count, self.fps, aus, self._face, self._mapping)
+            self._version = self.player.version
         return window
 
     @property
-    def current(self) -> bool:
+    def is_current(self) -> bool:
         """What was computed last is still what is planned."""
-        return self._revision == self.player.version
+        return self._version == self.player.version
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Compute anew what comes next: the face has changed."""
         self._window = self._mapping = None
 
 
-class Wanted(Protocol):
+class StreamRequest(Protocol):
     """What a subscription wants of a window.
 
-    `asked`: AUs as asked for, before the rules of co-occurrence; `name`: the character's, where it was given.
+    `raw`: AUs as asked for, before the rules of co-occurrence; `name`: the character's, where it was given.
     """
 
     stream: str
     encoding: str
     index: int
     name: str | None
-    asked: bool
+    raw: bool

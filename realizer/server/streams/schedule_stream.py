@@ -16,7 +16,7 @@ from realizer.scheduling.timing import Schedule
 
 
 @dataclass(eq=False)
-class Seen:
+class Snapshot:
     """A block as it was last told.
 
     Attributes:
@@ -33,23 +33,23 @@ class Seen:
     text: str | None = None
 
 
-class Plans:
+class ScheduleStream:
     """What became of blocks since they were looked at last, written once for all who get it."""
 
     def __init__(self, cast: BlockStore) -> None:
         self._cast = cast
-        self._seen: dict[int, Seen] = {}
+        self._snapshots: dict[int, Snapshot] = {}
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Nobody looks any more."""
-        self._seen.clear()
+        self._snapshots.clear()
 
-    def have_changed(self) -> bool:
+    def has_changes(self) -> bool:
         """Whether `changes` would give something."""
         schedules = self._schedules()
-        return any(p.number not in self._seen for p in self._cast.active()) or any(
-            seen.state is not seen.playing.state or self._moved(seen, schedules)
-            for seen in self._seen.values()
+        return any(p.number not in self._snapshots for p in self._cast.active()) or any(
+            seen.state is not seen.playing.state or self._has_moved(seen, schedules)
+            for seen in self._snapshots.values()
         )
 
     def changes(self) -> list[tuple[int, str]]:
@@ -59,28 +59,28 @@ class Plans:
         told once more, and never again.
         """
         for playing in self._cast.active():
-            if playing.number not in self._seen:
+            if playing.number not in self._snapshots:
                 named = {ref.block for ref in references(playing.block) if ref.block is not None}
-                self._seen[playing.number] = Seen(playing, tuple(named - {playing.block.id}))
+                self._snapshots[playing.number] = Snapshot(playing, tuple(named - {playing.block.id}))
         found: list[tuple[int, str]] = []
         schedules = self._schedules()
-        for number, seen in list(self._seen.items()):
-            moved = self._moved(seen, schedules)
+        for number, seen in list(self._snapshots.items()):
+            moved = self._has_moved(seen, schedules)
             if moved or seen.state is not seen.playing.state:
                 seen.text, seen.state = None, seen.playing.state
                 seen.schedules = [seen.playing.schedule, *map(schedules, seen.others)]
-                text = self._text(seen) if moved else _json(self._line(seen).head())
+                text = self._text(seen) if moved else _json(self._chart(seen).head())
                 found.append((seen.playing.character, text))
             if seen.playing.is_done:
-                del self._seen[number]
+                del self._snapshots[number]
         return found
 
-    def whole(self, character: int | None) -> str:
+    def full_message(self, character: int | None) -> str:
         """All blocks that play or wait, of one character or of all, as `changes` found them."""
-        wanted = (s for s in self._seen.values() if character in (None, s.playing.character))
+        wanted = (s for s in self._snapshots.values() if character in (None, s.playing.character))
         return ",".join(self._text(seen) for seen in wanted)
 
-    def _moved(self, seen: Seen, schedules: Callable[[str], Schedule | None]) -> bool:
+    def _has_moved(self, seen: Snapshot, schedules: Callable[[str], Schedule | None]) -> bool:
         """Whether its own times are others, or those of a block it refers to."""
         now = [seen.playing.schedule, *map(schedules, seen.others)]
         return len(now) != len(seen.schedules) or any(
@@ -93,16 +93,16 @@ class Plans:
 
         return lambda id: newest[id] if id in newest else self._cast.schedule_of(id)
 
-    def _text(self, seen: Seen) -> str:
+    def _text(self, seen: Snapshot) -> str:
         if seen.text is None:
-            seen.text = _json(self._line(seen).to_json())
+            seen.text = _json(self._chart(seen).to_json())
         return seen.text
 
-    def _line(self, seen: Seen) -> BlockLine:
+    def _chart(self, seen: Snapshot) -> BlockLine:
         return line_of(seen.playing, self._cast.schedule_of)
 
 
-def message(time: float, blocks: str, character: str | None, *, whole: bool) -> str:
+def schedule_message(time: float, blocks: str, character: str | None, *, whole: bool) -> str:
     """One message of the stream.
 
     Args:

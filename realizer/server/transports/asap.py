@@ -17,10 +17,10 @@ from typing import cast
 
 from bml_schema import WarningFeedback
 from realizer.core.settings import Settings, raises
-from realizer.server.http.access import Pace
-from realizer.server.runtime.session_registry import HubError
-from realizer.server.transports.document_framing import Assembler, Fault
-from realizer.server.transports.tcp_listener import TcpTransport, session_of
+from realizer.server.http.access import RateLimiter
+from realizer.server.runtime.session_registry import JoinError
+from realizer.server.transports.document_framing import DocumentFramer, Fault
+from realizer.server.transports.tcp_listener import TcpTransport, session_name
 from realizer.server.transports.transport import Sessions
 
 log = logging.getLogger(__name__)
@@ -31,13 +31,13 @@ FIRST_RETRY = 0.05  # s
 LAST_RETRY = 1.0  # s
 ATTEMPT = 5.0  # s; a host that drops packets answers nothing
 # Feedback that is kept while there is nobody to take it: hours of talk.
-KEPT = 4 * 2**20  # bytes
+MAX_QUEUED = 4 * 2**20  # bytes
 # A client's reader fails where the buffer of a start tag ends, at 4096 characters in the smallest.
 LONGEST_TAG = 4000  # characters
 _LONG_TAG = re.compile(rf"<[^<>]{{{LONGEST_TAG},}}")
 
 
-class AsapDoor(TcpTransport):
+class AsapTransport(TcpTransport):
     """Listens on `settings.host` and the first of `settings.asap_ports`, `port` once it has started.
 
     Asap serves one client at a time. Here each address has a session of its own, named `asap-ADDRESS`, which
@@ -54,18 +54,18 @@ class AsapDoor(TcpTransport):
         self._sessions = sessions
 
     @property
-    def lines(self) -> tuple[str, ...]:
+    def startup_lines(self) -> tuple[str, ...]:
         back = f"feedback to port {self._feedback_port} of the client"
         return (f"asap: BML at {self.where}, {back}, session asap-ADDRESS",)
 
     async def _talk(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         link = CallBack(host, self._feedback_port, writer.transport.abort)
         try:
-            number = self._sessions.join(link, session_of("asap", host))
-        except HubError as error:
+            number = self._sessions.join(link, session_name("asap", host))
+        except JoinError as error:
             log.warning("asap: %s is not let in: %s", host, error)
             return
-        calling = asyncio.create_task(link.keep())
+        calling = asyncio.create_task(link.keep_connected())
         try:
             await self._read(reader, number, link)
         finally:
@@ -75,7 +75,7 @@ class AsapDoor(TcpTransport):
                 await calling
 
     async def _read(self, reader: asyncio.StreamReader, number: int, link: CallBack) -> None:
-        assembler, pace = Assembler(self._limit), Pace(self._rate)
+        assembler, pace = DocumentFramer(self._limit), RateLimiter(self._rate)
         loop = asyncio.get_running_loop()
         while data := await reader.read(READ):
             for found in assembler.feed(data):
@@ -88,8 +88,8 @@ class AsapDoor(TcpTransport):
                     return
                 # 0 too: a read full of documents must not hold up the frames of others.
                 pause = pace.wait(loop.time())
-                if pace.news is not None:
-                    link.send(WarningFeedback(id="<no id>", type="IOException", text=pace.news).to_xml())
+                if pace.notice is not None:
+                    link.send(WarningFeedback(id="<no id>", type="IOException", text=pace.notice).to_xml())
                 await asyncio.sleep(pause)
 
 
@@ -98,7 +98,7 @@ class CallBack(asyncio.Protocol):
 
     Args:
         host, port: where the client listens, sooner or later.
-        close: lets go of the client, from `end`.
+        close: lets go of the client, from `disconnect`.
     """
 
     def __init__(self, host: str, port: int, close: Callable[[], None]) -> None:
@@ -106,12 +106,12 @@ class CallBack(asyncio.Protocol):
         self._close = close
         self._transport: asyncio.Transport | None = None
         self._lost = asyncio.Event()
-        self._kept: deque[bytes] = deque()
+        self._queue: deque[bytes] = deque()
         self._size = 0  # bytes in _kept
-        self._left_out = 0
+        self._dropped = 0
 
     @property
-    def waiting(self) -> int:
+    def unsent_bytes(self) -> int:
         return self._size if self._transport is None else self._transport.get_write_buffer_size()
 
     def send(self, data: str | bytes) -> None:
@@ -122,17 +122,17 @@ class CallBack(asyncio.Protocol):
         if self._transport is not None:
             self._transport.write(line)
             return
-        self._kept.append(line)
+        self._queue.append(line)
         self._size += len(line)
-        while self._size > KEPT:
-            self._size -= len(self._kept.popleft())
-            self._left_out += 1
+        while self._size > MAX_QUEUED:
+            self._size -= len(self._queue.popleft())
+            self._dropped += 1
 
-    def end(self, code: int, reason: str) -> None:
+    def disconnect(self, code: int, reason: str) -> None:
         log.warning("asap: %s is let go of: %s", self._to[0], reason)
         self._close()
 
-    async def keep(self) -> None:
+    async def keep_connected(self) -> None:
         """Connect, and again whenever the connection is lost, until cancelled."""
         loop = asyncio.get_running_loop()
         try:
@@ -166,13 +166,13 @@ class CallBack(asyncio.Protocol):
             transport.abort()  # nobody listened, and TCP has met itself on the way
             return
         self._transport = transport
-        if self._left_out:
-            words = f"{self._left_out} messages came before anybody listened here and are left out"
+        if self._dropped:
+            words = f"{self._dropped} messages came before anybody listened here and are left out"
             warning = WarningFeedback(id="<no id>", type="IOException", text=words)
             transport.write(warning.to_xml().encode() + b"\n")
-        transport.writelines(self._kept)
-        self._kept.clear()
-        self._size = self._left_out = 0
+        transport.writelines(self._queue)
+        self._queue.clear()
+        self._size = self._dropped = 0
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._transport = None

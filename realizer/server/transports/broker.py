@@ -29,7 +29,7 @@ def check_installed() -> None:
     logging.getLogger("stomp.py").setLevel(logging.CRITICAL)
 
 
-class Link:
+class BrokerConnection:
     """One connection, from `connect` to `lost`; what blocks is called in a thread of the caller's.
 
     Args:
@@ -39,7 +39,10 @@ class Link:
     """
 
     def __init__(
-        self, loop: asyncio.AbstractEventLoop, take: Callable[[Link, int, bytes], None], timeout: float
+        self,
+        loop: asyncio.AbstractEventLoop,
+        take: Callable[[BrokerConnection, int, bytes], None],
+        timeout: float,
     ) -> None:
         self.settled = asyncio.Event()  # connected, or not
         self.reading = asyncio.Event()  # all topics are subscribed to; or lost

@@ -37,7 +37,7 @@ _SOLID = re.compile(rb"[^" + _BLANKS + rb"]")
 _SHOWN = 60  # bytes of a stray stretch that its message shows
 
 
-class Assembler:
+class DocumentFramer:
     """Finds the documents of one stream.
 
     Between documents blanks, comments, declarations, processing instructions and DOCTYPEs are passed over.
@@ -98,7 +98,7 @@ class Assembler:
         start, end = found.span()
         self._text(start)
         self._give_up()
-        self._tell_stray()
+        self._report_stray()
         self._here, self._opened = end, start
         mark = found[0]
         if mark in _CLOSERS or mark == b"<!DOCTYPE":
@@ -214,10 +214,10 @@ class Assembler:
             room = start + _SHOWN - len(self._stray)
             self._stray += self._data[start : min(room, end if line < 0 else line)]
             if self._stray and (line >= 0 or end >= room):
-                self._tell_stray()
+                self._report_stray()
         self._here = end
 
-    def _tell_stray(self) -> None:
+    def _report_stray(self) -> None:
         if self._stray:
             shown = bytes(self._stray).strip(_BLANKS).decode("utf-8", "replace")
             self._fault(f"wanted <bml>, got {shown!r}")

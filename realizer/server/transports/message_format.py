@@ -17,21 +17,21 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class ToSession:
+class Inbound:
     """One message to the session: a document, or a control message of our own making."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class Leave:
+class Disconnect:
     """Somebody asks us to go."""
 
 
-Action = ToSession | Message | Leave
+Action = Inbound | Message | Disconnect
 
 
-class Dialect(Protocol):
+class MessageFormat(Protocol):
     """One way to talk over a broker; `topic` is what it reads. It may keep state: one for each session."""
 
     topic: str

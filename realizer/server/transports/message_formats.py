@@ -1,6 +1,6 @@
 """The message formats on a broker: bare BML, and Asap's BML in JSON.
 
-A new one is a class as in `dialect` and a row of DIALECTS.
+A new one is a class as in `format` and a row of DIALECTS.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from urllib.parse import quote, unquote_plus
 
 from bml_schema import WarningFeedback
 from realizer.core.settings import Settings
-from realizer.server.transports.message_format import Action, Dialect, Message, ToSession
+from realizer.server.transports.message_format import Action, Inbound, Message, MessageFormat
 from realizer.server.transports.vhmsg import Vhmsg
 
 
@@ -75,23 +75,23 @@ class AsapJson:
         return []
 
 
-def _json(settings: Settings) -> Dialect | None:
+def _json(settings: Settings) -> MessageFormat | None:
     topic = settings.stomp_json_in
     return AsapJson(topic, settings.stomp_json_out) if topic is not None else None
 
 
-def _xml(settings: Settings) -> Dialect | None:
+def _xml(settings: Settings) -> MessageFormat | None:
     topic = settings.stomp_xml_in
     return AsapXml(topic, settings.stomp_xml_out) if topic is not None else None
 
 
-def _vhmsg(settings: Settings) -> Dialect | None:
+def _vhmsg(settings: Settings) -> MessageFormat | None:
     topic = settings.stomp_vhmsg
     return Vhmsg(topic, settings.max_document) if topic is not None else None
 
 
 # Name of the session -> how the dialect is made; None where the settings switch it off.
-DIALECTS = {"stomp-json": _json, "stomp-xml": _xml, "stomp-vhmsg": _vhmsg}
+MESSAGE_FORMATS = {"stomp-json": _json, "stomp-xml": _xml, "stomp-vhmsg": _vhmsg}
 
 
 def _refusal(text: str) -> str:
@@ -103,8 +103,8 @@ def _decoded(content: str) -> str:
     return content if content.lstrip().startswith("<") else unquote_plus(content, errors="strict")
 
 
-def _document(text: str) -> ToSession:
+def _document(text: str) -> Inbound:
     """Text for the session, which would take what starts with a brace for a control message."""
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         raise ValueError(f"wanted <bml>, got {text[:60]!r}")
-    return ToSession(text)
+    return Inbound(text)

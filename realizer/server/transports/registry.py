@@ -6,23 +6,23 @@ from collections.abc import Callable, Iterator
 
 from realizer.core.registry import Registry
 from realizer.core.settings import Settings
-from realizer.server.transports.transport import Door
+from realizer.server.transports.transport import Transport
 
 # The name is the setting that asks for it; one of a plug-in has no setting and is always asked for.
-TRANSPORTS: Registry[Callable[..., Door | None]] = Registry(
+TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
     "realizer.transports",
     {
-        "asap_ports": "realizer.server.transports.asap:AsapDoor",
-        "xface_port": "realizer.server.transports.xface.server:XfaceDoor",
-        "xface_player": "realizer.server.transports.xface.player:XfacePlayerDoor",
-        "stomp": "realizer.server.transports.stomp:StompDoor",
+        "asap_ports": "realizer.server.transports.asap:AsapTransport",
+        "xface_port": "realizer.server.transports.xface.server:XfaceTransport",
+        "xface_player": "realizer.server.transports.xface.player:XfacePlayerTransport",
+        "stomp": "realizer.server.transports.stomp:StompTransport",
     },
     wanted="a function or class that takes the session host and the settings",
     accepts=callable,
 )
 
 
-def requested(settings: Settings) -> Iterator[Callable[..., Door | None]]:
+def requested(settings: Settings) -> Iterator[Callable[..., Transport | None]]:
     """Yield what makes each transport that the settings ask for."""
     names = [name for name in TRANSPORTS if getattr(settings, name, True) is not None]
     for _, make in TRANSPORTS.working(names):

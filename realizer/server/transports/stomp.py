@@ -13,11 +13,11 @@ from typing import Any
 from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, raises
-from realizer.server.http.access import Pace
-from realizer.server.runtime.session_registry import HubError
-from realizer.server.transports.broker import Link, check_installed
-from realizer.server.transports.message_format import Dialect, Leave, Message, ToSession
-from realizer.server.transports.message_formats import DIALECTS
+from realizer.server.http.access import RateLimiter
+from realizer.server.runtime.session_registry import JoinError
+from realizer.server.transports.broker import BrokerConnection, check_installed
+from realizer.server.transports.message_format import Disconnect, Inbound, Message, MessageFormat
+from realizer.server.transports.message_formats import MESSAGE_FORMATS
 from realizer.server.transports.transport import Sessions
 
 log = logging.getLogger(__name__)
@@ -26,10 +26,10 @@ FIRST_RETRY = 0.2  # s
 LAST_RETRY = 10.0  # s
 ATTEMPT = 5.0  # s; to connect, and to part
 # Messages that wait for the broker; of more the oldest go.
-KEPT = 4 * 2**20  # characters
+MAX_QUEUED = 4 * 2**20  # characters
 
 
-class StompDoor:
+class StompTransport:
     """A client of the broker at `settings.stomp` that comes back whenever the broker does.
 
     Each dialect has a session of its own, by its name in DIALECTS, made when the first message comes and kept
@@ -42,11 +42,13 @@ class StompDoor:
         self._address = (host.strip("[]"), int(port))
         self._sessions = sessions
         self._settings = settings
-        made = {name: make(settings) for name, make in DIALECTS.items()}
-        self._seats = [_Seat(self, name, dialect) for name, dialect in made.items() if dialect is not None]
-        self._pace = Pace(settings.max_rate)
+        made = {name: make(settings) for name, make in MESSAGE_FORMATS.items()}
+        self._links = [
+            _SessionLink(self, name, dialect) for name, dialect in made.items() if dialect is not None
+        ]
+        self._pace = RateLimiter(settings.max_rate)
         self._thread = ThreadPoolExecutor(1, "stomp")
-        self._link: Link | None = None
+        self._link: BrokerConnection | None = None
         self._out: deque[Message] = deque()
         self._size = 0  # characters in _out
         self._news = asyncio.Event()
@@ -55,19 +57,19 @@ class StompDoor:
         self._leaving: asyncio.Task[None] | None = None
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        names = ", ".join(f"{seat.dialect.topic} in session {seat.name}" for seat in self._seats)
+    def startup_lines(self) -> tuple[str, ...]:
+        names = ", ".join(f"{seat.format.topic} in session {seat.name}" for seat in self._links)
         return (f"stomp: {self._settings.stomp} reads {names}",)
 
     async def start(self) -> None:
         check_installed()
         self._loop = asyncio.get_running_loop()
-        self._keeper = asyncio.create_task(self._keep())
+        self._keeper = asyncio.create_task(self._keep_connected())
 
     async def ready(self) -> None:
         await self._up.wait()
 
-    def shut(self) -> None:
+    def stop_accepting(self) -> None:
         """Sessions refuse what comes from now on, with words; so messages are still read."""
 
     async def close(self) -> None:
@@ -77,7 +79,7 @@ class StompDoor:
 
     async def _leave(self) -> None:
         """Say good-bye where somebody listens, and part."""
-        for seat in self._seats:
+        for seat in self._links:
             seat.leave()
         if self._link is not None:
             with contextlib.suppress(TimeoutError):
@@ -92,11 +94,11 @@ class StompDoor:
 
     # what comes and goes ------------------------------------------------------------------------
 
-    def put(self, message: Message) -> None:
+    def send_message(self, message: Message) -> None:
         """Send it, when the broker is there."""
         self._out.append(message)
         self._size += len(message.body)
-        while self._size > KEPT:
+        while self._size > MAX_QUEUED:
             self._size -= len(self._out.popleft().body)
         self._news.set()
 
@@ -104,11 +106,11 @@ class StompDoor:
     def waiting(self) -> int:
         return self._size
 
-    def _take(self, link: Link, seat: int, body: bytes) -> None:
+    def _take(self, link: BrokerConnection, seat: int, body: bytes) -> None:
         """A message has come in; in the event loop. The next one is read when it may be."""
         pause = self._pace.wait(self._loop.time())
-        if self._pace.news is not None:
-            log.warning("stomp: %s", self._pace.news)
+        if self._pace.notice is not None:
+            log.warning("stomp: %s", self._pace.notice)
         if pause:
             self._loop.call_later(pause, link.handled)
         else:
@@ -117,31 +119,31 @@ class StompDoor:
             return
         if len(body) > self._settings.max_message:
             words = f"wanted at most {self._settings.max_message} bytes in a message, got {len(body)}"
-            log.warning("stomp: %s: %s", self._seats[seat].name, words)
+            log.warning("stomp: %s: %s", self._links[seat].name, words)
             refusal = WarningFeedback(
                 id="<no id>", type="PARSING_FAILURE", text=f"{words} {raises('max_message')}"
             )
-            self._seats[seat].send(refusal.to_xml())
+            self._links[seat].send(refusal.to_xml())
             return
-        for action in self._seats[seat].dialect.incoming(body):
+        for action in self._links[seat].format.incoming(body):
             match action:
                 case Message():
-                    self.put(action)
-                case ToSession(text):
-                    self._seats[seat].receive(text)
-                case Leave():
+                    self.send_message(action)
+                case Inbound(text):
+                    self._links[seat].receive(text)
+                case Disconnect():
                     log.warning("stomp: vrKillComponent: the door closes")
                     self._leaving = asyncio.create_task(self._leave())
                     return
 
     # the connection -----------------------------------------------------------------------------
 
-    async def _keep(self) -> None:
+    async def _keep_connected(self) -> None:
         """Be connected, until cancelled."""
         pause = FIRST_RETRY
         told = False
         while True:
-            link = Link(self._loop, self._take, ATTEMPT)
+            link = BrokerConnection(self._loop, self._take, ATTEMPT)
             try:
                 await self._connect(link)
                 log.log(
@@ -155,14 +157,14 @@ class StompDoor:
                 words = "no broker at %s%s; looking for it"
             finally:
                 self._link = None
-                await asyncio.shield(self._part(link))
+                await asyncio.shield(self._disconnect(link))
             if not told:
                 log.warning("stomp: " + words, self._settings.stomp, link.fault and f" ({link.fault})")
                 told = True
             await asyncio.sleep(pause)
             pause = min(2 * pause, LAST_RETRY)
 
-    async def _connect(self, link: Link) -> None:
+    async def _connect(self, link: BrokerConnection) -> None:
         settings = self._settings
         async with asyncio.timeout(ATTEMPT):
             await self._call(
@@ -174,19 +176,19 @@ class StompDoor:
             )
             await link.settled.wait()
             if link.connected:
-                await self._call(link.subscribe, [seat.dialect.topic for seat in self._seats])
+                await self._call(link.subscribe, [seat.format.topic for seat in self._links])
                 await link.reading.wait()
         if not link.connected or link.lost.is_set():
             raise RealizerError(link.fault or "it closes the connection")
         self._link = link
-        for seat in self._seats:
-            for message in reversed(seat.dialect.hello()):
+        for seat in self._links:
+            for message in reversed(seat.format.hello()):
                 self._out.appendleft(message)
                 self._size += len(message.body)
         self._news.set()
         self._up.set()
 
-    async def _talk(self, link: Link) -> None:
+    async def _talk(self, link: BrokerConnection) -> None:
         """Send what there is to send, until the connection is lost."""
         lost = asyncio.create_task(link.lost.wait())
         try:
@@ -207,7 +209,7 @@ class StompDoor:
         finally:
             lost.cancel()
 
-    async def _part(self, link: Link) -> None:
+    async def _disconnect(self, link: BrokerConnection) -> None:
         with contextlib.suppress(OSError, RealizerError):
             async with asyncio.timeout(ATTEMPT):
                 if link.connected and not link.lost.is_set():
@@ -220,12 +222,12 @@ class StompDoor:
         await self._loop.run_in_executor(self._thread, function, *arguments)
 
 
-class _Seat:
+class _SessionLink:
     """One dialect's connection to its session; a Client."""
 
-    def __init__(self, door: StompDoor, name: str, dialect: Dialect) -> None:
+    def __init__(self, door: StompTransport, name: str, dialect: MessageFormat) -> None:
         self.name = name
-        self.dialect = dialect
+        self.format = dialect
         self._door = door
         self._number: int | None = None
 
@@ -239,25 +241,25 @@ class _Seat:
                 sessions.leave(self._number)
                 self._number = sessions.join(self, self.name)
                 sessions.receive(self._number, text)
-        except HubError as error:
+        except JoinError as error:
             log.warning("stomp: %s: %s", self.name, error)
 
     @property
-    def waiting(self) -> int:
+    def unsent_bytes(self) -> int:
         return self._door.waiting
 
     def send(self, data: str | bytes) -> None:
         if isinstance(data, str) and data.startswith("<"):
-            for message in self.dialect.outgoing(data):
-                self._door.put(message)
+            for message in self.format.outgoing(data):
+                self._door.send_message(message)
 
-    def end(self, code: int, reason: str) -> None:
+    def disconnect(self, code: int, reason: str) -> None:
         log.warning("stomp: session %s ends: %s", self.name, reason)
         self.leave()
 
     def leave(self) -> None:
-        for message in self.dialect.farewell():
-            self._door.put(message)
+        for message in self.format.farewell():
+            self._door.send_message(message)
         if self._number is not None:
             self._door._sessions.leave(self._number)
             self._number = None

@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 LONGEST_NAME = 64  # characters of a session's name
 
 
-def session_of(door: str, host: str) -> str:
+def session_name(door: str, host: str) -> str:
     """The name of the session that the clients of an address share."""
     return (f"{door}-" + re.sub(r"[^A-Za-z0-9._~-]", "-", host))[:LONGEST_NAME]
 
@@ -61,21 +61,21 @@ class TcpTransport(ABC):
         """Return at once: clients can come in after `start`."""
         return
 
-    def shut(self) -> None:
+    def stop_accepting(self) -> None:
         """Take no new clients."""
         if self._server is not None:
             self._server.close()
 
     async def close(self) -> None:
         """Let everybody go."""
-        self.shut()
+        self.stop_accepting()
         for writer in self._clients.values():
             writer.transport.abort()
         await asyncio.gather(*self._clients, return_exceptions=True)
 
     @property
     @abstractmethod
-    def lines(self) -> tuple[str, ...]:
+    def startup_lines(self) -> tuple[str, ...]:
         """What is printed when it is ready: where it is."""
 
     @abstractmethod

@@ -8,11 +8,11 @@ from realizer.server.http.metrics import Metrics
 from realizer.server.runtime.session_registry import ANYBODY, Visitor
 
 
-class Client(Protocol):
+class Outbound(Protocol):
     """The way out to one connection. Called inside the event loop; never blocks."""
 
     @property
-    def waiting(self) -> int:
+    def unsent_bytes(self) -> int:
         """Bytes that were not yet taken by the network."""
         ...
 
@@ -20,7 +20,7 @@ class Client(Protocol):
         """One message of the session: feedback, a reply, a frame. A client leaves out what it cannot take."""
         ...
 
-    def end(self, code: int, reason: str) -> None:
+    def disconnect(self, code: int, reason: str) -> None:
         """The session lets go of it; the codes are those of a WebSocket close."""
         ...
 
@@ -50,7 +50,7 @@ class Sessions(Protocol):
         ...
 
     def join(
-        self, client: Client, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
+        self, client: Outbound, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
     ) -> int:
         """Add a client to the session of that name, or to one of its own; returns its number.
 
@@ -71,11 +71,11 @@ class Sessions(Protocol):
         ...
 
 
-class Door(Protocol):
-    """One way in. `start`, then `ready` waits until clients can come; `shut` and `close` end it."""
+class Transport(Protocol):
+    """One way in. `start`, then `ready` waits until clients can come; `stop_accepting` and `close` end it."""
 
     @property
-    def lines(self) -> tuple[str, ...]:
+    def startup_lines(self) -> tuple[str, ...]:
         """What is printed when it is ready: where it is."""
         ...
 
@@ -92,7 +92,7 @@ class Door(Protocol):
         """Return once clients can come in; for a door that depends on others this may take for ever."""
         ...
 
-    def shut(self) -> None:
+    def stop_accepting(self) -> None:
         """Take no new clients; those that are in stay."""
         ...
 

@@ -11,8 +11,8 @@ from xml.sax.saxutils import quoteattr, unescape
 
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.settings import raises
-from realizer.server.transports.document_framing import Assembler
-from realizer.server.transports.message_format import Action, Leave, Message, ToSession
+from realizer.server.transports.document_framing import DocumentFramer
+from realizer.server.transports.message_format import Action, Disconnect, Inbound, Message
 
 # What we are called where components of a VHMSG system say who they are.
 COMPONENT = "renderer"
@@ -67,12 +67,12 @@ class Vhmsg:
             case ["vrAllCall", *_]:
                 return list(self.hello())
             case ["vrKillComponent", who, *_] if who.lower() in (COMPONENT, NAME, "all"):
-                return [Leave()]
+                return [Disconnect()]
         return []
 
     def _speak(self, agent: str, recipient: str, id: str, xml: str) -> list[Action]:
         # The XML is an <act> with a <bml> in it, or a <bml> alone: what is around it is for others.
-        found = Assembler(self._limit).feed(xml.encode("utf-8", "replace") + b"\n")
+        found = DocumentFramer(self._limit).feed(xml.encode("utf-8", "replace") + b"\n")
         documents = [text for text in found if isinstance(text, str)]
         speak = _Speak(agent, recipient, id, set())
         if not documents:
@@ -82,13 +82,13 @@ class Vhmsg:
                 if not isinstance(fault, str) and "<bml" not in fault.text
             ]
             speak.error = faults[0] if faults else "wanted a whole <bml> document"
-            return list(self._over(speak))
+            return list(self._finish(speak))
         actions: list[Action] = []
         for document in documents:
             block, text = _named(document, self._free, id, agent)
             speak.blocks.add(block)
             self._speaks[block] = speak
-            actions.append(ToSession(text))
+            actions.append(Inbound(text))
         return actions
 
     def _free(self, id: str) -> bool:
@@ -96,7 +96,7 @@ class Vhmsg:
 
     def _stop(self, agent: str, id: str) -> list[Action]:
         blocks = [b for b, speak in self._speaks.items() if (speak.agent, speak.id) == (agent, id)]
-        return [ToSession(json.dumps({"type": "stop", "blocks": blocks}))] if blocks else []
+        return [Inbound(json.dumps({"type": "stop", "blocks": blocks}))] if blocks else []
 
     def outgoing(self, feedback: str) -> list[Message]:
         if not self._speaks:
@@ -131,9 +131,9 @@ class Vhmsg:
     def _ended(self, speak: _Speak, block: str) -> list[Message]:
         del self._speaks[block]
         speak.blocks.discard(block)
-        return [] if speak.blocks else self._over(speak)
+        return [] if speak.blocks else self._finish(speak)
 
-    def _over(self, speak: _Speak) -> list[Message]:
+    def _finish(self, speak: _Speak) -> list[Message]:
         """Its last block has ended, or it never had one. Where nothing of it played, that is an error."""
         if not speak.plays and not speak.interrupted:
             speak.error = speak.error or speak.dropped

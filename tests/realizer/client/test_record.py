@@ -87,7 +87,7 @@ def test_sound_stands_at_its_time_and_what_was_taken_back_is_silent() -> None:
         unpack(pack("audio", k, 1.0 + k * 0.02, np.full(RATE // 50, k + 1, "<i2").tobytes()))
         for k in range(4)
     ]
-    packets.append(unpack(pack("audio", 2, 1.04, b"", forget=True)))
+    packets.append(unpack(pack("audio", 2, 1.04, b"", flush=True)))
     pcm = sound_of(packets, 1.01, 0.1)
     step = RATE // 100
     assert [int(pcm[k * step]) for k in range(5)] == [1, 2, 2, 0, 0]

@@ -91,7 +91,7 @@ def test_a_session_shows_characters_by_their_faces_and_the_users_mapping(own: Pa
     (own / "mine.txt").write_text("27\n3 0 1 0 333\n", "utf-8")
     session = Session("s", Settings(mapping=own / "mine.txt"), 0.0)
     assert (most(session.faces.mapping(0), 26, 3), most(session.faces.mapping(0), 27, 3)) != ([111], [333])
-    session.faces.given[0] = "own"
+    session.faces.assigned[0] = "own"
     assert (most(session.faces.mapping(0), 26, 3), most(session.faces.mapping(0), 27, 3)) == ([111], [333])
 
 

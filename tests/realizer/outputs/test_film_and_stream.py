@@ -11,7 +11,7 @@ from PIL import Image
 from realizer.offline import realize
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
-from realizer.server.runtime.engines import Studio
+from realizer.server.runtime.engines import Engines
 from realizer.server.session.effects import Draw, Speak
 from tests.realizer.server.conftest import Driver
 
@@ -27,16 +27,16 @@ class Screening(Driver):
     """A session whose voice and pictures are there the moment it asks for them."""
 
     def __init__(self) -> None:
-        self.studio = Studio()
+        self.studio = Engines()
         super().__init__(idle=False, voice="silent")
 
     def do(self, effect) -> None:
         match effect:
             case Speak(id):
-                self.session.spoken(id, self.studio.speak(effect), self.opened + self.now)
+                self.session.on_speech(id, self.studio.speak(effect), self.opened + self.now)
                 self.collect()
             case Draw(id):
-                self.session.drawn(id, self.studio.draw(effect), self.opened + self.now)
+                self.session.on_picture(id, self.studio.draw(effect), self.opened + self.now)
                 self.collect()
             case _:
                 super().do(effect)

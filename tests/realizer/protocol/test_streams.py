@@ -50,8 +50,8 @@ def test_options_are_fields_of_subscribe(row) -> None:
 @pytest.mark.parametrize("row", KINDS.values(), ids=lambda row: row.name)
 def test_message_is_unpacked_as_its_stream(row) -> None:
     numbers = np.arange(6, dtype=row.dtype or "u1")
-    frame = unpack(pack(row.name, 3, 0.12, numbers.tobytes(), forget=row.flushes))
-    assert (frame.kind, frame.stream, frame.forget) == (row.kind, row.name, row.flushes)
+    frame = unpack(pack(row.name, 3, 0.12, numbers.tobytes(), flush=row.flushes))
+    assert (frame.kind, frame.stream, frame.flush) == (row.kind, row.name, row.flushes)
     if row.dtype is not None:
         assert frame.values.dtype == row.dtype
         assert np.array_equal(frame.values.ravel(), numbers)

@@ -33,9 +33,9 @@ from realizer.protocol.wire import (
     forget=st.booleans(),
 )
 def test_a_frame_comes_back_as_it_was(stream, frame, time, payload, character, forget) -> None:
-    got = unpack(pack(stream, frame, time, payload, character=character, forget=forget))
+    got = unpack(pack(stream, frame, time, payload, character=character, flush=forget))
     assert (got.stream, got.frame, got.time, got.payload) == (stream, frame, time, payload)
-    assert (got.character, got.forget) == (character, forget)
+    assert (got.character, got.flush) == (character, forget)
 
 
 @given(
@@ -58,7 +58,7 @@ def test_frames_packed_together_are_those_packed_alone(stream, first, count, wid
 
 
 def test_the_header_is_sixteen_bytes_little_endian() -> None:
-    message = pack("audio", 7, 0.14, b"xy", character=3, forget=True)
+    message = pack("audio", 7, 0.14, b"xy", character=3, flush=True)
     assert struct.unpack("<BBHId", message[:16]) == (4, 1, 0x103, 7, 0.14)
     assert message[16:] == b"xy"
 

@@ -109,7 +109,7 @@ class Driver:
         return self.clients[connection]
 
     def say(self, number: int, result) -> None:
-        self.session.spoken(number, result, self.opened + self.now)
+        self.session.on_speech(number, result, self.opened + self.now)
         self.collect()
         self.run(self.now)
 
@@ -123,12 +123,12 @@ class Driver:
 
     def wake(self) -> None:
         """As the shell does it."""
-        now, run = self.opened + self.now, self.session.run
-        if run is not None and (data := run.take(now)) is not None:
-            assert run.wakes == self.session.next_due()
+        now, run = self.opened + self.now, self.session.fast_path
+        if run is not None and (data := run.next_message(now)) is not None:
+            assert run.wake_at == self.session.next_due()
             self.do(Send(run.connection, data))
             return
-        found = None if self.session.reads else self.session.frames(now)
+        found = None if self.session.has_documents else self.session.frames(now)
         if found is None:
             self.session.tick(self.opened + self.now)
             self.collect()
@@ -139,7 +139,7 @@ class Driver:
                 self.do(effect)
 
     def collect(self) -> None:
-        for effect in self.session.outgoing():
+        for effect in self.session.take_effects():
             self.do(effect)
 
     def do(self, effect: Effect) -> None:
@@ -150,7 +150,7 @@ class Driver:
             case Speak(id):
                 self.spoken.append(effect)
                 if not self.mute:
-                    self.session.spoken(id, spoken(), self.opened + self.now)
+                    self.session.on_speech(id, spoken(), self.opened + self.now)
                     self.collect()
             case Draw():
                 self.draws.append(effect)

@@ -85,7 +85,7 @@ def test_a_voice_that_is_killed_in_a_text_costs_its_sound_and_one_warning(
         async with connect(server.url, max_queue=None) as client:
             await client.send(TALK.format("first", "One."))
             first = await until(client, 'id="first:end"')
-            engine = server._shell._studio._voices["espeak"]
+            engine = server._sessions._engines._voices["espeak"]
             assert isinstance(engine, EspeakVoice)
             assert engine.pid is not None
             os.kill(engine.pid, signal.SIGSTOP)  # so that it can never answer before it dies
@@ -131,7 +131,7 @@ def test_a_renderer_that_is_killed_is_started_again_and_pictures_go_on() -> None
         async with connect(server.url, max_queue=None) as client:
             await client.send('{"type":"subscribe","stream":"video","size":[32,32],"fps":5}')
             times = [await picture(client)]
-            (place,) = server._shell._studio._places.values()
+            (place,) = server._sessions._engines._slots.values()
             assert place.renderer.pid is not None
             os.kill(place.renderer.pid, signal.SIGKILL)
             times += [await picture(client) for _ in range(3)]
@@ -159,7 +159,7 @@ def disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Disk]:
     if request.param == "pages":
 
         def pages(server: Server, most: int) -> None:
-            file = server._shell._origin.journal._file  # type: ignore[union-attr]
+            file = server._sessions._factory.journal._file  # type: ignore[union-attr]
             (used,) = file.execute("PRAGMA page_count").fetchone()
             file.execute(f"PRAGMA max_page_count = {most or used}")
 
@@ -302,7 +302,7 @@ def test_a_client_that_comes_back_where_clocks_are_other_ones_has_all_feedback_o
 
 async def emptied(server: Server, files: int) -> None:
     """Wait until nobody is there any more, and nothing is open that was not before."""
-    while server._shell.health()["connections"] or files_open(os.getpid()) > files:
+    while server._sessions.health()["connections"] or files_open(os.getpid()) > files:
         await asyncio.sleep(0.01)
 
 
@@ -314,7 +314,7 @@ def test_two_thousand_that_come_and_go_leave_nothing_behind() -> None:
         files = files_open(os.getpid())
         await asyncio.to_thread(come_and_go, server.port, 2000, 10)
         await emptied(server, files)
-        assert server._shell.health() == {"sessions": 10, "connections": 0}
+        assert server._sessions.health() == {"sessions": 10, "connections": 0}
         async with connect(server.url) as client:
             await plays(client, "b")
 
@@ -333,7 +333,7 @@ def test_one_who_closes_its_side_only_is_let_go() -> None:
     async def test(server: Server) -> None:
         got = await asyncio.to_thread(half_closed, server.port, "show")
         assert b"b:end" not in got
-        while server._shell.health()["connections"]:
+        while server._sessions.health()["connections"]:
             await asyncio.sleep(0.01)
         async with connect(f"{server.url}?session=show&seen=0") as again:
             await until(again, 'id="b:end"')  # what it has asked for was played

@@ -16,7 +16,7 @@ from realizer.behaviours.registry import VOCABULARY
 from realizer.behaviours.speech import speech_request
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.scheduling.timing import Schedule
-from realizer.server.runtime.engines import Studio
+from realizer.server.runtime.engines import Engines
 from realizer.server.session.effects import Speak
 from realizer.speech import engine_process
 from realizer.speech.espeak.voice import EspeakVoice
@@ -153,7 +153,7 @@ def test_a_voice_that_is_not_there_is_refused_with_those_that_are() -> None:
 @pytest.mark.espeak
 @pytest.mark.parametrize("name", ["espeak", "espeak:nl", "espeak:en-gb+f3"])
 def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> None:
-    studio = Studio()
+    studio = Engines()
     alone = EspeakVoice(name.partition(":")[2] or None)
     try:
         said = studio.speak(Speak(1, SpeechRequest("een twee", voice=name)))
@@ -172,7 +172,7 @@ def test_a_service_asks_the_voice_of_that_name_and_of_no_other(name: str) -> Non
 def test_an_engine_that_is_killed_in_the_middle_costs_one_sound(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    studio = Studio()
+    studio = Engines()
     answers: list[object] = []
     exchange, begun = engine_process._exchange, threading.Event()
 

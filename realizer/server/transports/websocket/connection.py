@@ -19,10 +19,10 @@ from websockets.protocol import State
 from realizer.core.settings import Settings, raises
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.http import access
-from realizer.server.http.access import Guard, Pace
-from realizer.server.http.jwt_tokens import Pass
+from realizer.server.http.access import AccessControl, RateLimiter
+from realizer.server.http.jwt_tokens import Grant
 from realizer.server.journal import JournalError
-from realizer.server.runtime.session_registry import HubError
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.transport import Sessions
 from realizer.server.transports.websocket.request import address_of, headers_of, session_of, visitor_of
 
@@ -33,13 +33,13 @@ GOODBYE = 2.0  # s
 REASON = 123  # bytes that a close frame has room for behind its code
 
 
-class Visits:
+class WebSocketConnections:
     """Lets clients into sessions as `guard` says, and reads them as fast as `settings` say."""
 
-    def __init__(self, sessions: Sessions, settings: Settings, guard: Guard) -> None:
+    def __init__(self, sessions: Sessions, settings: Settings, access: AccessControl) -> None:
         self._sessions = sessions
         self._settings = settings
-        self._guard = guard
+        self._access = access
         self._checking = asyncio.Lock()
         self._from: Counter[str] = Counter()  # address -> WebSockets that are open
 
@@ -55,7 +55,7 @@ class Visits:
                 f"{most} connections from {address_of(socket)} are open: wanted fewer "
                 f"{raises('max_connections')}"
             )
-            raise HubError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
+            raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, words)
 
     async def handle(self, socket: ServerConnection) -> None:
         """One WebSocket, from its opening to its end."""
@@ -63,8 +63,8 @@ class Visits:
         address = address_of(socket)
         try:
             self.check_room(socket)  # again: many may have been let in at the same moment
-        except HubError as error:
-            await WebSocketClient(socket).close(1013, str(error))
+        except JoinError as error:
+            await WebSocketWriter(socket).close(1013, str(error))
             return
         self._from[address] += 1
         try:
@@ -79,19 +79,19 @@ class Visits:
 
     async def _visit(self, socket: ServerConnection, request: Request) -> None:
         """One visit, to its end; who may not come in is told why."""
-        client = WebSocketClient(socket)
+        client = WebSocketWriter(socket)
         greeting = None
         try:
-            allowed = self._guard.request(request.path, headers_of(request), later=True)
+            allowed = self._access.request(request.path, headers_of(request), later=True)
             if allowed is None:
-                greeting, allowed = await self._greeting(socket)
+                greeting, allowed = await self._first_message(socket)
             visitor = visitor_of(socket, allowed)
             name, seen = session_of(request)
             self._sessions.check(name, visitor)  # who greets is known only now
             await self._sessions.restore(name, seen)
             number = self._sessions.join(client, name, seen, visitor)
-        except HubError as error:
-            await self._turn_away(socket, client, error)
+        except JoinError as error:
+            await self._reject(socket, client, error)
             return
         except JournalError as error:
             await client.close(1013, str(error))
@@ -101,7 +101,7 @@ class Visits:
         try:
             if greeting is not None:
                 self._sessions.receive(number, greeting)
-            async with asyncio.timeout(allowed.left):
+            async with asyncio.timeout(allowed.seconds_left):
                 await self._read(socket, number, client)
         except ConnectionClosed:
             pass
@@ -111,20 +111,20 @@ class Visits:
             self._sessions.leave(number)
             log.info("left", extra={**told, "code": socket.close_code})
 
-    async def _read(self, socket: ServerConnection, number: int, client: WebSocketClient) -> None:
+    async def _read(self, socket: ServerConnection, number: int, client: WebSocketWriter) -> None:
         """Hand messages on, no faster than a client may send them: the rest waits in its own buffers."""
         loop = asyncio.get_running_loop()
-        pace = Pace(self._settings.max_rate)
+        pace = RateLimiter(self._settings.max_rate)
         async for message in socket:
             if not self._sessions.receive(number, message):
                 return
             # 0 too: messages that are there already must not hold up everybody else.
             pause = pace.wait(loop.time())
-            if pace.news is not None:
-                client.send(ErrorMessage(code="rate", message=pace.news).text())
+            if pace.notice is not None:
+                client.send(ErrorMessage(code="rate", message=pace.notice).text())
             await asyncio.sleep(pause)
 
-    async def _greeting(self, socket: ServerConnection) -> tuple[str | bytes, Pass]:
+    async def _first_message(self, socket: ServerConnection) -> tuple[str | bytes, Grant]:
         """The first message of a client that has not brought a token yet, and what its token lets it do.
 
         Raises:
@@ -134,9 +134,9 @@ class Visits:
         with contextlib.suppress(ConnectionClosed, TimeoutError):
             async with asyncio.timeout(access.PATIENCE):
                 message = await socket.recv()
-        return message, self._guard.greets(message)
+        return message, self._access.check_hello(message)
 
-    async def _turn_away(self, socket: ServerConnection, client: WebSocketClient, error: HubError) -> None:
+    async def _reject(self, socket: ServerConnection, client: WebSocketWriter, error: JoinError) -> None:
         """Say why one who is here already may not stay."""
         self._sessions.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(socket), "status": error.status})
@@ -150,7 +150,7 @@ class Visits:
 
     async def _check(self, socket: ServerConnection) -> None:
         """An editor's own WebSocket: a text in, its faults out, one after the other."""
-        from realizer.server.http.page_tools import faults
+        from realizer.server.http.page_tools import lint
 
         loop = asyncio.get_running_loop()
         with contextlib.suppress(ConnectionClosed):
@@ -160,11 +160,11 @@ class Visits:
                     return
                 # One text at a time, whoever asks: those that play come first.
                 async with self._checking:
-                    told = await loop.run_in_executor(None, faults, text, self._settings)
+                    told = await loop.run_in_executor(None, lint, text, self._settings)
                 await socket.send(told)
 
 
-class WebSocketClient:
+class WebSocketWriter:
     """The way out to one WebSocket: what is sent is written at once, or waits in the socket's own buffer."""
 
     def __init__(self, socket: ServerConnection) -> None:
@@ -172,7 +172,7 @@ class WebSocketClient:
         self._end: asyncio.Task[None] | None = None
 
     @property
-    def waiting(self) -> int:
+    def unsent_bytes(self) -> int:
         transport = self._socket.transport
         return 0 if transport is None else transport.get_write_buffer_size()
 
@@ -183,7 +183,7 @@ class WebSocketClient:
             payload = data.encode() if isinstance(data, str) else data
             self._socket.transport.write(_head(text, len(payload)) + payload)
 
-    def end(self, code: int, reason: str) -> None:
+    def disconnect(self, code: int, reason: str) -> None:
         if self._end is None:
             self._end = asyncio.get_running_loop().create_task(self.close(code, reason))
 

@@ -9,9 +9,9 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from realizer.server.http.http_site import Answer
-from realizer.server.http.jwt_tokens import Pass
-from realizer.server.runtime.session_registry import HubError, Visitor
+from realizer.server.http.http_site import HttpResponse
+from realizer.server.http.jwt_tokens import Grant
+from realizer.server.runtime.session_registry import JoinError, Visitor
 
 
 def address_of(socket: ServerConnection) -> str:
@@ -28,7 +28,7 @@ def headers_of(request: Request) -> dict[str, str]:
     return {name.lower(): value for name, value in request.headers.raw_items()}
 
 
-def visitor_of(socket: ServerConnection, allowed: Pass | None) -> Visitor:
+def visitor_of(socket: ServerConnection, allowed: Grant | None) -> Visitor:
     """Who comes; as far as is known where no token has come yet."""
     return Visitor(address_of(socket), None if allowed is None else allowed.sessions)
 
@@ -49,11 +49,11 @@ def session_of(request: Request) -> tuple[str | None, int | None]:
     if seen is None:
         return session, None
     if not (seen.isascii() and seen.isdigit() and len(seen) < 16):
-        raise HubError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
+        raise JoinError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
     return session, int(seen)
 
 
-def response_to(answer: Answer) -> Response:
+def response_to(answer: HttpResponse) -> Response:
     headers = Headers(
         {
             "Content-Type": answer.media_type,

@@ -21,12 +21,12 @@ from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from realizer.core.settings import Settings
-from realizer.server.http.access import Guard
-from realizer.server.http.http_site import TEXT, Answer, Site
+from realizer.server.http.access import AccessControl
+from realizer.server.http.http_site import TEXT, HttpResponse, HttpSite
 from realizer.server.http.metrics import MEDIA_TYPE
-from realizer.server.runtime.session_host import Shell
-from realizer.server.runtime.session_registry import HubError
-from realizer.server.transports.websocket.connection import GOODBYE, Visits
+from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_registry import JoinError
+from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
 from realizer.server.transports.websocket.request import (
     address_of,
     headers_of,
@@ -44,23 +44,23 @@ PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 OPENING = 10.0  # s
 
 
-class WebSocketDoor:
+class WebSocketTransport:
     """Serves `settings.host`; `port` is the one that is open after `start`.
 
     Args:
-        worker: the number of this one among several; then it serves what it is told to `take`.
+        worker: the number of this one among several; then it serves what it is told to `serve_socket`.
     """
 
-    def __init__(self, shell: Shell, settings: Settings, *, worker: int | None = None) -> None:
+    def __init__(self, sessions: SessionHost, settings: Settings, *, worker: int | None = None) -> None:
         self.port = settings.port
         self._listens = worker is None
         self._worker = worker or 0
         self._taking: set[asyncio.Task[Any]] = set()
-        self._shell = shell
+        self._sessions = sessions
         self._settings = settings
-        self._guard = Guard(settings)
-        self._visits = Visits(shell, settings, self._guard)
-        self._site = Site(shell.health, settings)
+        self._access = AccessControl(settings)
+        self._connections = WebSocketConnections(sessions, settings, self._access)
+        self._site = HttpSite(sessions.health, settings)
         self._socket: SocketServer | None = None
         self._opened = WeakSet[ServerConnection]()
         self._closing: set[asyncio.Task[None]] = set()
@@ -76,20 +76,20 @@ class WebSocketDoor:
         return _addresses(self._settings, self.port)[1]
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        return lines(self._settings, self.port) if self._listens else ()
+    def startup_lines(self) -> tuple[str, ...]:
+        return startup_lines(self._settings, self.port) if self._listens else ()
 
     async def start(self) -> None:
         where: dict[str, Any] = {
             "host": self._settings.host,
             "port": self.port,
-            "ssl": self._guard.tls(),
+            "ssl": self._access.tls(),
         }
         if not self._listens:
-            where = {"unix": True, "sock": _nowhere()}
+            where = {"unix": True, "sock": _unreachable_socket()}
         where["create_connection"] = self._open
         self._socket = await listen(
-            self._visits.handle,
+            self._connections.handle,
             process_request=self._http,
             compression=None,  # frames are dense and late is worse than large
             max_size=self._settings.max_message,
@@ -102,7 +102,7 @@ class WebSocketDoor:
         if self._listens:
             self.port = next(iter(self._socket.sockets)).getsockname()[1]
 
-    def take(self, client: socket.socket) -> None:
+    def serve_socket(self, client: socket.socket) -> None:
         """Serve a connection that another process has accepted."""
         loop = asyncio.get_running_loop()
         taking = loop.create_task(loop.connect_accepted_socket(self._connection, client))
@@ -122,7 +122,7 @@ class WebSocketDoor:
     async def ready(self) -> None:
         return
 
-    def shut(self) -> None:
+    def stop_accepting(self) -> None:
         if self._socket is not None:
             self._socket.close(close_connections=False)
 
@@ -144,47 +144,47 @@ class WebSocketDoor:
         upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
         if path in ("/ws", "/check") and upgrade:
             try:
-                allowed = self._guard.request(request.path, headers_of(request), later=path == "/ws")
-                self._visits.check_room(connection)
+                allowed = self._access.request(request.path, headers_of(request), later=path == "/ws")
+                self._connections.check_room(connection)
                 if path == "/check":
-                    self._guard.room()
+                    self._access.check_memory()
                 else:
-                    self._shell.check(session_of(request)[0], visitor_of(connection, allowed))
-            except HubError as error:
+                    self._sessions.check(session_of(request)[0], visitor_of(connection, allowed))
+            except JoinError as error:
                 return self._refused(connection, error)
             return None
         if path in ("/ws", "/check") or upgrade:
             got = "a WebSocket" if upgrade else "plain HTTP"
             words = f"wanted a WebSocket at /ws or /check, got {got} at {path}\n"
-            return response_to(Answer(426 if not upgrade else 404, TEXT, words.encode()))
-        if path in ("/metrics", "/healthz") and (wrong := self._another(request)) is not None:
-            return response_to(Answer(404, TEXT, f"{wrong}\n".encode()))
+            return response_to(HttpResponse(426 if not upgrade else 404, TEXT, words.encode()))
+        if path in ("/metrics", "/healthz") and (wrong := self._wrong_worker(request)) is not None:
+            return response_to(HttpResponse(404, TEXT, f"{wrong}\n".encode()))
         if path == "/metrics":
             try:
-                allowed = self._guard.request(request.path, headers_of(request))
+                allowed = self._access.request(request.path, headers_of(request))
                 if allowed is None or allowed.sessions is not None:
-                    raise HubError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
-            except HubError as error:
+                    raise JoinError(http.HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
+            except JoinError as error:
                 return self._refused(connection, error)
-            return response_to(Answer(200, MEDIA_TYPE, self._shell.measured().encode()))
+            return response_to(HttpResponse(200, MEDIA_TYPE, self._sessions.metrics_text().encode()))
         loop = asyncio.get_running_loop()
         return response_to(await loop.run_in_executor(None, self._site.answer, request.path))
 
-    def _another(self, request: Request) -> str | None:
+    def _wrong_worker(self, request: Request) -> str | None:
         """Why the worker that a request names is not this one; None where it is, or none is named."""
         named = query_of(request).get("worker")
         if named in (None, str(self._worker)):
             return None
         return f"worker: wanted a number of 0..{self._settings.workers - 1}, got {named[:80]!r}"
 
-    def _refused(self, connection: ServerConnection, error: HubError) -> Response:
-        self._shell.metrics.counts["refused"] += 1
+    def _refused(self, connection: ServerConnection, error: JoinError) -> Response:
+        self._sessions.metrics.counts["refused"] += 1
         log.info("refused: %s", error, extra={"address": address_of(connection), "status": error.status})
         headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
-        return response_to(Answer(error.status, TEXT, f"{error}\n".encode(), headers))
+        return response_to(HttpResponse(error.status, TEXT, f"{error}\n".encode(), headers))
 
 
-def _nowhere() -> socket.socket:
+def _unreachable_socket() -> socket.socket:
     """A socket to listen on that nobody can reach: the package's server must listen to serve at all."""
     here = socket.socket(socket.AF_UNIX)
     # In a container memory may be the only place that can be written.
@@ -195,7 +195,7 @@ def _nowhere() -> socket.socket:
     return here
 
 
-def lines(settings: Settings, port: int) -> tuple[str, ...]:
+def startup_lines(settings: Settings, port: int) -> tuple[str, ...]:
     """What a service prints that is open at a port."""
     service, page = _addresses(settings, port)
     return f"listening on {service}", f"page at {page}"

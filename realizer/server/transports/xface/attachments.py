@@ -16,7 +16,7 @@ from realizer.behaviours.media import media_file
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, raises
-from realizer.server.documents.limits import too_large
+from realizer.server.documents.limits import size_error
 from realizer.server.transports.xface.wire import Task
 
 ROOM = 2**10  # bytes of a document that are not its keys
@@ -30,10 +30,10 @@ class Script:
     blocks: tuple[str, ...]
 
 
-Brought = FAPClip | Script | RealizerError | None
+Attachment = FAPClip | Script | RealizerError | None
 
 
-class Empty(RealizerError):
+class MissingAttachment(RealizerError):
     """A task without what it should bring."""
 
 
@@ -56,7 +56,7 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
             return _clip(path.read_bytes(), settings)
         case "UPLOAD_SCRIPT", (text, processor, *_) if processor.strip().upper() == "BML":
             script = text if "<" in text else unescape(text)
-            if (large := too_large(script, settings)) is not None:
+            if (large := size_error(script, settings)) is not None:
                 raise RealizerError(large)
             items = list(read(script, VOCABULARY, max_bytes=settings.max_document))
             blocks = tuple(item.id for item in items if isinstance(item, Block))
@@ -67,7 +67,7 @@ def prepare(task: Task, settings: Settings) -> FAPClip | Script | None:
         case "UPLOAD_SCRIPT", (_, processor, *_):
             raise RealizerError(f"wanted the processor BML, got {processor.strip()[:60]!r}")
         case (("UPLOAD_FAP" | "LOAD_FAP" | "UPLOAD_SCRIPT"), _):
-            raise Empty("wanted params, got none, or empty ones")
+            raise MissingAttachment("wanted params, got none, or empty ones")
     return None
 
 

@@ -8,7 +8,7 @@ import json
 import logging
 
 from realizer.core.settings import Settings
-from realizer.server.runtime.session_registry import HubError
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.transport import Sessions
 from realizer.server.transports.xface.player_link import PlayerLink, State
 
@@ -26,7 +26,7 @@ WANTS = (
 )
 
 
-class XfacePlayerDoor:
+class XfacePlayerTransport:
     """A client of the player at `settings.xface_player` that comes back whenever the player does.
 
     What it shows is the first face of the session `settings.xface_player_session`, which is made for it.
@@ -45,18 +45,18 @@ class XfacePlayerDoor:
         self._keeper: asyncio.Task[None] | None = None
 
     @property
-    def lines(self) -> tuple[str, ...]:
+    def startup_lines(self) -> tuple[str, ...]:
         settings = self._settings
         return (f"xface player: {settings.xface_player} shows session {settings.xface_player_session}",)
 
     async def start(self) -> None:
         self._loop = asyncio.get_running_loop()
-        self._keeper = asyncio.create_task(self._keep())
+        self._keeper = asyncio.create_task(self._keep_connected())
 
     async def ready(self) -> None:
         await self._up.wait()
 
-    def shut(self) -> None:
+    def stop_accepting(self) -> None:
         """What plays is shown to its end."""
 
     async def close(self) -> None:
@@ -68,7 +68,7 @@ class XfacePlayerDoor:
     # the session's side --------------------------------------------------------------------------
 
     @property
-    def waiting(self) -> int:
+    def unsent_bytes(self) -> int:
         """Nothing: of the frames that come, only the newest is kept."""
         return 0
 
@@ -80,25 +80,25 @@ class XfacePlayerDoor:
                 self._link.show(message["values"])
                 self._pump()
 
-    def end(self, code: int, reason: str) -> None:
+    def disconnect(self, code: int, reason: str) -> None:
         log.warning("xface player: session %s ends: %s", self._settings.xface_player_session, reason)
         if self._writer is not None:
             self._writer.transport.abort()  # and soon there is another one
 
     # the player's side ---------------------------------------------------------------------------
 
-    async def _keep(self) -> None:
+    async def _keep_connected(self) -> None:
         """Be connected, until cancelled."""
         name = self._settings.xface_player
         pause, told = FIRST_RETRY, False
         while True:
             try:
-                reader = await self._greeted()
+                reader = await self._connect()
                 log.log(logging.WARNING if told else logging.INFO, "xface player: %s shows us", name)
                 pause, told = FIRST_RETRY, False
                 await self._show(reader)
                 words = f"the player at {name} is gone"
-            except HubError as error:
+            except JoinError as error:
                 words = str(error)
             except OSError as error:  # a timeout is one too
                 words = f"no player at {name} ({error.strerror or str(error) or 'nobody answers'})"
@@ -110,17 +110,17 @@ class XfacePlayerDoor:
             await asyncio.sleep(pause)
             pause = min(2 * pause, LAST_RETRY)
 
-    async def _greeted(self) -> asyncio.StreamReader:
+    async def _connect(self) -> asyncio.StreamReader:
         """A connection to a player that has said its greeting."""
         async with asyncio.timeout(ATTEMPT):
             reader, self._writer = await asyncio.open_connection(*self._address)
             if self._writer.get_extra_info("sockname") == self._writer.get_extra_info("peername"):
                 raise OSError("nobody answers")  # TCP has met itself on the way
-            self._link.opened()
+            self._link.on_connect()
             while self._link.state is State.GREETING:
                 if not (data := await reader.read(READ)):
                     raise OSError("it closes the connection")
-                self._link.heard(data)
+                self._link.receive(data)
         return reader
 
     async def _show(self, reader: asyncio.StreamReader) -> None:
@@ -131,7 +131,7 @@ class XfacePlayerDoor:
             for wants in WANTS:
                 self._sessions.receive(number, wants)
             while data := await reader.read(READ):
-                self._link.heard(data)
+                self._link.receive(data)
                 self._pump()
         finally:
             self._sessions.leave(number)
@@ -156,5 +156,5 @@ class XfacePlayerDoor:
         if self._writer is not None:
             self._writer.transport.abort()
             self._writer = None
-        self._link.closed()
+        self._link.on_disconnect()
         self._pump()

@@ -60,7 +60,7 @@ class PlayerLink:
         self._sent = 0.0
         self._told: set[str] = set()
 
-    def opened(self) -> None:
+    def on_connect(self) -> None:
         """A connection stands; the player speaks first."""
         assert self.state is State.CLOSED, "connected already"
         self._data.clear()
@@ -70,7 +70,7 @@ class PlayerLink:
         self._told.clear()
         self._go(State.GREETING)
 
-    def closed(self) -> None:
+    def on_disconnect(self) -> None:
         """The connection is gone."""
         self._go(State.CLOSED)
 
@@ -78,7 +78,7 @@ class PlayerLink:
         """This frame, 68 whole numbers in each FAP's FAPU, in place of any that was not sent yet."""
         self._wanted = tuple(values)
 
-    def heard(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         """What the player said."""
         self._data += data
         for note in read_notes(self._data):
@@ -87,15 +87,15 @@ class PlayerLink:
                 self._go(State.READY)
             elif self.state in _WAITING and note.id == self._number and note.status in _ENDED:
                 if note.status == Status.ERROR:
-                    self._tell(f"it cannot do {note.name}")
+                    self._log_once(f"it cannot do {note.name}")
                 self._ended()
             elif note.name == "ERROR":
-                self._tell("it does not understand a task")
+                self._log_once("it does not understand a task")
 
     def due(self, now: float) -> bytes | None:
         """The task to send now, if there is one; it is to be sent whole, by itself."""
         if self.state in _WAITING and now >= self._sent + PATIENCE:
-            self._tell("it says nothing of a task; going on")
+            self._log_once("it says nothing of a task; going on")
             self._ended()
         if self.state is State.UPLOADED:
             self._go(State.STOPPING)
@@ -130,7 +130,7 @@ class PlayerLink:
         """The task on its way is done, or lost."""
         self._go(State.UPLOADED if self.state is State.UPLOADING else State.READY)
 
-    def _tell(self, what: str) -> None:
+    def _log_once(self, what: str) -> None:
         """Once for each connection: it may be so of every frame."""
         if what not in self._told:
             self._told.add(what)

@@ -13,14 +13,14 @@ from bml_schema.feedback import parse_feedback
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours.fap_document import document_of
 from realizer.core.errors import RealizerError
-from realizer.server.transports.message_format import Leave, ToSession
-from realizer.server.transports.xface.attachments import Brought, Empty, Script
+from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.xface.attachments import Attachment, MissingAttachment, Script
 from realizer.server.transports.xface.wire import Status, Task, pack_note
 from realizer.tables import faps
 
 log = logging.getLogger(__name__)
 
-Answer = bytes | ToSession | Leave
+Answer = bytes | Inbound | Disconnect
 ERROR = pack_note("ERROR", 0, 0, Status.ERROR)
 # Tasks of the player that ask for what it has and we have not: its meshes, its scripts, its films.
 UNABLE = frozenset(
@@ -36,28 +36,28 @@ ABLE = frozenset(
     }
 )
 _NAMES = tuple(row.name for row in faps()[2:])
-MOST_WAITING = 100  # tasks of a client that wait for what plays
+MAX_WAITING = 100  # tasks of a client that wait for what plays
 
 
 @dataclass(eq=False, slots=True)
-class _Running:
+class _RunningTask:
     """A task whose blocks play, or will.
 
     Attributes:
-        planned, started, left: those of its blocks that are, that have, that have not ended yet.
+        planned, started, blocks_left: those of its blocks that are, that have, that have not ended yet.
         clip: what plays, where it is no script.
         began: seconds, when the first of them started.
     """
 
     task: Task
-    left: set[str]
+    blocks_left: set[str]
     clip: FAPClip | None = None
     planned: set[str] = field(default_factory=set)
     started: bool = False
     began: float = 0.0
 
 
-class Desk:
+class TaskRunner:
     """The player as one client sees it: what it has loaded, what plays of it, and what waits.
 
     A FAP file plays as a BML block with an id of our own; a pose is held by a `set` message, which lets go of
@@ -73,9 +73,9 @@ class Desk:
         self._clip: FAPClip | None = None
         self._first = 0  # the frame that playing begins with
         self._moved: dict[str, float] = {}  # names of the FAPs of the pose that is held, all 0
-        self._playing: _Running | None = None
+        self._playing: _RunningTask | None = None
         self._waiting: deque[Task] = deque()
-        self._scripts: list[_Running] = []
+        self._scripts: list[_RunningTask] = []
         self._count = 0
 
     @property
@@ -89,58 +89,62 @@ class Desk:
             log.info("xface: wanted a task of the player, got %s", task.name)
             yield from self.refuse(task)
         elif task.name != "KILL_APP":
-            yield from _told(task, Status.QUEUED)
+            yield from _notes(task, Status.QUEUED)
 
     def refuse(self, task: Task) -> Iterator[Answer]:
         """What is said of a task that is none of the player's, or of which only the head was read."""
         if task.name in ABLE | UNABLE:
-            yield from _told(task, Status.ERROR)
+            yield from _notes(task, Status.ERROR)
         else:
             yield pack_note("ERROR", task.owner, task.id, Status.ERROR)
 
-    def run(self, task: Task, brought: Brought, now: float) -> Iterator[Answer]:
+    def run(self, task: Task, attachment: Attachment, now: float) -> Iterator[Answer]:
         """Do what a task asks, once it has been accepted.
 
         Args:
-            brought: what `prepare` made of it, or raised.
+            attachment: what `prepare` made of it, or raised.
         """
-        if isinstance(brought, RealizerError) or task.name in UNABLE:
-            log.info("xface: %s: %s", task.name, brought or "not something this player does")
-            yield from _told(task, Status.ERROR)
-            if isinstance(brought, RealizerError) and not isinstance(brought, Empty) and "FAP" in task.name:
-                yield from _told(task, Status.FINISHED)  # clients of the player count on it
+        if isinstance(attachment, RealizerError) or task.name in UNABLE:
+            log.info("xface: %s: %s", task.name, attachment or "not something this player does")
+            yield from _notes(task, Status.ERROR)
+            if (
+                isinstance(attachment, RealizerError)
+                and not isinstance(attachment, MissingAttachment)
+                and "FAP" in task.name
+            ):
+                yield from _notes(task, Status.FINISHED)  # clients of the player count on it
             return
-        match task.name, brought:
+        match task.name, attachment:
             case (("UPLOAD_FAP" | "LOAD_FAP"), FAPClip()):
-                yield from _told(task, Status.STARTED)
-                self._clip, self._first = brought, 0
-                if len(brought.values) == 1 and self._playing is None:
+                yield from _notes(task, Status.STARTED)
+                self._clip, self._first = attachment, 0
+                if len(attachment.values) == 1 and self._playing is None:
                     yield self._show(0)  # the player there is waits for a stop; nobody needs that
-                yield from _told(task, Status.FINISHED)
+                yield from _notes(task, Status.FINISHED)
             case "UPLOAD_SCRIPT", Script(text, blocks):
-                self._scripts.append(_Running(task, set(blocks)))
-                yield ToSession(text)
+                self._scripts.append(_RunningTask(task, set(blocks)))
+                yield Inbound(text)
             case "RESUME_PLAYBACK", _:
                 yield from self._resume(task)
             case (("STOP_PLAYBACK" | "REWIND_PLAYBACK"), _):
                 yield from self._stop(rewind=True)
-                yield from _told(task, Status.FINISHED)
+                yield from _notes(task, Status.FINISHED)
             case "PAUSE_PLAYBACK", _:
                 one, clip = self._playing, self._clip
                 if one is not None and clip is not None and one.clip is clip and one.started:
                     passed = int((now - one.began) * clip.fps)
                     self._first = min(self._first + max(passed, 0), len(clip.values) - 1)
                 yield from self._stop(rewind=False)
-                yield from _told(task, Status.FINISHED)
+                yield from _notes(task, Status.FINISHED)
             case "ADVANCE_FRAME", _:
                 if self._clip is not None and self._playing is None:
                     self._first = min(self._first + 1, len(self._clip.values) - 1)
                     yield self._show(self._first)
             case "KILL_APP", _:
-                yield from _told(task, Status.FINISHED)
-                yield Leave()
+                yield from _notes(task, Status.FINISHED)
+                yield Disconnect()
 
-    def told(self, text: str, now: float) -> Iterator[Answer]:
+    def on_feedback(self, text: str, now: float) -> Iterator[Answer]:
         """What is said when the session tells `text`."""
         if not text.startswith("<"):
             return
@@ -150,29 +154,29 @@ class Desk:
         match parse_feedback(text):
             case PredictionFeedback(blocks=blocks):
                 for one in running:
-                    one.planned |= {b.id for b in blocks if b.status != "IN_PREP"} & one.left
+                    one.planned |= {b.id for b in blocks if b.status != "IN_PREP"} & one.blocks_left
             case BlockProgress(id=id):
                 block, _, point = id.rpartition(":")
-                for one in (one for one in running if block in one.left):
+                for one in (one for one in running if block in one.blocks_left):
                     yield from self._progress(one, block, point, now)
             case WarningFeedback(id=block, text=why):
-                for one in (one for one in running if block in one.left - one.planned):
+                for one in (one for one in running if block in one.blocks_left - one.planned):
                     log.info("xface: %s: %s: %s", one.task.name, block, why)
                     yield from self._ended(one, block)
 
-    def _progress(self, one: _Running, block: str, point: str, now: float) -> Iterator[Answer]:
+    def _progress(self, one: _RunningTask, block: str, point: str, now: float) -> Iterator[Answer]:
         if point == "start" and not one.started:
             one.started, one.began = True, now
-            yield from _told(one.task, Status.STARTED)
+            yield from _notes(one.task, Status.STARTED)
         elif point == "end":
             yield from self._ended(one, block)
 
-    def _ended(self, one: _Running, block: str) -> Iterator[Answer]:
+    def _ended(self, one: _RunningTask, block: str) -> Iterator[Answer]:
         """A block has ended, or was refused; with the last one of a task so has the task."""
-        one.left.discard(block)
-        if one.left:
+        one.blocks_left.discard(block)
+        if one.blocks_left:
             return
-        yield from _told(one.task, Status.FINISHED if one.started else Status.ERROR)
+        yield from _notes(one.task, Status.FINISHED if one.started else Status.ERROR)
         if one is not self._playing:
             self._scripts.remove(one)
             return
@@ -181,22 +185,22 @@ class Desk:
             yield from self._resume(self._waiting.popleft())
 
     def _resume(self, task: Task) -> Iterator[Answer]:
-        if self._playing is not None and len(self._waiting) < MOST_WAITING:
+        if self._playing is not None and len(self._waiting) < MAX_WAITING:
             self._waiting.append(task)
         elif self._clip is None or self._playing is not None:
-            yield from _told(task, Status.ERROR)
+            yield from _notes(task, Status.ERROR)
         elif len(self._clip.values) - self._first < 2 or not self._clip.mask[2:].any():
-            yield from _told(task, Status.STARTED)
+            yield from _notes(task, Status.STARTED)
             yield self._show(self._first)
-            yield from _told(task, Status.FINISHED)
+            yield from _notes(task, Status.FINISHED)
         else:
             self._count += 1
             block = f"xface-{self.owner}-{self._count}"
             document = document_of(self._clip.from_frame(self._first), block)
-            self._playing = _Running(task, {block}, self._clip)
+            self._playing = _RunningTask(task, {block}, self._clip)
             self._moved = {}
-            yield _held({})
-            yield ToSession(document)
+            yield _hold_faps({})
+            yield Inbound(document)
 
     def _stop(self, *, rewind: bool) -> Iterator[Answer]:
         """End what plays and what waits to, and show the frame where playing would begin."""
@@ -207,36 +211,36 @@ class Desk:
             ended += self._scripts
             self._scripts = []
         if ended:
-            blocks = {block for one in ended for block in one.left}
-            yield ToSession(json.dumps({"type": "stop", "blocks": sorted(blocks)}))
+            blocks = {block for one in ended for block in one.blocks_left}
+            yield Inbound(json.dumps({"type": "stop", "blocks": sorted(blocks)}))
         for one in ended:
             if not one.started:
-                yield from _told(one.task, Status.STARTED)
-            yield from _told(one.task, Status.FINISHED)
+                yield from _notes(one.task, Status.STARTED)
+            yield from _notes(one.task, Status.FINISHED)
         waiting, self._waiting = self._waiting, deque()
         for task in waiting:
-            yield from _told(task, Status.FINISHED)
+            yield from _notes(task, Status.FINISHED)
         if self._clip is not None:
             yield self._show(self._first)
 
-    def _show(self, frame: int) -> ToSession:
+    def _show(self, frame: int) -> Inbound:
         """Hold one frame of the clip."""
         assert self._clip is not None
         values: dict[str, float] = {}
         for row, value in zip(faps(), self._clip.values[frame].tolist(), strict=True):
             if value:
                 values[row.name] = max(row.least, min(row.most, float(value)))
-        held = _held(self._moved | values)
+        held = _hold_faps(self._moved | values)
         self._moved = dict.fromkeys(values, 0.0)
         return held
 
 
-def _held(values: dict[str, float]) -> ToSession:
+def _hold_faps(values: dict[str, float]) -> Inbound:
     """Hold these FAPs by name, and no others, whoever set them."""
-    return ToSession(json.dumps({"type": "set", "faps": dict.fromkeys(_NAMES) | values}))
+    return Inbound(json.dumps({"type": "set", "faps": dict.fromkeys(_NAMES) | values}))
 
 
-def _told(task: Task, status: Status) -> Iterator[bytes]:
+def _notes(task: Task, status: Status) -> Iterator[bytes]:
     """A note to the client, where it wants notes."""
     if task.owner:
         yield pack_note(task.name, task.owner, task.id, status)

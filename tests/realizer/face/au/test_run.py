@@ -21,7 +21,7 @@ from realizer.face.model import Face
 from realizer.playback.player import Player
 from realizer.render import Renderer
 from realizer.server.session.session import Session
-from realizer.server.streams.frame_windows import Timeline
+from realizer.server.streams.frame_windows import FrameTimeline
 
 pytestmark = pytest.mark.xdist_group("render")
 
@@ -122,7 +122,7 @@ def test_meshes_of_a_session_are_those_of_a_film(faces: dict[str, Face]) -> None
 
     face = faces["au"]
     player = Player(PlayOptions(idle=True, seed=3))
-    window = Timeline(player, 0, 25, lambda: face).window(0, 20)
+    window = FrameTimeline(player, 0, 25, lambda: face).window(0, 20)
     assert window.poses.shape == (window.count, len(face.inputs))
     meshes = quantise(face, deform(face, window.poses[:30]))
     for row in (0, 29, 7, 8):  # in any order

@@ -8,12 +8,12 @@ from bml_schema import Block
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
-from realizer.server.documents.document_queue import Inbox, Stopped
+from realizer.server.documents.document_queue import CancelledBlock, DocumentQueue
 
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'
 
 
-def read(box: Inbox) -> list[Block | Stopped | Warning]:
+def read(box: DocumentQueue) -> list[Block | CancelledBlock | Warning]:
     found = []
     while (item := box.next()) is not None:
         found.append(item)
@@ -21,7 +21,7 @@ def read(box: Inbox) -> list[Block | Stopped | Warning]:
 
 
 def test_documents_come_out_in_order_with_faults_where_they_stand() -> None:
-    box = Inbox(Settings())
+    box = DocumentQueue(Settings())
     assert box.put(WAIT.format("a") + "<bml id='x'><oops" + WAIT.format("b")) is None
     assert box.put(WAIT.format("c")) is None
     items = read(box)
@@ -31,7 +31,7 @@ def test_documents_come_out_in_order_with_faults_where_they_stand() -> None:
 
 
 def test_a_message_that_is_too_long_is_refused_by_name() -> None:
-    box = Inbox(Settings(max_document=40))
+    box = DocumentQueue(Settings(max_document=40))
     refused = box.put(WAIT.format("a"))
     assert refused is not None
     assert (refused.id, refused.type) == ("a", "PARSING_FAILURE")
@@ -39,31 +39,31 @@ def test_a_message_that_is_too_long_is_refused_by_name() -> None:
     assert not box
 
 
-def names(box: Inbox) -> str:
+def names(box: DocumentQueue) -> str:
     """Ids in order, those that are stopped in brackets."""
-    return " ".join(f"({i.block.id})" if isinstance(i, Stopped) else i.id for i in read(box))
+    return " ".join(f"({i.block.id})" if isinstance(i, CancelledBlock) else i.id for i in read(box))
 
 
 def test_what_is_stopped_before_it_is_read_comes_out_as_such_and_what_comes_later_does_not() -> None:
-    box = Inbox(Settings())
+    box = DocumentQueue(Settings())
     box.put(WAIT.format("a") + WAIT.format("b") + WAIT.format("c"))
     first = box.next()
     assert isinstance(first, Block)
     assert first.id == "a"
     box.put(WAIT.format("b"))
-    box.stop(["b", "x"])
+    box.cancel(["b", "x"])
     box.put(WAIT.format("b") + WAIT.format("x"))
     assert names(box) == "(b) c (b) b x"
-    box.stop(["b"])  # there is none
+    box.cancel(["b"])  # there is none
     box.put(WAIT.format("b"))
     box.put(WAIT.format("c"))
-    box.stop(None)
+    box.cancel(None)
     box.put(WAIT.format("d"))
     assert names(box) == "(b) (c) d"
 
 
 def test_too_many_messages_are_refused() -> None:
-    box = Inbox(Settings(max_blocks=1))
+    box = DocumentQueue(Settings(max_blocks=1))
     assert box.put(WAIT.format("a")) is None
     refused = box.put(WAIT.format("b"))
     assert refused is not None
@@ -73,7 +73,7 @@ def test_too_many_messages_are_refused() -> None:
 
 
 def test_too_many_behaviours_are_refused_where_they_stand_and_reading_goes_on() -> None:
-    box = Inbox(Settings(max_behaviours=1))
+    box = DocumentQueue(Settings(max_behaviours=1))
     two = '<bml id="two"><wait id="a"/><wait id="b"/></bml>'
     assert box.put(two + WAIT.format("one")) is None
     refused, read_on = read(box)
@@ -87,7 +87,7 @@ def test_too_many_behaviours_are_refused_where_they_stand_and_reading_goes_on() 
 def test_what_the_limits_let_in_is_read_however_large() -> None:
     waits = "".join(f'<wait id="w{k}"/>' for k in range(10_001))
     text = f'<bml id="b"><!--{"x" * 2**20}-->{waits}</bml>'
-    box = Inbox(Settings(max_document=2 * 2**20, max_behaviours=20_000))
+    box = DocumentQueue(Settings(max_document=2 * 2**20, max_behaviours=20_000))
     assert box.put(text) is None
     (block,) = read(box)
     assert isinstance(block, Block)
@@ -95,7 +95,7 @@ def test_what_the_limits_let_in_is_read_however_large() -> None:
 
 
 def test_a_bug_of_the_reader_costs_one_message(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
-    box = Inbox(Settings())
+    box = DocumentQueue(Settings())
 
     def broken(*_, **__):
         raise RuntimeError("a bug")

@@ -16,11 +16,11 @@ from realizer.scheduling.timing import Schedule
 from realizer.server.documents import limits
 from realizer.server.documents.limits import (
     MAX_CHARACTERS,
-    beyond,
-    too_large,
-    too_long,
-    too_many_pixels,
-    used_up,
+    block_limit_error,
+    duration_error,
+    memory_error,
+    pixel_rate_error,
+    size_error,
 )
 
 SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
@@ -45,38 +45,41 @@ def block(text: str) -> Block:
 def test_a_refusal_says_which_limit_what_came_and_where_it_is_set(
     most: dict[str, int], text: str, busy: int, says: str
 ) -> None:
-    words = beyond(block(text), Settings(**most), busy, ())
+    words = block_limit_error(block(text), Settings(**most), busy, ())
     assert words is not None
     assert says in words
     (name,) = most
     assert words.endswith(f"(REALIZER_{name.upper()} sets it)")
-    assert beyond(block(text), Settings(), busy, ()) is None
+    assert block_limit_error(block(text), Settings(), busy, ()) is None
 
 
 def test_the_last_character_that_has_room_comes_in_and_no_other() -> None:
     crowd = [f"c{k}" for k in range(MAX_CHARACTERS)]
     known, new = (block(f'<bml id="b" characterId="{name}"/>') for name in ("c3", "another"))
-    assert beyond(new, Settings(), 0, crowd[:-1]) is None
-    assert beyond(known, Settings(), 0, crowd) is None
-    assert beyond(new, Settings(), 0, crowd) == f"wanted at most {MAX_CHARACTERS} characters in a session"
+    assert block_limit_error(new, Settings(), 0, crowd[:-1]) is None
+    assert block_limit_error(known, Settings(), 0, crowd) is None
+    assert (
+        block_limit_error(new, Settings(), 0, crowd)
+        == f"wanted at most {MAX_CHARACTERS} characters in a session"
+    )
 
 
 def test_what_is_too_large_to_be_read_is_counted_in_bytes_and_elements() -> None:
     text = '<bml id="b"><!-- é --><wait id="w"/></bml>'
     size = len(text.encode())
-    assert too_large(text, Settings(max_document=size, max_elements=3)) is None  # a comment counts
-    words = too_large(text, Settings(max_document=size - 1))
+    assert size_error(text, Settings(max_document=size, max_elements=3)) is None  # a comment counts
+    words = size_error(text, Settings(max_document=size - 1))
     assert words == (
         f"wanted at most {size - 1} bytes of BML in a message, got {size} (REALIZER_MAX_DOCUMENT sets it)"
     )
-    words = too_large(text, Settings(max_elements=2))
+    words = size_error(text, Settings(max_elements=2))
     assert words == "wanted at most 2 elements in a message, got 3 (REALIZER_MAX_ELEMENTS sets it)"
 
 
 def test_a_block_that_is_planned_to_last_too_long_is_not_played() -> None:
     minute = '<bml id="b"><wait id="w" duration="60.5"/></bml>'
-    assert too_long(block(minute), schedule(minute), Settings(max_duration=61)) is None
-    words = too_long(block(minute), schedule(minute), Settings(max_duration=60))
+    assert duration_error(block(minute), schedule(minute), Settings(max_duration=61)) is None
+    words = duration_error(block(minute), schedule(minute), Settings(max_duration=60))
     assert words == "wanted a block of at most 60 s, got 60.5 (REALIZER_MAX_DURATION sets it)"
 
 
@@ -84,13 +87,13 @@ def test_a_block_that_is_planned_to_last_too_long_is_not_played() -> None:
 def test_what_others_say_may_come_later_than_any_block_lasts(point: str) -> None:
     tied = f'<bml id="b"><wait id="w" start="0" end="{point}"/></bml>'
     late = Schedule("b", {"w": ("start", "end")}, {"w": np.array([0.0, 1e6])})
-    assert too_long(block(tied), late, Settings()) is None
+    assert duration_error(block(tied), late, Settings()) is None
 
 
 def test_the_longest_speech_that_is_taken_is_no_block_that_lasts_too_long() -> None:
     settings = Settings()
     text = SPEECH.format("Hello there. " * (settings.max_speech // 13))
-    assert too_long(block(text), schedule(text, voice="silent"), settings) is None
+    assert duration_error(block(text), schedule(text, voice="silent"), settings) is None
 
 
 def test_memory_is_counted_where_the_system_says_and_where_it_does_not(
@@ -99,19 +102,19 @@ def test_memory_is_counted_where_the_system_says_and_where_it_does_not(
     few, many = Settings(max_memory=64), Settings(max_memory=10**7)
     for file in (limits.MEMORY, tmp_path / "none"):
         monkeypatch.setattr(limits, "MEMORY", file)
-        assert used_up(many) is None
-        assert used_up(Settings()) is None
-        assert "wanted at most 64 (REALIZER_MAX_MEMORY sets it)" in str(used_up(few))
+        assert memory_error(many) is None
+        assert memory_error(Settings()) is None
+        assert "wanted at most 64 (REALIZER_MAX_MEMORY sets it)" in str(memory_error(few))
 
 
 def test_large_pictures_are_drawn_at_a_low_rate_only() -> None:
     settings = Settings(max_pixels=1e6)
-    assert too_many_pixels((200, 200), 25.0, settings) is None
-    words = too_many_pixels((201, 200), 25.0, settings)
+    assert pixel_rate_error((200, 200), 25.0, settings) is None
+    words = pixel_rate_error((201, 200), 25.0, settings)
     assert words is not None
     assert "201x200 at 25 fps (REALIZER_MAX_PIXELS sets it)" in words
-    assert too_many_pixels((100, 100), 25.0, settings, 750_000) is None
-    assert "beside 750001 of others" in str(too_many_pixels((100, 100), 25.0, settings, 750_001))
+    assert pixel_rate_error((100, 100), 25.0, settings, 750_000) is None
+    assert "beside 750001 of others" in str(pixel_rate_error((100, 100), 25.0, settings, 750_001))
 
 
 def test_every_limit_has_words_of_its_own_in_the_settings() -> None:

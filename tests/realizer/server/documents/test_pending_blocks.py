@@ -6,7 +6,7 @@ import pytest
 
 from bml_schema import parse
 from realizer.behaviours.registry import VOCABULARY
-from realizer.server.documents.pending_blocks import Preparation
+from realizer.server.documents.pending_blocks import PendingBlocks
 from realizer.speech.utterance import SpeechRequest
 from tests.realizer.server.conftest import spoken
 
@@ -16,9 +16,9 @@ def block(text: str):
 
 
 @pytest.fixture
-def talking() -> Preparation:
+def talking() -> PendingBlocks:
     """A block "a" whose speech 1 is still to be spoken."""
-    preparation = Preparation()
+    preparation = PendingBlocks()
     preparation.add(
         block('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>'),
         0,
@@ -47,15 +47,15 @@ def talking() -> Preparation:
 )
 def test_a_block_waits_only_for_what_it_depends_on(talking, later, character, waits) -> None:
     waiting = talking.add(block(later), character, {}, 1.0)
-    assert bool(waiting.after) is waits
-    assert (talking.ready() is None) is waits
+    assert bool(waiting.predecessors) is waits
+    assert (talking.first_ready() is None) is waits
 
 
 def test_a_spoken_block_is_ready_and_lets_the_next_one_go(talking) -> None:
     talking.add(block('<bml id="b" composition="APPEND"><wait id="w"/></bml>'), 0, {}, 1.0)
-    talking.spoken(1, spoken())
+    talking.add_utterance(1, spoken())
     order = []
-    while (ready := talking.ready()) is not None:
+    while (ready := talking.first_ready()) is not None:
         order.append(ready)
         talking.remove([ready])
     assert [w.block.id for w in order] == ["a", "b"]
@@ -63,9 +63,9 @@ def test_a_spoken_block_is_ready_and_lets_the_next_one_go(talking) -> None:
 
 
 def test_an_answer_nobody_waits_for_is_dropped(talking) -> None:
-    talking.spoken(99, spoken())
-    assert talking.said(99) is None
-    assert talking.said(1).ssml == "Hi"
+    talking.add_utterance(99, spoken())
+    assert talking.request_of(99) is None
+    assert talking.request_of(1).ssml == "Hi"
 
 
 def test_what_takes_too_long_is_told(talking) -> None:

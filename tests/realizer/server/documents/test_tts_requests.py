@@ -53,7 +53,7 @@ def test_the_first_clause_sounds_before_the_rest_is_made_and_all_of_it_is_what_w
     driver = Driver(mute=True)
     driver.send({"type": "subscribe", "stream": "audio", "rate": RATE})
     driver.send(BLOCK.format("b", "", TEXT, NOD))
-    assert [len(o.say.ssml) < 160 for o in driver.spoken] == [True]
+    assert [len(o.request.ssml) < 160 for o in driver.spoken] == [True]
     assert answer(driver, voice)
     first = driver.run(0.1)
     assert [f.stream for f in first.frames] == ["audio"] * len(first.frames)
@@ -62,10 +62,10 @@ def test_the_first_clause_sounds_before_the_rest_is_made_and_all_of_it_is_what_w
         driver.run(driver.now + 0.2)
     speaking = driver.session.player.speech()[0]
     client = driver.run(200)
-    heard = np.concatenate([f.values for f in client.frames if not f.forget])
+    heard = np.concatenate([f.values for f in client.frames if not f.flush])
     start = round((speaking.start - client.frames[0].time) * RATE)
     assert np.array_equal(heard[start:][: len(speaking.utterance.pcm)], speaking.utterance.pcm)
-    assert not [f for f in client.frames if f.forget], "what was sent ahead stays true"
+    assert not [f for f in client.frames if f.flush], "what was sent ahead stays true"
     frames = [f.frame for f in client.frames]
     assert frames == list(range(frames[0], frames[-1] + 1)), "no gap"
 
@@ -111,7 +111,7 @@ def test_lips_move_in_every_part_and_do_not_jump_where_the_next_one_comes() -> N
     one = Driver(idle=False, mute=True)
     one.send({"type": "subscribe", "stream": "fap", "fps": 25})
     one.send(BLOCK.format("b", "", SENTENCE.format(1), ""))
-    one.say(1, SilentVoice().say(one.spoken[0].say))
+    one.say(1, SilentVoice().say(one.spoken[0].request))
     usual = np.array([f.values[3:5] for f in one.run(10).frames if f.stream == "fap"])
     assert np.abs(np.diff(mouth, axis=0)).max() < 1.5 * np.abs(np.diff(usual, axis=0)).max()
 
@@ -190,8 +190,8 @@ def test_a_text_that_has_to_last_longer_is_said_again_in_one(voice) -> None:
     driver.send(timed)
     while answer(driver, voice):
         pass
-    whole = [o for o in driver.spoken if o.say.seconds is not None]
-    assert [o.say.ssml.strip() for o in whole] == [text.strip()]
+    whole = [o for o in driver.spoken if o.request.seconds is not None]
+    assert [o.request.ssml.strip() for o in whole] == [text.strip()]
     assert times(driver.run(60))["b:s:end"] == pytest.approx(asked, abs=0.01)
 
 

@@ -16,16 +16,16 @@ from cryptography.hazmat.primitives.hashes import SHA256
 
 from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.messages.common import MAX_CONTROL
-from realizer.server.http.access import Guard, Pace
-from realizer.server.http.jwt_tokens import Pass
-from realizer.server.runtime.session_registry import HubError
+from realizer.server.http.access import AccessControl, RateLimiter
+from realizer.server.http.jwt_tokens import Grant
+from realizer.server.runtime.session_registry import JoinError
 
 TOKEN = "Xk-secret-7"
 SECRET = "a secret that is long enough to be one"
 
 
-def guard(**settings) -> Guard:
-    return Guard(Settings(**settings))
+def guard(**settings) -> AccessControl:
+    return AccessControl(Settings(**settings))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_a_token_comes_in_the_address_or_a_header(target: str, headers: dict[str
 def test_a_wrong_token_is_refused_at_once_and_not_repeated(
     target: str, headers: dict[str, str], later: bool
 ) -> None:
-    with pytest.raises(HubError, match="wanted that of this service") as refused:
+    with pytest.raises(JoinError, match="wanted that of this service") as refused:
         guard(token=TOKEN).request(target, headers, later=later)
     assert refused.value.status == 401
     assert TOKEN not in str(refused.value)
@@ -63,8 +63,8 @@ def test_a_wrong_token_is_refused_at_once_and_not_repeated(
 def test_without_a_token_a_client_may_still_greet_with_it() -> None:
     g = guard(token=TOKEN)
     assert g.request("/ws", {}, later=True) is None
-    assert g.greets(json.dumps({"type": "hello", "token": TOKEN})) == Pass()
-    with pytest.raises(HubError, match="got none"):
+    assert g.check_hello(json.dumps({"type": "hello", "token": TOKEN})) == Grant()
+    with pytest.raises(JoinError, match="got none"):
         g.request("/metrics", {})
 
 
@@ -83,41 +83,41 @@ def test_without_a_token_a_client_may_still_greet_with_it() -> None:
     ],
 )
 def test_any_other_first_message_is_no_greeting(message: str | bytes) -> None:
-    with pytest.raises(HubError, match="token: wanted") as refused:
-        guard(token=TOKEN).greets(message)
+    with pytest.raises(JoinError, match="token: wanted") as refused:
+        guard(token=TOKEN).check_hello(message)
     assert refused.value.status == 401
     assert TOKEN not in str(refused.value)
 
 
 def test_a_first_message_that_is_large_is_not_even_read() -> None:
     large = json.dumps({"type": "hello", "token": TOKEN, "session": "x" * MAX_CONTROL})
-    with pytest.raises(HubError, match="a first hello"):
-        guard(token=TOKEN).greets(large)
+    with pytest.raises(JoinError, match="a first hello"):
+        guard(token=TOKEN).check_hello(large)
 
 
 @pytest.mark.parametrize("both", [{}, {"token": TOKEN}])
 def test_a_signed_token_comes_in_the_same_places(both: dict[str, str]) -> None:
     g = guard(jwt_key=SECRET, **both)
     signed = jwt.encode({"session": "show"}, SECRET, "HS256")
-    bound = Pass(frozenset({"show"}))
+    bound = Grant(frozenset({"show"}))
     assert g.request(f"/ws?session=show&token={signed}", {}) == bound
     assert g.request("/ws", {"authorization": f"Bearer {signed}"}) == bound
     assert g.request("/ws", {}, later=True) is None
-    assert g.greets(json.dumps({"type": "hello", "token": signed})) == bound
+    assert g.check_hello(json.dumps({"type": "hello", "token": signed})) == bound
 
 
 def test_beside_a_key_the_token_of_the_service_opens_everything() -> None:
     g = guard(jwt_key=SECRET, token=TOKEN)
-    assert g.request(f"/ws?token={TOKEN}", {}) == Pass()
+    assert g.request(f"/ws?token={TOKEN}", {}) == Grant()
     with pytest.raises(
-        HubError, match=r"that of this service .* or a JWT of this service's key .*, got another one"
+        JoinError, match=r"that of this service .* or a JWT of this service's key .*, got another one"
     ):
         g.request("/ws?token=another", {})
 
 
 def test_a_refusal_says_why_a_signed_token_is_not_taken() -> None:
     old = jwt.encode({"exp": 1}, SECRET, "HS256")
-    with pytest.raises(HubError, match=r"REALIZER_JWT_KEY\), got one that has expired") as refused:
+    with pytest.raises(JoinError, match=r"REALIZER_JWT_KEY\), got one that has expired") as refused:
         guard(jwt_key=SECRET).request(f"/ws?token={old}", {}, later=True)
     assert refused.value.status == 401
     assert old not in str(refused.value)
@@ -155,16 +155,16 @@ def test_pages_of_elsewhere_stay_out(
     if welcome:
         assert g.request("/ws", headers)
         return
-    with pytest.raises(HubError, match="REALIZER_ORIGINS lets more in") as refused:
+    with pytest.raises(JoinError, match="REALIZER_ORIGINS lets more in") as refused:
         g.request("/ws", headers)
     assert refused.value.status == 403
 
 
 def test_a_service_that_has_used_its_memory_lets_nobody_in() -> None:
-    guard(max_memory=10**7).room()
+    guard(max_memory=10**7).check_memory()
     full = guard(max_memory=64)
-    with pytest.raises(HubError, match=r"wanted at most 64 \(REALIZER_MAX_MEMORY sets it\)") as refused:
-        full.room()
+    with pytest.raises(JoinError, match=r"wanted at most 64 \(REALIZER_MAX_MEMORY sets it\)") as refused:
+        full.check_memory()
     assert refused.value.status == 503
 
 
@@ -212,22 +212,22 @@ def test_the_library_below_does_not_log_requests_where_there_is_a_token() -> Non
 
 
 def test_a_client_that_keeps_to_its_rate_never_waits() -> None:
-    pace = Pace(10)
+    pace = RateLimiter(10)
     assert all(pace.wait(k / 10) == 0.0 for k in range(1000))
 
 
 def test_of_a_flood_it_is_told_once_which_limit_it_met() -> None:
-    pace = Pace(2)
-    told = [pace.wait(0.0) > 0 and pace.news for _ in range(10)]
+    pace = RateLimiter(2)
+    told = [pace.wait(0.0) > 0 and pace.notice for _ in range(10)]
     assert told[:4] == [False] * 4
     assert told[4] == "wanted at most 2 messages a second; more are read later (REALIZER_MAX_RATE sets it)"
     assert told[5:] == [None] * 5
     pace.wait(60.0)
-    assert [pace.wait(60.0) > 0 and pace.news for _ in range(4)][-1] == told[4]  # and again, after a pause
+    assert [pace.wait(60.0) > 0 and pace.notice for _ in range(4)][-1] == told[4]  # and again, after a pause
 
 
 def test_a_flood_is_read_at_the_rate_after_a_first_burst() -> None:
-    pace, now, read = Pace(10), 0.0, 0
+    pace, now, read = RateLimiter(10), 0.0, 0
     while now < 60.0:
         now += pace.wait(now)
         read += 1

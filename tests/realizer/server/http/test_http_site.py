@@ -7,9 +7,9 @@ from urllib.parse import quote
 
 import pytest
 
-from realizer.server.http.http_site import NOT_BUILT, Site
+from realizer.server.http.http_site import NOT_BUILT, HttpSite
 
-SITE = Site(lambda: {"sessions": 2})
+SITE = HttpSite(lambda: {"sessions": 2})
 BUILT = SITE.answer("/").status == 200
 
 
@@ -74,7 +74,7 @@ def test_nothing_else_can_be_had(path) -> None:
 
 
 def test_without_a_bundle_the_page_says_how_to_get_one(tmp_path, monkeypatch) -> None:
-    site = Site(dict)
+    site = HttpSite(dict)
     monkeypatch.setattr(site, "_static", tmp_path / "static")
     answer = site.answer("/")
     assert (answer.status, answer.body) == (503, NOT_BUILT.encode())

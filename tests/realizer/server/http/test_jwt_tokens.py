@@ -19,7 +19,7 @@ from cryptography.hazmat.primitives.serialization import (
 
 from realizer.core.errors import RealizerError
 from realizer.server.http import jwt_tokens
-from realizer.server.http.jwt_tokens import Pass, PassError, Passes
+from realizer.server.http.jwt_tokens import Grant, TokenError, TokenVerifier
 
 SECRET = "a secret that is long enough to be one"
 LONG = 10**10  # s; POSIX, in three hundred years
@@ -45,17 +45,17 @@ def pem(key: Any) -> str:
 @pytest.mark.parametrize("algorithm", ["RS256", "ES256", "ES384", "EdDSA"])
 def test_a_token_is_taken_that_the_private_key_signed_and_no_other(algorithm: str) -> None:
     key, other = keys(algorithm), keys(algorithm)
-    reader = Passes(pem(key))
-    assert reader.read(jwt.encode({"sub": "me"}, key, algorithm)) == Pass()
-    with pytest.raises(PassError, match="not signed with it"):
-        reader.read(jwt.encode({"sub": "me"}, other, algorithm))
+    reader = TokenVerifier(pem(key))
+    assert reader.verify(jwt.encode({"sub": "me"}, key, algorithm)) == Grant()
+    with pytest.raises(TokenError, match="not signed with it"):
+        reader.verify(jwt.encode({"sub": "me"}, other, algorithm))
 
 
 def test_a_secret_signs_too() -> None:
-    reader = Passes(SECRET)
-    assert reader.read(jwt.encode({"exp": LONG}, SECRET, "HS256")) == Pass(None, LONG)
-    with pytest.raises(PassError, match="not signed with it"):
-        reader.read(jwt.encode({"exp": LONG}, SECRET[::-1], "HS256"))
+    reader = TokenVerifier(SECRET)
+    assert reader.verify(jwt.encode({"exp": LONG}, SECRET, "HS256")) == Grant(None, LONG)
+    with pytest.raises(TokenError, match="not signed with it"):
+        reader.verify(jwt.encode({"exp": LONG}, SECRET[::-1], "HS256"))
 
 
 @pytest.mark.parametrize("algorithm", ["HS256", "none", "HS512"])
@@ -66,8 +66,8 @@ def test_a_public_key_is_no_secret_to_sign_with(algorithm: str) -> None:
     signed = jwt.encode({"sub": "me"}, "x" * 64, "HS256").split(".")
     forged = _signed(head, {"sub": "me"}, pem(key))
     for token in (forged, ".".join([signed[0], signed[1], ""])):
-        with pytest.raises(PassError):
-            Passes(pem(key)).read(token)
+        with pytest.raises(TokenError):
+            TokenVerifier(pem(key)).verify(token)
 
 
 def _signed(head: dict[str, str], claims: dict[str, Any], secret: str) -> str:
@@ -101,8 +101,8 @@ def _signed(head: dict[str, str], claims: dict[str, Any], secret: str) -> str:
 )
 def test_claims_that_do_not_hold_are_said_without_what_is_in_them(claims: dict[str, Any], says: str) -> None:
     token = _signed({"alg": "HS256", "typ": "JWT"}, {"sub": "who-is-it", **claims}, SECRET)
-    with pytest.raises(PassError, match=says) as refused:
-        Passes(SECRET).read(token)
+    with pytest.raises(TokenError, match=says) as refused:
+        TokenVerifier(SECRET).verify(token)
     assert "who-is-it" not in str(refused.value)
 
 
@@ -116,33 +116,33 @@ def test_claims_that_do_not_hold_are_said_without_what_is_in_them(claims: dict[s
     ],
 )
 def test_a_token_may_be_bound_to_sessions(claims: dict[str, Any], sessions: set[str] | None) -> None:
-    assert Passes(SECRET).read(jwt.encode(claims, SECRET, "HS256")).sessions == sessions
+    assert TokenVerifier(SECRET).verify(jwt.encode(claims, SECRET, "HS256")).sessions == sessions
 
 
 def test_where_an_audience_is_asked_for_a_token_must_be_for_it() -> None:
-    reader = Passes(SECRET, "faces")
-    assert reader.read(jwt.encode({"aud": ["others", "faces"]}, SECRET, "HS256")) == Pass()
+    reader = TokenVerifier(SECRET, "faces")
+    assert reader.verify(jwt.encode({"aud": ["others", "faces"]}, SECRET, "HS256")) == Grant()
     for claims in ({}, {"aud": "others"}):
-        with pytest.raises(PassError, match="REALIZER_JWT_AUDIENCE"):
-            reader.read(jwt.encode(claims, SECRET, "HS256"))
+        with pytest.raises(TokenError, match="REALIZER_JWT_AUDIENCE"):
+            reader.verify(jwt.encode(claims, SECRET, "HS256"))
 
 
 def test_clocks_may_differ_by_some_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     now = int(time.time())
     claims = {"exp": now + 60, "nbf": now + 3}
-    until = Passes(SECRET).read(jwt.encode(claims, SECRET, "HS256"))
+    until = TokenVerifier(SECRET).verify(jwt.encode(claims, SECRET, "HS256"))
     monkeypatch.setattr(jwt_tokens.time, "time", lambda: now + 60.0)
-    assert until.left == jwt_tokens.LEEWAY
+    assert until.seconds_left == jwt_tokens.LEEWAY
     monkeypatch.setattr(jwt_tokens.time, "time", lambda: now + 600.0)
-    assert until.left == 0
-    assert Pass().left is None
+    assert until.seconds_left == 0
+    assert Grant().seconds_left is None
 
 
 @pytest.mark.parametrize("token", ["", ".", "..", "a.b.c", "é" * 100, "\udcff", "x" * 100_000, "\0"])
 def test_what_is_no_token_is_none(token: str) -> None:
     for key in (SECRET, pem(keys("EdDSA"))):
-        with pytest.raises(PassError):
-            Passes(key).read(token)
+        with pytest.raises(TokenError):
+            TokenVerifier(key).verify(token)
 
 
 def test_a_key_that_cannot_be_used_is_refused_with_what_was_wanted() -> None:
@@ -151,7 +151,7 @@ def test_a_key_that_cannot_be_used_is_refused_with_what_was_wanted() -> None:
     odd = pem(ec.generate_private_key(ec.SECP256K1()))
     for key in (pem(weak), private, odd, "-----BEGIN PUBLIC KEY-----\nnone\n-----END PUBLIC KEY-----"):
         with pytest.raises(RealizerError, match="setting jwt_key: wanted a public key in PEM") as refused:
-            Passes(key)
+            TokenVerifier(key)
         assert "none" not in str(refused.value)
         assert "MI" not in str(refused.value)
 
@@ -170,4 +170,4 @@ def test_without_the_package_one_sentence_says_what_to_install(
     key = pem(keys("EdDSA"))
     monkeypatch.setattr(builtins, "__import__", find)
     with pytest.raises(RealizerError, match=r"pip install 'bml-realizer\[jwt\]'"):
-        Passes(key)
+        TokenVerifier(key)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from realizer.server.http.metrics import COUNTERS, GAUGES, Metrics, summed
+from realizer.server.http.metrics import COUNTERS, GAUGES, Metrics, sum_samples
 
 SAMPLE = re.compile(r'([a-z_]+)(?:\{([a-z]+="[^"]*"(?:,[a-z]+="[^"]*")*)\})? (\S+)')
 
@@ -68,7 +68,7 @@ def test_what_all_workers_counted_is_the_sum_of_theirs() -> None:
         for seconds in (0.0001, 0.3 * (number + 1)):
             metrics.late.observe(seconds)
         texts[number] = metrics.text(dict.fromkeys(GAUGES, number + 1), {})
-    whole = summed(texts)
+    whole = sum_samples(texts)
     got = samples(whole)
     assert got["realizer_frames_dropped_total", ""] == 20_000_002
     assert got["realizer_sessions", ""] == 4

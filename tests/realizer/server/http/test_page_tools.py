@@ -9,14 +9,14 @@ import pytest
 
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.core.settings import Settings
-from realizer.server.http.page_tools import MOST_TEXT, DeskError, faults, feeling, pose
+from realizer.server.http.page_tools import MAX_TEXT, ToolError, export_pose, lint, preview_emotion
 from realizer.tables import faps
 
 NAMES = [row.name for row in faps()]
 
 
 def told(text: str) -> list[dict]:
-    return json.loads(faults(text, Settings()))["faults"]
+    return json.loads(lint(text, Settings()))["faults"]
 
 
 def test_a_fault_has_its_place_and_a_sound_text_none() -> None:
@@ -40,18 +40,18 @@ def test_any_text_is_answered(text: str) -> None:
 
 
 def test_what_is_too_long_to_be_checked_while_it_is_typed_is_said() -> None:
-    answer = json.loads(faults("x" * (MOST_TEXT + 1), Settings()))
+    answer = json.loads(lint("x" * (MAX_TEXT + 1), Settings()))
     assert answer["faults"] == []
-    assert str(MOST_TEXT) in answer["skipped"]
+    assert str(MAX_TEXT) in answer["skipped"]
 
 
 def test_a_place_on_the_wheel_is_action_units_and_a_published_profile_is_faps() -> None:
-    own = json.loads(feeling('{"angle": 45, "activation": 7}'))
+    own = json.loads(preview_emotion('{"angle": 45, "activation": 7}'))
     assert own["shares"] == {"fear": 1.0}
     assert own["values"]["20L"] == own["values"]["20R"] > 0.5
-    published = json.loads(feeling('{"angle": 45, "activation": 5, "profile": "published"}'))
+    published = json.loads(preview_emotion('{"angle": 45, "activation": 5, "profile": "published"}'))
     assert set(published["values"]) <= set(NAMES)
-    one = json.loads(feeling('{"name": "fear 8", "profile": "published"}'))
+    one = json.loads(preview_emotion('{"name": "fear 8", "profile": "published"}'))
     assert one["values"] != published["values"]
 
 
@@ -67,12 +67,14 @@ def test_a_place_on_the_wheel_is_action_units_and_a_published_profile_is_faps() 
     ],
 )
 def test_what_is_no_feeling_is_refused(asked: str, said: str) -> None:
-    with pytest.raises(DeskError, match=said):
-        feeling(asked)
+    with pytest.raises(ToolError, match=said):
+        preview_emotion(asked)
 
 
 def test_a_pose_is_a_fap_file_of_one_frame_that_is_read_again() -> None:
-    text = pose('{"type": "set", "aus": {"12L": 1}, "faps": {"open_jaw": 300, "53": 20}}', "ben", Settings())
+    text = export_pose(
+        '{"type": "set", "aus": {"12L": 1}, "faps": {"open_jaw": 300, "53": 20}}', "ben", Settings()
+    )
     clip = read_fap(text)
     assert clip.notes == ()
     assert clip.values.shape == (1, 68)
@@ -83,7 +85,7 @@ def test_a_pose_is_a_fap_file_of_one_frame_that_is_read_again() -> None:
 
 
 def test_a_pose_of_nothing_is_the_neutral_face() -> None:
-    assert not np.any(read_fap(pose('{"type": "set"}', None, Settings())).values)
+    assert not np.any(read_fap(export_pose('{"type": "set"}', None, Settings())).values)
 
 
 @pytest.mark.parametrize(
@@ -96,5 +98,5 @@ def test_a_pose_of_nothing_is_the_neutral_face() -> None:
     ],
 )
 def test_what_is_no_pose_is_refused(asked: str, face: str | None, said: str) -> None:
-    with pytest.raises(DeskError, match=said):
-        pose(asked, face, Settings())
+    with pytest.raises(ToolError, match=said):
+        export_pose(asked, face, Settings())

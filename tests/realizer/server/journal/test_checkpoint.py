@@ -12,8 +12,8 @@ import pytest
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import journal_writer as thresholds
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.replay import restored
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.replay import restore_session
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from tests.interleavings import BODIES, CONTROLS, HEADS, NAMES, Memory, no_error, spoken
@@ -47,8 +47,8 @@ LASTING = (
 
 def opened(journal: Memory | None) -> Session:
     session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
-    session.notes = Notes("s", journal)
-    session.notes.begin(EPOCH)
+    session.journal = JournalWriter("s", journal)
+    session.journal.begin(EPOCH)
     return session
 
 
@@ -60,7 +60,9 @@ class Run:
     owed: dict[int, Speak] = field(default_factory=dict)
 
     def collect(self) -> None:
-        self.owed |= {effect.id: effect for effect in self.session.outgoing() if isinstance(effect, Speak)}
+        self.owed |= {
+            effect.id: effect for effect in self.session.take_effects() if isinstance(effect, Speak)
+        }
 
     def until(self, t: float) -> None:
         while (due := wakes(self.session)) <= t:
@@ -119,7 +121,7 @@ class Pair:
         for id in ids:
             for run in (self.whole, self.torn):
                 if (order := run.owed.pop(id, None)) is not None:
-                    run.session.spoken(id, spoken(order), self._now)
+                    run.session.on_speech(id, spoken(order), self._now)
                     run.collect()
 
     def _rest(self) -> None:
@@ -132,7 +134,7 @@ class Pair:
             self._answer()
             self._pass(1.5)
         for run in (self.whole, self.torn):
-            run.session.rest(self._now)
+            run.session.compact_journal(self._now)
 
     def _pass(self, seconds: float) -> None:
         self._now += seconds
@@ -140,11 +142,11 @@ class Pair:
             run.until(self._now)
 
     def _die(self) -> None:
-        kept = self.journal.take("s")
+        kept = self.journal.claim("s")
         assert kept is not None
         session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
-        _, owed = restored(session, kept, spoken)
-        session.notes = Notes("s", self.journal, kept=kept)
+        _, owed = restore_session(session, kept, spoken)
+        session.journal = JournalWriter("s", self.journal, saved=kept)
         self.torn = Run(session, {effect.id: effect for effect in owed if isinstance(effect, Speak)})
         self.restored += bool(kept.parts)
         for run in (self.torn, self.whole):
@@ -156,13 +158,16 @@ class Pair:
 
     def _agree(self) -> None:
         whole, torn = self.whole.session, self.torn.session
-        first = max(torn.log.first, whole.log.first)
-        assert torn.log.since(first) == whole.log.since(first)
-        assert torn.log.newest == whole.log.newest
+        first = max(torn.feedback_log.first, whole.feedback_log.first)
+        assert torn.feedback_log.since(first) == whole.feedback_log.since(first)
+        assert torn.feedback_log.newest == whole.feedback_log.newest
         assert torn.player.characters == whole.player.characters
         assert torn.clips.ids == whole.clips.ids
-        assert (torn.faces.given, torn.intake.voices) == (whole.faces.given, whole.intake.voices)
-        assert torn.intake.orders.fault == whole.intake.orders.fault
+        assert (torn.faces.assigned, torn.submission.voices) == (
+            whole.faces.assigned,
+            whole.submission.voices,
+        )
+        assert torn.submission.tts.fault == whole.submission.tts.fault
         times = self._now + np.arange(4) / 25
         for index in range(len(whole.player.characters)):
             one, other = (session.player.frames(times, index) for session in (whole, torn))

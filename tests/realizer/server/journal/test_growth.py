@@ -11,9 +11,9 @@ import pytest
 
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
-from realizer.server.journal import Journal, JournalError, Kept, journal_at
-from realizer.server.journal.journal_writer import ENTRIES, LONG, Notes
-from realizer.server.journal.replay import restored
+from realizer.server.journal import Journal, JournalError, SavedSession, journal_at
+from realizer.server.journal.journal_writer import ENTRIES, LONG, JournalWriter
+from realizer.server.journal.replay import restore_session
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.feedback_log import LAST
 from realizer.server.session.session import Session
@@ -30,8 +30,8 @@ WAIT = '<bml id="b"><wait id="w" duration="0.5"/></bml>'
 
 def opened(journal: Journal | None) -> Session:
     session = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
-    session.notes = Notes("long", journal)
-    session.notes.begin(0.0)
+    session.journal = JournalWriter("long", journal)
+    session.journal.begin(0.0)
     session.connect(1, 0.0)
     return session
 
@@ -41,9 +41,9 @@ def play(session: Session, message: str | bytes, begin: float, until: float) -> 
     session.receive(1, message, begin)
     now = begin
     while True:
-        for effect in session.outgoing():
+        for effect in session.take_effects():
             if isinstance(effect, Speak):
-                session.spoken(effect.id, spoken(effect), now)
+                session.on_speech(effect.id, spoken(effect), now)
                 break
         else:
             if (due := wakes(session)) > until:
@@ -66,23 +66,25 @@ def test_after_thousands_of_documents_there_are_no_more_entries_than_after_hundr
     for k in range(DOCUMENTS):
         play(session, TALK if k % 100 == 0 else WAIT, APART * k, APART * (k + 1))
         if k % 50 == 49:
-            kept = journal.take("long")
+            kept = journal.claim("long")
             assert kept is not None
             most = max(most, len(kept.entries))
             size = max(size, sum(map(len, kept.parts.values())))
     assert most < ENTRIES + 20
     assert size < 2**20
-    assert session.log.newest > 4 * DOCUMENTS
-    kept = journal.take("long")
+    assert session.feedback_log.newest > 4 * DOCUMENTS
+    kept = journal.claim("long")
     assert kept is not None
     again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
-    at, owed = restored(again, kept, spoken)
+    at, owed = restore_session(again, kept, spoken)
     assert not owed
     assert at <= APART * DOCUMENTS
     for one in (session, again):
         play(one, WAIT, APART * DOCUMENTS, APART * (DOCUMENTS + 1))
-    assert again.log.since(again.log.newest - 5) == session.log.since(session.log.newest - 5)
-    assert again.log.newest == session.log.newest
+    assert again.feedback_log.since(again.feedback_log.newest - 5) == session.feedback_log.since(
+        session.feedback_log.newest - 5
+    )
+    assert again.feedback_log.newest == session.feedback_log.newest
     journal.end("long")
 
 
@@ -103,17 +105,17 @@ def test_a_client_that_missed_more_than_a_checkpoint_has_is_told_of_a_gap() -> N
     journal = Memory()
     session = opened(journal)
     end = talked(session, 400)
-    kept = journal.take("long")
+    kept = journal.claim("long")
     assert kept is not None
     assert len(json.loads(kept.parts["state"])["told"]) <= LAST
     again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
-    restored(again, kept, spoken)
+    restore_session(again, kept, spoken)
     again.connect(9, end, seen=1)
-    gap, *rest = [str(effect.data) for effect in again.outgoing() if isinstance(effect, Send)]
+    gap, *rest = [str(effect.data) for effect in again.take_effects() if isinstance(effect, Send)]
     told = json.loads(gap)
     assert (told["type"], told["seen"]) == ("gap", 1)
     assert told["first"] > 2
-    assert numbers(rest) == list(range(told["first"], again.log.newest + 1))
+    assert numbers(rest) == list(range(told["first"], again.feedback_log.newest + 1))
 
 
 def test_a_clip_is_written_once_and_goes_with_its_session() -> None:
@@ -125,8 +127,8 @@ def test_a_clip_is_written_once_and_goes_with_its_session() -> None:
         talked_until = APART * k
         for _ in range(ENTRIES):
             session.receive(1, '{"type": "scene", "objects": null}', talked_until)
-        session.rest(talked_until + 1)
-        kept = journal.take("long")
+        session.compact_journal(talked_until + 1)
+        kept = journal.claim("long")
         assert kept is not None
         assert journal.compacted == k + 1
         sounds.append({name: text for name, text in kept.parts.items() if name != "state"})
@@ -141,16 +143,18 @@ def test_a_session_whose_face_is_never_still_has_a_checkpoint_where_nothing_play
     for k in range(LONG * ENTRIES // 2 + 10):
         play(session, TALK if k % 100 == 0 else WAIT, apart * k, apart * (k + 1))
     assert journal.compacted == 1
-    kept = journal.take("long")
+    kept = journal.claim("long")
     assert kept is not None
     assert len(kept.entries) < ENTRIES
     again = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
-    restored(again, kept, spoken)
+    restore_session(again, kept, spoken)
     tied = '<bml id="c"><head id="n" lexeme="NOD" start="b:w:end+2"/></bml>'
     for one in (session, again):
         play(one, tied, apart * k + 0.7, apart * k + 20)
-    assert again.log.newest == session.log.newest
-    assert again.log.since(session.log.newest - 12) == session.log.since(session.log.newest - 12)
+    assert again.feedback_log.newest == session.feedback_log.newest
+    assert again.feedback_log.since(session.feedback_log.newest - 12) == session.feedback_log.since(
+        session.feedback_log.newest - 12
+    )
     times = apart * k + 10 + np.arange(50) / 25
     assert np.array_equal(again.player.frames(times).faps, session.player.frames(times).faps)
 
@@ -169,10 +173,10 @@ def test_while_a_block_waits_or_a_speech_is_open_nothing_is_left_out() -> None:
         play(session, holds, 0.0, 100.0)
         for _ in range(ENTRIES):
             play(session, '{"type": "scene", "objects": null}', 100.0, 100.0)
-        session.rest(200.0)
+        session.compact_journal(200.0)
         assert not journal.compacted
         play(session, ends, 200.0, 300.0)
-        session.rest(300.0)
+        session.compact_journal(300.0)
         assert journal.compacted == 1
 
 
@@ -191,4 +195,4 @@ def test_a_checkpoint_that_cannot_be_read_is_no_session(state: str, why: str) ->
     with pytest.raises(JournalError, match=f"the checkpoint of session s.*{why}"):
         session.restore({"state": state})
     with pytest.raises(JournalError, match="the checkpoint of session s"):
-        restored(session, Kept(0.0, [], {"clip:c": "{}"}), spoken)
+        restore_session(session, SavedSession(0.0, [], {"clip:c": "{}"}), spoken)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from realizer.server.journal import Entry, JournalError, Kept, Lost, journal_at
-from realizer.server.journal.entry import KEPT
-from realizer.server.journal.sqlite_journal import LocalJournal
+from realizer.server.journal import Entry, JournalError, SavedSession, TakenOver, journal_at
+from realizer.server.journal.entry import RETENTION
+from realizer.server.journal.sqlite_journal import SqliteJournal
 
 ENTRIES = [
     Entry(0.0, "join", 1),
@@ -44,7 +44,7 @@ def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, s
     one.begin(session, 1234.5)
     for entry in ENTRIES:
         one.add(session, entry)
-    assert other.take(session) == Kept(1234.5, ENTRIES)
+    assert other.claim(session) == SavedSession(1234.5, ENTRIES)
     one.close()
     other.close()
 
@@ -52,12 +52,12 @@ def test_what_was_kept_is_there_for_whoever_takes_the_session_over(where: str, s
 def test_who_has_lost_a_session_is_told_when_it_writes(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     one.begin(session, 0.0)
-    assert other.take(session) == Kept(0.0, [])
-    with pytest.raises(Lost, match=session):
+    assert other.claim(session) == SavedSession(0.0, [])
+    with pytest.raises(TakenOver, match=session):
         one.add(session, ENTRIES[0])
     other.add(session, ENTRIES[1])
     one.end(session)  # which is not its any more
-    assert one.take(session) == Kept(0.0, [ENTRIES[1]])
+    assert one.claim(session) == SavedSession(0.0, [ENTRIES[1]])
 
 
 def test_who_looks_finds_which_sessions_are_another_s_now_and_changes_nothing(
@@ -67,27 +67,27 @@ def test_who_looks_finds_which_sessions_are_another_s_now_and_changes_nothing(
     mine, gone, never = session, f"{session}-gone", f"{session}-never"
     one.begin(mine, 0.0)
     one.begin(gone, 0.0)
-    other.take(gone)
+    other.claim(gone)
     found: list[set[str]] = []
-    looking = threading.Thread(target=lambda: found.append(one.taken([mine, gone, never])))
+    looking = threading.Thread(target=lambda: found.append(one.taken_over([mine, gone, never])))
     looking.start()
     looking.join()
     assert found == [{gone}]
-    assert one.taken([]) == one.taken([mine]) == set()
-    assert other.taken([gone]) == set()
+    assert one.taken_over([]) == one.taken_over([mine]) == set()
+    assert other.taken_over([gone]) == set()
     one.add(mine, ENTRIES[0])
-    assert other.take(mine) == Kept(0.0, ENTRIES[:1])
+    assert other.claim(mine) == SavedSession(0.0, ENTRIES[:1])
     one.close()
     other.close()
 
 
 def test_a_session_that_ended_or_never_was_is_not_taken(where: str, session: str) -> None:
     journal = journal_at(where)
-    assert journal.take(session) is None
+    assert journal.claim(session) is None
     journal.begin(session, 0.0)
     journal.add(session, ENTRIES[0])
     journal.end(session)
-    assert journal.take(session) is None
+    assert journal.claim(session) is None
 
 
 def test_a_session_that_begins_again_has_nothing_of_the_one_before(where: str, session: str) -> None:
@@ -95,7 +95,7 @@ def test_a_session_that_begins_again_has_nothing_of_the_one_before(where: str, s
     journal.begin(session, 1.0)
     journal.add(session, ENTRIES[0])
     journal.begin(session, 2.0)
-    assert journal.take(session) == Kept(2.0, [])
+    assert journal.claim(session) == SavedSession(2.0, [])
 
 
 def test_a_checkpoint_stands_for_what_came_before_and_says_what_has_changed(where: str, session: str) -> None:
@@ -103,12 +103,14 @@ def test_a_checkpoint_stands_for_what_came_before_and_says_what_has_changed(wher
     journal.begin(session, 1.0)
     journal.add(session, ENTRIES[0])
     journal.compact(session, {"state": "one", "clip:a": "Grüße\n\u2028", "clip:b": "b"})
-    assert journal.take(session) == Kept(1.0, [], {"state": "one", "clip:a": "Grüße\n\u2028", "clip:b": "b"})
+    assert journal.claim(session) == SavedSession(
+        1.0, [], {"state": "one", "clip:a": "Grüße\n\u2028", "clip:b": "b"}
+    )
     journal.add(session, ENTRIES[1])
     journal.add(session, ENTRIES[2])
     journal.compact(session, {"state": "two", "clip:b": None, "clip:never": None})
     journal.add(session, ENTRIES[3])
-    assert journal_at(where).take(session) == Kept(
+    assert journal_at(where).claim(session) == SavedSession(
         1.0, [ENTRIES[3]], {"state": "two", "clip:a": "Grüße\n\u2028"}
     )
 
@@ -120,28 +122,28 @@ def test_a_session_that_begins_again_or_ends_has_no_checkpoint(where: str, sessi
         journal.compact(session, {"state": "old"})
         end()
         journal.begin(session, 2.0)
-        assert journal.take(session) == Kept(2.0, [])
+        assert journal.claim(session) == SavedSession(2.0, [])
 
 
 def test_who_has_lost_a_session_changes_nothing_by_a_checkpoint(where: str, session: str) -> None:
     one, other = journal_at(where), journal_at(where)
     one.begin(session, 0.0)
     one.add(session, ENTRIES[0])
-    other.take(session)
-    with pytest.raises(Lost, match=session):
+    other.claim(session)
+    with pytest.raises(TakenOver, match=session):
         one.compact(session, {"state": "mine"})
-    assert other.take(session) == Kept(0.0, [ENTRIES[0]])
+    assert other.claim(session) == SavedSession(0.0, [ENTRIES[0]])
 
 
 def test_a_checkpoint_that_cannot_be_written_leaves_all_as_it_was(tmp_path: Path, session: str) -> None:
-    journal = LocalJournal(tmp_path / "journal.db")
+    journal = SqliteJournal(tmp_path / "journal.db")
     journal.begin(session, 0.0)
     journal.add(session, ENTRIES[0])
     (used,) = journal._file.execute("PRAGMA page_count").fetchone()
     journal._file.execute(f"PRAGMA max_page_count = {used}")
     with pytest.raises(JournalError, match="full"):
         journal.compact(session, {"state": "small", "clip:a": "x" * 100_000})
-    assert journal.take(session) == Kept(0.0, [ENTRIES[0]])
+    assert journal.claim(session) == SavedSession(0.0, [ENTRIES[0]])
 
 
 def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -> None:
@@ -149,7 +151,7 @@ def test_sessions_have_nothing_to_do_with_each_other(where: str, session: str) -
     for name, entry in ((session, ENTRIES[0]), (session + "~", ENTRIES[1])):
         journal.begin(name, 0.0)
         journal.add(name, entry)
-    assert journal.take(session) == Kept(0.0, [ENTRIES[0]])
+    assert journal.claim(session) == SavedSession(0.0, [ENTRIES[0]])
 
 
 @pytest.mark.parametrize(
@@ -170,13 +172,13 @@ def test_sessions_that_nobody_came_back_to_are_forgotten_in_the_end(tmp_path: Pa
     journal.compact("checkpoint", {"state": '{"at": 100.0}', "clip:c": "{}"})
     journal.compact("both", {"state": '{"at": 50.0}'})
     journal.add("both", Entry(100.0, "tick"))
-    clock.now = begin + KEPT + 1
+    clock.now = begin + RETENTION + 1
     journal = journal_at(path)
-    assert journal.take("left") is None
-    assert all(journal.take(name) is not None for name in ("entry", "checkpoint", "both"))
-    clock.now = begin + KEPT + 101
+    assert journal.claim("left") is None
+    assert all(journal.claim(name) is not None for name in ("entry", "checkpoint", "both"))
+    clock.now = begin + RETENTION + 101
     journal = journal_at(path)
-    assert not any(journal.take(name) for name in ("entry", "checkpoint", "both"))
+    assert not any(journal.claim(name) for name in ("entry", "checkpoint", "both"))
 
 
 def test_a_file_that_is_no_journal_is_not_written_to(tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ from click.testing import CliRunner
 from realizer.cli import cli
 from realizer.core.settings import Settings
 from realizer.server.journal import JournalError, playback
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.playback import played
-from realizer.server.journal.recordings import FolderJournal, head, read_record
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.playback import replay_recording
+from realizer.server.journal.recordings import RecordingFolder, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -29,8 +29,8 @@ SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
 def recorded(folder: Path) -> tuple[Path, list[str]]:
     """A session that was played with a voice that takes its time: its record, and what was told."""
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
-    session.notes = Notes("s", record=FolderJournal(folder, head(SETTINGS, None)))
-    session.notes.begin(1e9)
+    session.journal = JournalWriter("s", record=RecordingFolder(folder, head(SETTINGS, None)))
+    session.journal.begin(1e9)
     session.connect(1, 100.0)
     coming = [
         (100.05, SCENE),
@@ -47,22 +47,22 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
             session.receive(1, coming.pop(0)[1], now)
         while answers and answers[0][0] <= now:
             order = answers.pop(0)[1]
-            session.spoken(order.id, speak_to_length(SilentVoice(), order.say), now)
+            session.on_speech(order.id, speak_to_length(SilentVoice(), order.request), now)
         session.tick(now)
-        for effect in session.outgoing():
+        for effect in session.take_effects():
             if isinstance(effect, Speak):
                 answers.append((now + 0.2, effect))
             elif isinstance(effect, Send) and str(effect.data).startswith("<"):
                 told.append(str(effect.data))
     session.disconnect(1, now)
-    session.notes.end()
+    session.journal.end()
     return next(folder.glob("*.jsonl")), told
 
 
 def test_feedback_is_the_same_to_the_last_digit(tmp_path: Path) -> None:
     path, told = recorded(tmp_path)
-    realization, again = played(read_record(path))
-    assert again == playback.told(read_record(path)) == told
+    realization, again = replay_recording(read_record(path))
+    assert again == playback.replay_feedback(read_record(path)) == told
     assert any('"b:end"' in text for text in told)
     assert [w.text for w in realization.speeches[0].utterance.words] == ["Hello", "how", "are", "you"]
 
@@ -72,7 +72,7 @@ def test_a_record_that_broke_off_is_played_to_the_end_of_what_was_planned(tmp_pa
     lines = path.read_text().splitlines()
     spoken = next(k for k, line in enumerate(lines) if '"spoken"' in line)
     path.write_text("\n".join(lines[: spoken + 1]) + '\n{"at": 0.9, "kind": "te')
-    _, again = played(read_record(path))
+    _, again = replay_recording(read_record(path))
     assert any('id="a:end"' in text for text in again)
     assert not any('id="b:' in text for text in again)
     assert again[:4] == told[:4]
@@ -80,20 +80,20 @@ def test_a_record_that_broke_off_is_played_to_the_end_of_what_was_planned(tmp_pa
 
 def test_a_record_that_broke_off_in_a_speech_ends_with_what_had_been_said(tmp_path: Path) -> None:
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
-    record = FolderJournal(tmp_path, head(SETTINGS, None))
-    session.notes = Notes("s", record=record)
-    session.notes.begin(1e9)
+    record = RecordingFolder(tmp_path, head(SETTINGS, None))
+    session.journal = JournalWriter("s", record=record)
+    session.journal.begin(1e9)
     session.connect(1, 100.0)
     session.receive(1, '{"type": "speech", "id": "turn", "append": "One two three. Four"}', 100.1)
     for step in range(100):
         now = 100.1 + step * 0.02
         session.tick(now)
-        for effect in session.outgoing():
+        for effect in session.take_effects():
             if isinstance(effect, Speak):
-                session.spoken(effect.id, speak_to_length(SilentVoice(), effect.say), now)
+                session.on_speech(effect.id, speak_to_length(SilentVoice(), effect.request), now)
     record.close()
     (path,) = tmp_path.glob("*.jsonl")
-    realization, again = played(read_record(path))
+    realization, again = replay_recording(read_record(path))
     assert any('"turn:end"' in text for text in again)
     assert 1.0 < realization.duration < 10.0
 
@@ -112,7 +112,7 @@ def test_a_head_that_is_none_is_told_of(first: str, fault: str, tmp_path: Path) 
     path = tmp_path / "x.jsonl"
     path.write_text(first + "\n")
     with pytest.raises(JournalError, match=fault):
-        played(read_record(path))
+        replay_recording(read_record(path))
 
 
 def test_a_line_that_is_no_entry_is_told_of_with_its_number(tmp_path: Path) -> None:
@@ -137,8 +137,8 @@ def test_a_voice_that_is_not_here_is_silent_as_it_would_be_live_or_another_one_i
 ) -> None:
     path, told = recorded(tmp_path)
     path.write_text(path.read_text().replace('"voice": "silent"', '"voice": "no-such-voice"'))
-    assert len(played(read_record(path), voice="silent")[1]) == len(told)
-    again = played(read_record(path))[1]
+    assert len(replay_recording(read_record(path), voice="silent")[1]) == len(told)
+    again = replay_recording(read_record(path))[1]
     assert sum("no-such-voice" in text for text in again) == 1  # in a warning
     assert any('id="b:end"' in text for text in again)
     assert "no-such-voice" in capsys.readouterr().err

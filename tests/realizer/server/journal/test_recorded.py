@@ -20,7 +20,7 @@ from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 from realizer.core.settings import Settings
 from realizer.server.journal.journal_writer import ENTRIES
-from realizer.server.journal.playback import told
+from realizer.server.journal.playback import replay_feedback
 from realizer.server.journal.recordings import read_record
 from realizer.server.serve import Server
 from tests.programs import serving
@@ -92,7 +92,7 @@ def test_a_replay_shows_each_frame_as_a_viewer_of_the_live_session_got_it(tmp_pa
 
     asyncio.run(watch())
     (path,) = tmp_path.iterdir()
-    assert [text for text in told(read_record(path)) if "warning" in text] == []
+    assert [text for text in replay_feedback(read_record(path)) if "warning" in text] == []
     again = written(path)
     assert len(live) > 100
     assert {frame: again[frame] for frame in live if frame < len(again)} == live
@@ -121,7 +121,7 @@ def test_the_record_of_a_session_that_was_taken_over_goes_on_and_is_whole(tmp_pa
         seen = numbers(first)[-1]
         rest = asyncio.run(until(f"{url}?session=s&seen={seen}", "two:end", NOD.format("two")))
     assert list(records.iterdir()) == [path]
-    assert told(read_record(path))[: len(first + rest)] == first + rest
+    assert replay_feedback(read_record(path))[: len(first + rest)] == first + rest
 
 
 def test_where_the_record_is_not_here_another_one_begins_with_what_the_session_was(tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_where_the_record_is_not_here_another_one_begins_with_what_the_session_w
     (path,) = (tmp_path / "there").iterdir()
     record = read_record(path)
     assert "state" in record.parts
-    again = told(record)
+    again = replay_feedback(record)
     begins = numbers(again)[0]
     assert 1 < begins <= len(first)
     assert again[: len(first + rest) - begins + 1] == (first + rest)[begins - 1 :]
@@ -177,7 +177,7 @@ def test_with_two_workers_each_session_has_one_whole_record(tmp_path: Path) -> N
     assert len(list(tmp_path.iterdir())) == len(live)
     for name, texts in live.items():
         (path,) = tmp_path.glob(f"{name}-*.jsonl")
-        assert told(read_record(path)) == texts
+        assert replay_feedback(read_record(path)) == texts
 
 
 def test_on_a_full_disk_the_service_plays_on_and_what_was_recorded_is_played_again(tmp_path: Path) -> None:
@@ -203,6 +203,6 @@ def test_on_a_full_disk_the_service_plays_on_and_what_was_recorded_is_played_aga
     assert any('id="c:end"' in text for text in live)
     assert "realizer_records_stopped_total 1" in metrics
     (path,) = tmp_path.iterdir()
-    again = told(read_record(path))
+    again = replay_feedback(read_record(path))
     assert again == live[: len(again)]
     assert any('id="b:end"' in text for text in again)

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.cli import cli
-from realizer.server.journal import Entry, JournalError, Kept
-from realizer.server.journal.recordings import FolderJournal, read_record
+from realizer.server.journal import Entry, JournalError, SavedSession
+from realizer.server.journal.recordings import RecordingFolder, read_record
 from tests.programs import running
 
 ENTRIES = [Entry(0.1 * k, "text", 1, f"message {k}") for k in range(6)]
@@ -30,9 +30,9 @@ sys.stdin.read()
 
 def wrote(folder: Path, entries: list[Entry], parts: dict[str, str] | None = None) -> Path:
     """The record of a process that has died since."""
-    record = FolderJournal(folder, HEAD)
+    record = RecordingFolder(folder, HEAD)
     if parts:
-        record.resume("s", Kept(1e9, entries, parts))
+        record.resume("s", SavedSession(1e9, entries, parts))
     else:
         record.begin("s", 1e9)
         for entry in entries:
@@ -42,9 +42,9 @@ def wrote(folder: Path, entries: list[Entry], parts: dict[str, str] | None = Non
     return path
 
 
-def gone_on(folder: Path, kept: Kept) -> list[Path]:
+def gone_on(folder: Path, kept: SavedSession) -> list[Path]:
     """The records there are when a session was taken over and one thing more was done."""
-    record = FolderJournal(folder, HEAD)
+    record = RecordingFolder(folder, HEAD)
     record.resume("s", kept)
     record.add("s", Entry(9.0, "tick"))
     record.close()
@@ -56,20 +56,20 @@ def test_a_record_goes_on_with_what_it_lacks(written: int, tmp_path: Path) -> No
     path = wrote(tmp_path, ENTRIES[:written])
     with path.open("a") as broken:
         broken.write('{"at": 0.')
-    assert gone_on(tmp_path, Kept(1e9, ENTRIES)) == [path]
+    assert gone_on(tmp_path, SavedSession(1e9, ENTRIES)) == [path]
     assert read_record(path).entries == (*ENTRIES, Entry(9.0, "tick"))
 
 
 def test_a_record_goes_on_behind_a_checkpoint_of_which_it_knows_nothing(tmp_path: Path) -> None:
     path = wrote(tmp_path, ENTRIES[:5])
-    assert gone_on(tmp_path, Kept(1e9, ENTRIES[3:], {"state": "{}"})) == [path]
+    assert gone_on(tmp_path, SavedSession(1e9, ENTRIES[3:], {"state": "{}"})) == [path]
     assert read_record(path).entries == (*ENTRIES, Entry(9.0, "tick"))
     assert not read_record(path).parts
 
 
 def test_one_that_began_with_a_checkpoint_goes_on_too(tmp_path: Path) -> None:
     path = wrote(tmp_path, ENTRIES[:2], {"state": "{}"})
-    assert gone_on(tmp_path, Kept(1e9, ENTRIES, {"state": "{}"})) == [path]
+    assert gone_on(tmp_path, SavedSession(1e9, ENTRIES, {"state": "{}"})) == [path]
     assert read_record(path).entries == (*ENTRIES, Entry(9.0, "tick"))
     assert read_record(path).parts == {"state": "{}"}
 
@@ -77,14 +77,17 @@ def test_one_that_began_with_a_checkpoint_goes_on_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("written", "kept"),
     [
-        (ENTRIES, Kept(1e9, ENTRIES[:3])),  # more than was kept
-        ([ENTRIES[0], ENTRIES[2]], Kept(1e9, ENTRIES)),  # a hole
-        (ENTRIES[:2], Kept(1e9, ENTRIES[4:], {"state": "{}"})),  # what the checkpoint stands for is not there
-        (ENTRIES, Kept(1e9, [], {"state": "{}"})),  # nobody knows whether it is
+        (ENTRIES, SavedSession(1e9, ENTRIES[:3])),  # more than was kept
+        ([ENTRIES[0], ENTRIES[2]], SavedSession(1e9, ENTRIES)),  # a hole
+        (
+            ENTRIES[:2],
+            SavedSession(1e9, ENTRIES[4:], {"state": "{}"}),
+        ),  # what the checkpoint stands for is not there
+        (ENTRIES, SavedSession(1e9, [], {"state": "{}"})),  # nobody knows whether it is
     ],
 )
 def test_one_that_lacks_something_else_stays_and_another_begins(
-    written: list[Entry], kept: Kept, tmp_path: Path
+    written: list[Entry], kept: SavedSession, tmp_path: Path
 ) -> None:
     path = wrote(tmp_path, written)
     before = path.read_bytes()
@@ -99,8 +102,8 @@ def test_one_of_other_settings_or_that_is_none_stays_and_another_begins(tmp_path
     path = wrote(tmp_path, ENTRIES)
     path.write_bytes(path.read_bytes().replace(b"25.0", b"30.0"))
     path.with_stem(path.stem + "-2").write_bytes(b"\xff\xfe\n")
-    assert len(gone_on(tmp_path, Kept(1e9, ENTRIES))) == 3
-    assert len(gone_on(tmp_path, Kept(1e9, [*ENTRIES, Entry(9.0, "tick")]))) == 3
+    assert len(gone_on(tmp_path, SavedSession(1e9, ENTRIES))) == 3
+    assert len(gone_on(tmp_path, SavedSession(1e9, [*ENTRIES, Entry(9.0, "tick")]))) == 3
 
 
 def test_one_that_another_process_still_writes_is_not_touched(tmp_path: Path) -> None:
@@ -108,13 +111,13 @@ def test_one_that_another_process_still_writes_is_not_touched(tmp_path: Path) ->
     with running(command, stdin=subprocess.PIPE) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "holds\n"
-        first, second = gone_on(tmp_path, Kept(1e9, ENTRIES))
+        first, second = gone_on(tmp_path, SavedSession(1e9, ENTRIES))
     assert read_record(first).entries == ()
     assert read_record(second).entries == (*ENTRIES, Entry(9.0, "tick"))
 
 
 def test_a_record_on_a_full_disk_has_whole_lines_and_nothing_that_was_refused(tmp_path: Path) -> None:
-    journal = FolderJournal(tmp_path, {})
+    journal = RecordingFolder(tmp_path, {})
     journal.begin("s", 0.0)
     first, refused, last = (Entry(at, "text", 1, "x" * 100) for at in (1.0, 2.0, 3.0))
     journal.add("s", first)
@@ -132,7 +135,7 @@ def test_a_record_on_a_full_disk_has_whole_lines_and_nothing_that_was_refused(tm
 
 
 def test_a_record_that_cannot_begin_leaves_no_file(tmp_path: Path) -> None:
-    record = FolderJournal(tmp_path, HEAD)
+    record = RecordingFolder(tmp_path, HEAD)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
     try:

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from realizer.server.journal import Entry, JournalError, Kept, journal_at, redis_journal
+from realizer.server.journal import Entry, JournalError, SavedSession, journal_at, redis_journal
 from tests.realizer.server.journal.conftest import RedisServer
 
 FIRST, REFUSED, LAST = (Entry(at, "text", 1, f"<bml id='b{at:g}'/>") for at in (1.0, 2.0, 3.0))
@@ -30,7 +30,7 @@ def test_a_server_that_is_killed_and_started_again_has_lost_nothing(redis_server
         journal.add("s", REFUSED)
     redis_server.start()
     journal.add("s", LAST)
-    assert journal_at(redis_server.url).take("s") == Kept(1.0, [FIRST, LAST], {"state": "so far"})
+    assert journal_at(redis_server.url).claim("s") == SavedSession(1.0, [FIRST, LAST], {"state": "so far"})
 
 
 def test_what_was_written_though_its_answer_never_came_is_not_kept_as_its_client_was_told(
@@ -45,7 +45,7 @@ def test_what_was_written_though_its_answer_never_came_is_not_kept_as_its_client
         journal.add("s", REFUSED)
     redis_server.process.send_signal(signal.SIGCONT)
     journal.add("s", LAST)  # behind the one that was read meanwhile
-    assert journal.take("s") == Kept(1.0, [FIRST, LAST])
+    assert journal.claim("s") == SavedSession(1.0, [FIRST, LAST])
 
 
 def test_a_server_that_hangs_is_not_waited_for_by_one_after_the_other(
@@ -65,7 +65,7 @@ def test_a_server_that_hangs_is_not_waited_for_by_one_after_the_other(
     redis_server.process.send_signal(signal.SIGCONT)
     now += redis_journal.PAUSE
     journal.add("s", LAST)
-    assert journal.take("s") == Kept(1.0, [LAST])
+    assert journal.claim("s") == SavedSession(1.0, [LAST])
 
 
 def test_a_checkpoint_whose_answer_never_came_is_whole_or_was_not(
@@ -81,8 +81,8 @@ def test_a_checkpoint_whose_answer_never_came_is_whole_or_was_not(
         journal.compact("s", {"state": "new"})
     redis_server.process.send_signal(signal.SIGCONT)
     journal.add("s", LAST)
-    old, new = Kept(1.0, [FIRST, LAST], {"state": "old"}), Kept(1.0, [LAST], {"state": "new"})
-    assert journal.take("s") in (old, new)
+    old, new = SavedSession(1.0, [FIRST, LAST], {"state": "old"}), SavedSession(1.0, [LAST], {"state": "new"})
+    assert journal.claim("s") in (old, new)
 
 
 def test_whoever_looks_while_checkpoints_are_written_finds_the_old_or_the_new(where: str) -> None:
@@ -93,7 +93,7 @@ def test_whoever_looks_while_checkpoints_are_written_finds_the_old_or_the_new(wh
     def look() -> None:
         other = journal_at(where)
         while not done.is_set():
-            kept = other.take("torn")
+            kept = other.claim("torn")
             if kept is not None:
                 found.append(
                     (

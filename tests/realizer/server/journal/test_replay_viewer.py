@@ -16,9 +16,9 @@ from realizer.core.settings import Settings
 from realizer.outputs.output import RenderSettings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.render import Renderer
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.playback import played
-from realizer.server.journal.recordings import FolderJournal, Record, head, read_record
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.playback import replay_recording
+from realizer.server.journal.recordings import Record, RecordingFolder, head, read_record
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -57,8 +57,8 @@ def recorded(
         late: draws how late it is woken; None: never.
     """
     session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)
-    session.notes = Notes("s", record=FolderJournal(folder, head(SETTINGS, None)))
-    session.notes.begin(1e9)
+    session.journal = JournalWriter("s", record=RecordingFolder(folder, head(SETTINGS, None)))
+    session.journal.begin(1e9)
     session.connect(1, OPENED)
     got: list[bytes] = []
     answers: list[tuple[float, Speak]] = []
@@ -73,16 +73,16 @@ def recorded(
             session.receive(1, coming.pop(0)[1], now)
         elif answers and answers[0][0] <= now:
             order = answers.pop(0)[1]
-            session.spoken(order.id, speak_to_length(SilentVoice(), order.say), now)
+            session.on_speech(order.id, speak_to_length(SilentVoice(), order.request), now)
         else:
             session.tick(now)
-        for effect in session.outgoing():
+        for effect in session.take_effects():
             if isinstance(effect, Speak):
                 answers.append((now + 0.2, effect))
             elif isinstance(effect, Send) and isinstance(effect.data, bytes):
                 got.append(effect.data)
     session.disconnect(1, now)
-    session.notes.end()
+    session.journal.end()
     return read_record(folder), got
 
 
@@ -125,7 +125,7 @@ def test_every_frame_is_as_it_was_got_though_the_session_was_woken_late(seed: in
     random = Random(seed)
     record, got = recorded(tmp_path, some(random, 6.0), 8.0, random if seed % 2 else None)
     live = faps(got)
-    again = played(record)[0].faps.integers()
+    again = replay_recording(record)[0].faps.integers()
     assert len(live) > 190
     for number, row in live.items():
         assert np.array_equal(again[number], row), number
@@ -134,9 +134,9 @@ def test_every_frame_is_as_it_was_got_though_the_session_was_woken_late(seed: in
 def test_an_output_lasts_until_the_record_ends_and_what_is_held_has_come_to_stand(tmp_path: Path) -> None:
     doings = [(0.5, setting(aus={"4": 1})), (1.0, '{"type": "stop"}')]
     record, _ = recorded(tmp_path / "held", doings, 3.0)
-    assert played(record)[0].duration == record.entries[-1].at == pytest.approx(3.0)
+    assert replay_recording(record)[0].duration == record.entries[-1].at == pytest.approx(3.0)
     record, _ = recorded(tmp_path / "let go of", [*doings, (2.999, setting(aus=None))], 3.0)
-    faded = played(record)[0]
+    faded = replay_recording(record)[0]
     assert 3.2 < faded.duration < 3.5
     brow = faded.aus.aus[:, BROW]
     assert brow[40] > 0.9
@@ -160,11 +160,11 @@ def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> Non
     ]
     hear = json.dumps({"type": "subscribe", "stream": "audio", "rate": rate})
     record, got = recorded(tmp_path, doings, 4.0, watch=hear)
-    again = played(record)[0].sound(rate)
+    again = replay_recording(record)[0].sound(rate)
     live = np.zeros_like(again)
     for packet in map(unpack, got):
         first = packet.frame * rate // 50
-        if packet.forget:
+        if packet.flush:
             live[first:] = 0
         else:
             live[first : first + rate // 50] = np.frombuffer(packet.payload, "<i2")
@@ -176,7 +176,7 @@ def test_what_is_said_is_heard_again_until_it_was_cut_off(tmp_path: Path) -> Non
 def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
     doings = [(at, setting(faps={"open_jaw": value})) for at, value in ((0.5, 100), (1.5, None), (2.5, 60))]
     record, _ = recorded(tmp_path, doings, 3.5)
-    jaw = played(record)[0].faps.integers()[:, 2]
+    jaw = replay_recording(record)[0].faps.integers()[:, 2]
     assert [int(jaw[round(25 * at)]) for at in (0.4, 1.2, 2.3, 3.2)] == [0, 100, 0, 60]
 
 
@@ -184,7 +184,7 @@ def test_what_was_held_once_is_seen_at_its_time_only(tmp_path: Path) -> None:
 def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> None:
     doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
     record, got = recorded(tmp_path, doings, 2.0)
-    realization, _ = played(record)
+    realization, _ = replay_recording(record)
     again = realization.faps.integers()
     assert all(np.array_equal(again[number], row) for number, row in faps(got).items())
     (_, before), (changed, after) = realization.faces
@@ -202,7 +202,7 @@ def test_pictures_have_the_face_that_a_character_had_then(tmp_path: Path) -> Non
 def test_a_character_that_comes_later_is_there_from_the_first_frame(tmp_path: Path) -> None:
     doings = [(0.5, setting(character="a", aus={"1": 1})), (1.0, setting(character="b", aus={"4": 1}))]
     record, _ = recorded(tmp_path, doings, 2.0)
-    realization, _ = played(record)
+    realization, _ = replay_recording(record)
     first, second = realization.characters.values()
     assert first.faps.values.shape == second.faps.values.shape
     assert not second.aus.aus[:24, BROW].any()

@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.documents.document_queue import Intake
+from realizer.server.documents.document_queue import Submission
 from realizer.server.journal.journal_writer import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
@@ -145,7 +145,7 @@ def test_a_session_that_is_killed_after_a_checkpoint_goes_on_with_all_that_outli
 def test_a_checkpoint_comes_though_nobody_says_anything_any_more(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("realizer.server.runtime.session_host.SWEEP", 0.05)
+    monkeypatch.setattr("realizer.server.runtime.session_host.EXPIRY_INTERVAL", 0.05)
     where = str(tmp_path / "journal.db")
 
     async def run() -> None:
@@ -270,7 +270,7 @@ async def held(client: ClientConnection) -> float:
 def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_it_was(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session_host, "SWEEP", 0.05)
+    monkeypatch.setattr(session_host, "EXPIRY_INTERVAL", 0.05)
     monkeypatch.setattr(connection, "GOODBYE", LIMIT)
 
     async def run() -> None:
@@ -281,7 +281,7 @@ def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_i
             deaf.transport.pause_reading()  # it does not hear that it is let go of
             async with connect(f"{other.url}?session=deaf") as second:
                 await second.send('{"type": "set", "aus": {"12L": 0.5}}')
-                while not one._shell._hub.sessions["deaf"].closed:
+                while not one._sessions._registry.sessions["deaf"].closed:
                     await asyncio.sleep(0)
                 while await held(second) < 0.5:
                     pass
@@ -295,7 +295,7 @@ def test_who_comes_back_before_one_who_is_let_go_has_left_finds_the_session_as_i
 def test_who_only_watches_is_let_go_when_another_process_takes_the_session_over_and_may_come_back(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session_host, "SWEEP", 0.05)
+    monkeypatch.setattr(session_host, "EXPIRY_INTERVAL", 0.05)
 
     async def run() -> None:
         async with (
@@ -346,14 +346,14 @@ def test_the_second_client_that_comes_back_is_told_no_gap_though_it_had_seen_mor
 def test_a_session_that_a_fault_of_ours_ended_can_be_begun_anew(
     monkeypatch: pytest.MonkeyPatch, kept: Settings
 ) -> None:
-    put = Intake.put
+    put = Submission.enqueue
 
-    def faulty(intake: Intake, text: str, t: float) -> None:
+    def faulty(intake: Submission, text: str, t: float) -> None:
         if "fault" in text:
             raise ZeroDivisionError
         put(intake, text, t)
 
-    monkeypatch.setattr(Intake, "put", faulty)
+    monkeypatch.setattr(Submission, "enqueue", faulty)
 
     async def run() -> None:
         async with asyncio.timeout(LIMIT), Server(kept) as server:
@@ -412,7 +412,7 @@ def test_documents_are_played_and_kept_though_there_is_no_room_for_their_record(
             async with Server(settings) as server, connect(f"{server.url}?session=s") as client:
                 await client.send(NEXT)
                 told = await feedback(client, "b:end")
-                assert "realizer_records_stopped_total 1" in server._shell.measured()
+                assert "realizer_records_stopped_total 1" in server._sessions.metrics_text()
             async with Server(settings) as server, connect(f"{server.url}?session=s&seen=0") as client:
                 assert await feedback(client, "b:end") == told
 

@@ -15,7 +15,12 @@ from realizer.animation.channel import Channel, Crossfade, Gain, Layer
 from realizer.animation.idle.blinks import BlinkReduction
 from realizer.playback.character import BaseShift, Character
 from realizer.scheduling.timing import Schedule
-from realizer.server.journal.serialization import character_of, plain_character, plain_schedule, schedule_of
+from realizer.server.journal.serialization import (
+    character_from_json,
+    character_to_json,
+    schedule_from_json,
+    schedule_to_json,
+)
 
 NUMBER = st.floats(-1e6, 1e6)
 TIMES = st.lists(NUMBER, min_size=1, max_size=5, unique=True).map(sorted)
@@ -72,7 +77,7 @@ def same(one: object, other: object) -> bool:
 
 @given(CHARACTERS)
 def test_a_face_holds_what_it_held(character: Character) -> None:
-    assert same(character_of(json.loads(json.dumps(plain_character(character)))), character)
+    assert same(character_from_json(json.loads(json.dumps(character_to_json(character)))), character)
 
 
 @given(NAMES, NUMBER, st.dictionaries(NAMES, st.lists(st.tuples(NAMES, NUMBER), max_size=4), max_size=4))
@@ -82,4 +87,4 @@ def test_points_are_when_they_were(
     points = {name: tuple(point for point, _ in pairs) for name, pairs in behaviours.items()}
     times = {name: np.array([time for _, time in pairs], float) for name, pairs in behaviours.items()}
     schedule = Schedule(block, points, times, start=start)
-    assert same(schedule_of(json.loads(json.dumps(plain_schedule(schedule)))), schedule)
+    assert same(schedule_from_json(json.loads(json.dumps(schedule_to_json(schedule)))), schedule)

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from realizer.core.errors import RenderError
-from realizer.server.runtime.engines import IDLE, Studio
-from realizer.server.session.effects import Draw, Look
+from realizer.server.runtime.engines import IDLE, Engines
+from realizer.server.session.effects import Draw, RenderOptions
 
 
 @dataclass
@@ -34,14 +34,14 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def studio(clock) -> Iterator[Studio]:
-    studio = Studio(clock=clock)
+def studio(clock) -> Iterator[Engines]:
+    studio = Engines(clock=clock)
     yield studio
     studio.close()
 
 
 def order(width: int, form: str = "jpeg") -> Draw:
-    look = Look((width, 16), "front", None, "#102030", 80, form)
+    look = RenderOptions((width, 16), "front", None, "#102030", 80, form)
     return Draw(1, "default", np.zeros(68, np.float32), look)
 
 
@@ -79,7 +79,7 @@ def test_a_renderer_that_takes_long_to_start_is_not_ended_for_another_one(
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 2)
     assert width(studio.draw(order(16))) == 16
     begins = clock.asked = threading.Event()
-    starting = studio.drawers.submit(studio.draw, order(17))
+    starting = studio.render_pool.submit(studio.draw, order(17))
     assert begins.wait(60)
     clock.now = IDLE + 1.0
     clock.asked = None
@@ -97,7 +97,7 @@ def test_a_renderer_that_draws_is_not_ended_for_another_one(
 ) -> None:
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
     begins = clock.asked = threading.Event()
-    drawing = studio.drawers.submit(studio.draw, order(16))
+    drawing = studio.render_pool.submit(studio.draw, order(16))
     assert begins.wait(60)
     clock.asked = None
     clock.now = 2 * IDLE
@@ -107,6 +107,6 @@ def test_a_renderer_that_draws_is_not_ended_for_another_one(
 
 @pytest.mark.gl
 def test_a_face_that_is_not_there_is_an_answer(studio) -> None:
-    look = Look((16, 16), "front", None, None, 80)
+    look = RenderOptions((16, 16), "front", None, None, 80)
     answer = studio.draw(Draw(1, "nobody", np.zeros(68, np.float32), look))
     assert "nobody" in str(answer)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from realizer.server.runtime import gc_policy
-from realizer.server.runtime.gc_policy import ENDED, Cycles
+from realizer.server.runtime.gc_policy import ENDED, GcPolicy
 
 
 class Knot:
@@ -35,28 +35,28 @@ def knot() -> weakref.ref[Knot]:
 
 
 def test_they_are_looked_for_when_as_many_have_ended_as_are_there() -> None:
-    known, tied = Cycles(), knot()
+    known, tied = GcPolicy(), knot()
     for ended, alive, looked in (
         (ENDED - 1, 0, False),
         (ENDED, 300, False),
         (299, 300, False),
         (300, 300, True),
     ):
-        known.ended = ended
+        known.ended_connections = ended
         assert tied() is not None
-        assert known.look(alive) is looked
+        assert known.collect_if_needed(alive) is looked
     assert tied() is None
-    assert known.ended == 0
-    assert not known.look(0)
+    assert known.ended_connections == 0
+    assert not known.collect_if_needed(0)
 
 
 def test_they_are_looked_for_when_the_process_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
     used = 200e6
     monkeypatch.setattr(gc_policy, "memory", lambda: used)
-    known, tied = Cycles(), knot()
+    known, tied = GcPolicy(), knot()
     used = 390e6
-    assert not known.look(1000)
+    assert not known.collect_if_needed(1000)
     used = 410e6
-    assert known.look(1000)
+    assert known.collect_if_needed(1000)
     assert tied() is None
-    assert not known.look(1000)  # that is how large it is now
+    assert not known.collect_if_needed(1000)  # that is how large it is now

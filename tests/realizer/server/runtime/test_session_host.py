@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from realizer.core.settings import Settings
-from realizer.server.runtime.session_host import Shell
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.streams.connection import SLOW
 
 PERIOD = 1 / 25  # s
@@ -44,7 +44,7 @@ class Loop(asyncio.SelectorEventLoop):
 class Client:
     """A client, and what it got."""
 
-    waiting: int = 0
+    unsent_bytes: int = 0
     frames: list[bytes] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
     ends: list[int] = field(default_factory=list)
@@ -55,15 +55,15 @@ class Client:
         else:
             self.texts.append(data)
 
-    def end(self, code: int, reason: str) -> None:
+    def disconnect(self, code: int, reason: str) -> None:
         self.ends.append(code)
 
 
-def hosted(test: Callable[[Shell], Awaitable[None]]) -> None:
+def hosted(test: Callable[[SessionHost], Awaitable[None]]) -> None:
     """Run a test against a host of sessions."""
 
     async def run() -> None:
-        host = Shell(Settings(voice="silent"))
+        host = SessionHost(Settings(voice="silent"))
         await host.start()
         try:
             await test(host)
@@ -74,7 +74,7 @@ def hosted(test: Callable[[Shell], Awaitable[None]]) -> None:
         runner.run(run())
 
 
-def subscribed(host: Shell, session: str | None = None) -> tuple[int, Client]:
+def subscribed(host: SessionHost, session: str | None = None) -> tuple[int, Client]:
     """A client that gets 25 frames a second."""
     client = Client()
     number = host.join(client, session)
@@ -85,17 +85,17 @@ def subscribed(host: Shell, session: str | None = None) -> tuple[int, Client]:
 @pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.parametrize("phase", PHASES)
 def test_slow_client_gets_frames_again_once_it_has_read(phase: float, alone: bool) -> None:
-    async def test(host: Shell) -> None:
+    async def test(host: SessionHost) -> None:
         _, client = subscribed(host, "s")
         if not alone:
             subscribed(host, "s")
         await asyncio.sleep(0.5)
-        client.waiting = SLOW + 1
+        client.unsent_bytes = SLOW + 1
         await asyncio.sleep(1 + phase)
         before = len(client.frames)
         await asyncio.sleep(1)
         assert len(client.frames) == before
-        client.waiting = 0
+        client.unsent_bytes = 0
         await asyncio.sleep(2)
         assert len(client.frames) - before >= 49
 
@@ -103,7 +103,7 @@ def test_slow_client_gets_frames_again_once_it_has_read(phase: float, alone: boo
 
 
 def test_frames_come_at_their_times() -> None:
-    async def test(host: Shell) -> None:
+    async def test(host: SessionHost) -> None:
         _, client = subscribed(host)
         await asyncio.sleep(4 + PERIOD / 2)
         assert len(client.frames) == 101

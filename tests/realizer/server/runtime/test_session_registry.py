@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 
 from realizer.core.settings import Settings
 from realizer.server.documents import limits
-from realizer.server.runtime.session_registry import Hub, HubError, Visitor, worker_of
+from realizer.server.runtime.session_registry import JoinError, SessionRegistry, Visitor, worker_of
 from realizer.server.session.effects import Close
 from realizer.server.session.session import Session
 
 
 @pytest.fixture
-def hub() -> Hub:
+def hub() -> SessionRegistry:
     return limited(max_sessions=3)
 
 
-def limited(**most: int) -> Hub:
+def limited(**most: int) -> SessionRegistry:
     settings = Settings(keep=60.0, **most)
-    return Hub(lambda id, now, named: Session(id, settings, now, named=named), settings)
+    return SessionRegistry(lambda id, now, named: Session(id, settings, now, named=named), settings)
 
 
 def test_a_name_is_shared_and_no_name_is_ones_own(hub) -> None:
@@ -43,16 +43,16 @@ def test_an_unnamed_session_is_gone_with_its_connection(hub) -> None:
 def test_a_named_session_stays_until_it_is_swept(hub) -> None:
     session = hub.open(1, "show", 0.0)
     hub.leave(1, 10.0)
-    hub.sweep(69.0)
+    hub.remove_expired(69.0)
     assert hub.open(2, "show", 69.0) is session
     hub.leave(2, 70.0)
-    hub.sweep(131.0)
+    hub.remove_expired(131.0)
     assert not hub.sessions
 
 
 @pytest.mark.parametrize("name", ["", "a b", "x" * 65, "../etc", "é"])
 def test_a_bad_name_is_refused_with_what_was_wanted(hub, name) -> None:
-    with pytest.raises(HubError, match=r"wanted 1\.\.64") as caught:
+    with pytest.raises(JoinError, match=r"wanted 1\.\.64") as caught:
         hub.open(1, name, 0.0)
     assert caught.value.status == 400
 
@@ -60,7 +60,7 @@ def test_a_bad_name_is_refused_with_what_was_wanted(hub, name) -> None:
 def test_too_many_sessions_are_refused_but_joining_is_not(hub) -> None:
     for k in range(3):
         hub.open(k, f"s{k}", 0.0)
-    with pytest.raises(HubError) as caught:
+    with pytest.raises(JoinError) as caught:
         hub.open(9, "more", 0.0)
     assert caught.value.status == 503
     hub.open(10, "s0", 0.0)
@@ -75,7 +75,7 @@ def test_a_session_that_was_left_makes_room_the_longest_left_first(hub) -> None:
     hub.open(9, "more", 3.0)
     assert set(hub.sessions) == {"s0", "s2", "more"}
     hub.open(10, "s0", 3.0)
-    with pytest.raises(HubError, match="3 sessions are open"):
+    with pytest.raises(JoinError, match="3 sessions are open"):
         hub.check("again")
 
 
@@ -84,7 +84,7 @@ def test_hello_into_one_session_too_many_is_an_error_and_leaves_all_as_it_was(hu
         hub.open(k, f"s{k}", 0.0)
     here = hub.open(3, "s0", 0.0)
     here.receive(3, '{"type":"hello","session":"more"}', 0.5)
-    (effect,) = hub.effects(here, 0.5)
+    (effect,) = hub.take_effects(here, 0.5)
     assert '"where":"hello.session"' in effect.data
     assert hub.session_of(3) is here
 
@@ -93,7 +93,7 @@ def test_hello_moves_a_connection_to_the_session_it_names(hub) -> None:
     there = hub.open(1, "show", 0.0)
     here = hub.open(2, None, 0.0)
     here.receive(2, '{"type":"hello","session":"show","seen":0}', 0.5)
-    effects = hub.effects(here, 0.5)
+    effects = hub.take_effects(here, 0.5)
     assert hub.session_of(2) is there
     assert here.id not in hub.sessions
     assert '"session":"show"' in effects[0].data
@@ -103,13 +103,13 @@ def test_one_that_has_moved_hears_nothing_more_of_where_it_was(hub) -> None:
     hub.open(1, "show", 0.0)
     here = hub.open(2, "here", 0.0)
     here.receive(2, '<bml id="b"><wait id="w" duration="1"/></bml>', 0.0)
-    hub.effects(here, 0.0)
+    hub.take_effects(here, 0.0)
     # Something of the old session is due in the very moment in which it goes.
     here.receive(2, '{"type":"hello","session":"show"}', 0.0)
-    effects = hub.effects(here, 0.0)
+    effects = hub.take_effects(here, 0.0)
     welcome = next(n for n, effect in enumerate(effects) if '"session":"show"' in effect.data)
     assert [effect.data for effect in effects[welcome + 1 :]] == []
-    assert here.log.newest > 0
+    assert here.feedback_log.newest > 0
 
 
 def test_hello_into_a_session_that_cannot_be_kept_ends_the_connection_with_words() -> None:
@@ -117,13 +117,13 @@ def test_hello_into_a_session_that_cannot_be_kept_ends_the_connection_with_words
 
     def make(id: str, now: float, named: bool) -> Session:
         if id == "show":
-            raise HubError(503, "the journal has no room")
+            raise JoinError(503, "the journal has no room")
         return Session(id, settings, now, named=named)
 
-    hub = Hub(make, settings)
+    hub = SessionRegistry(make, settings)
     here = hub.open(1, "here", 0.0)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
-    assert hub.effects(here, 0.5) == [Close(1, 1013, "the journal has no room")]
+    assert hub.take_effects(here, 0.5) == [Close(1, 1013, "the journal has no room")]
     assert hub.session_of(1) is None
 
 
@@ -136,7 +136,7 @@ def test_one_address_opens_no_more_than_its_share_and_others_still_come() -> Non
         hub.open(k, f"s{k}", 0.0, visitor=HERE)
     for name in ("more", None):
         with pytest.raises(
-            HubError, match=r"2 sessions .* 10\.0\.0\.1 .*REALIZER_MAX_ADDRESS_SESSIONS"
+            JoinError, match=r"2 sessions .* 10\.0\.0\.1 .*REALIZER_MAX_ADDRESS_SESSIONS"
         ) as caught:
             hub.check(name, HERE)
         assert caught.value.status == 429
@@ -164,10 +164,10 @@ def test_a_session_that_ended_counts_no_more() -> None:
         hub.leave(k, 1.0)
     failed = hub.open(3, "show", 2.0, visitor=HERE)
     failed.close()
-    hub.forget(failed)
+    hub.remove(failed)
     kept = hub.open(4, "show", 3.0, visitor=HERE)
     hub.leave(4, 4.0)
-    hub.sweep(4.0 + 60.0)
+    hub.remove_expired(4.0 + 60.0)
     assert kept.closed
     hub.open(5, "show", 70.0, visitor=HERE)
 
@@ -182,7 +182,7 @@ def test_a_session_that_was_brought_back_is_opened_by_who_comes_to_it() -> None:
     hub = limited(max_address_sessions=1)
     hub.open(1, "one", 0.0, visitor=HERE)
     hub.sessions["two"] = Session("two", Settings(), 0.0, named=True)
-    with pytest.raises(HubError, match="wanted fewer"):
+    with pytest.raises(JoinError, match="wanted fewer"):
         hub.check("two", HERE)
     hub.open(2, "two", 0.0, visitor=THERE)
 
@@ -191,12 +191,12 @@ def test_hello_counts_what_it_leaves_and_what_it_opens() -> None:
     hub = limited(max_address_sessions=1)
     here = hub.open(1, None, 0.0, visitor=HERE)
     here.receive(1, '{"type":"hello","session":"show"}', 0.5)
-    hub.effects(here, 0.5)
+    hub.take_effects(here, 0.5)
     there = hub.session_of(1)
     assert there is not None
     assert there.id == "show"
     there.receive(1, '{"type":"hello","session":"another"}', 0.6)
-    (effect,) = hub.effects(there, 0.6)
+    (effect,) = hub.take_effects(there, 0.6)
     assert "REALIZER_MAX_ADDRESS_SESSIONS" in effect.data
 
 
@@ -204,16 +204,16 @@ def test_a_visitor_who_is_bound_to_sessions_comes_into_no_other() -> None:
     hub = limited()
     bound = Visitor("10.0.0.1", frozenset({"show", "stage"}))
     for name in ("other", None):
-        with pytest.raises(HubError, match=r"the token is for \(show, stage\)") as caught:
+        with pytest.raises(JoinError, match=r"the token is for \(show, stage\)") as caught:
             hub.open(1, name, 0.0, visitor=bound)
         assert caught.value.status == 403
     here = hub.open(1, "show", 0.0, visitor=bound)
     here.receive(1, '{"type":"hello","session":"other"}', 0.5)
-    (effect,) = hub.effects(here, 0.5)
+    (effect,) = hub.take_effects(here, 0.5)
     assert "hello.session" in effect.data
     assert hub.session_of(1) is here
     here.receive(1, '{"type":"hello","session":"stage"}', 0.5)
-    hub.effects(here, 0.5)
+    hub.take_effects(here, 0.5)
     there = hub.session_of(1)
     assert there is not None
     assert there.id == "stage"
@@ -229,7 +229,7 @@ def test_where_memory_is_used_up_no_session_is_opened_and_those_that_play_are_jo
     hub.open(1, "show", 0.0)
     pages.write_text("2000000 1000000 0")
     hub.open(2, "show", 0.0)
-    with pytest.raises(HubError, match="REALIZER_MAX_MEMORY") as caught:
+    with pytest.raises(JoinError, match="REALIZER_MAX_MEMORY") as caught:
         hub.open(3, "more", 0.0)
     assert caught.value.status == 503
 
@@ -257,7 +257,7 @@ def test_whatever_they_do_nobody_has_more_than_their_share(
                 joined = hub.open(connection, name, now, visitor=Visitor(address))
                 who[connection] = address
                 opened.setdefault(joined, address)
-            except HubError as full:
+            except JoinError as full:
                 share = full.status == 429
             else:
                 share = None
@@ -270,25 +270,25 @@ def test_whatever_they_do_nobody_has_more_than_their_share(
             hub.leave(connection, now)
         elif move == "hello" and session is not None and name is not None:
             session.receive(connection, f'{{"type":"hello","session":"{name}"}}', now)
-            hub.effects(session, now)
+            hub.take_effects(session, now)
             there = hub.session_of(connection)
             assert there is not None
             opened.setdefault(there, who[connection])
         elif move == "sweep":
-            hub.sweep(now + 40)
+            hub.remove_expired(now + 40)
         elif move == "fail" and session is not None:
             session.close()
-            hub.forget(session)
+            hub.remove(session)
         opened = {s: a for s, a in opened.items() if hub.sessions.get(s.id) is s}
         shares = Counter(opened.values())
         assert len(hub.sessions) <= 4
         assert max(shares["10.0.0.1"], shares["10.0.0.2"]) <= 2
     for connection in range(8):
         hub.leave(connection, 1000)
-    hub.sweep(2000)
+    hub.remove_expired(2000)
     assert not hub.sessions
-    assert not hub._openers
-    assert not hub._opened
+    assert not hub._opened_by
+    assert not hub._opened_count
 
 
 def test_sessions_of_other_doors_are_where_these_doors_are() -> None:

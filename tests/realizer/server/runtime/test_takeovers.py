@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from realizer.core.settings import Settings
-from realizer.server.journal import JournalError, Lost, journal_at
+from realizer.server.journal import JournalError, TakenOver, journal_at
 from realizer.server.runtime import takeovers
 from realizer.server.runtime.takeovers import taken_over
 from realizer.server.session.session import Session
@@ -29,8 +29,8 @@ def test_those_that_are_another_s_are_found_among_many(
     one_s_own = opened("own", named=False)
     here.begin("own", 0.0)
     for name in ("s1", "s3", "s4", "own"):
-        there.take(name)
-    sessions[3].lose(Lost("known already"))
+        there.claim(name)
+    sessions[3].hand_over(TakenOver("known already"))
     found = asyncio.run(taken_over(here, [*sessions, one_s_own]))
     assert found == [sessions[1], sessions[4]]
     assert asyncio.run(taken_over(there, sessions)) == [sessions[0], sessions[2]]
@@ -46,7 +46,7 @@ def test_where_the_journal_cannot_be_read_nobody_is_let_go(
     def broken(sessions: object) -> set[str]:
         raise JournalError("it does not answer")
 
-    monkeypatch.setattr(journal, "taken", broken)
+    monkeypatch.setattr(journal, "taken_over", broken)
     assert asyncio.run(taken_over(journal, [opened("s")])) == []
     assert "it does not answer" in caplog.text
     journal.close()

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.runtime.timer_wheel import NEVER, STEP, TURN, Alarms
+from realizer.server.runtime.timer_wheel import NEVER, STEP, TURN, TimerWheel
 
 
 class Clock:
@@ -44,7 +44,7 @@ class Clock:
         return rang
 
 
-def alarms(clock: Clock, *, costs: float = 0.0) -> tuple[Alarms[str], list[tuple[str, float, float]]]:
+def alarms(clock: Clock, *, costs: float = 0.0) -> tuple[TimerWheel[str], list[tuple[str, float, float]]]:
     """Alarms and what they woke: (thing, when it was to be, when it was)."""
     woken: list[tuple[str, float, float]] = []
 
@@ -52,14 +52,14 @@ def alarms(clock: Clock, *, costs: float = 0.0) -> tuple[Alarms[str], list[tuple
         woken.append((thing, when, clock.now))
         clock.now += costs
 
-    return Alarms(clock, wake), woken
+    return TimerWheel(clock, wake), woken
 
 
 def test_each_is_woken_once_at_its_time() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     for thing, when in (("b", 2.0), ("a", 1.0), ("c", 3.0)):
-        some.set(thing, when)
+        some.schedule(thing, when)
     clock.run(2.5)
     assert woken == [("a", 1.0, 1.0), ("b", 2.0, 2.0)]
     clock.run(9.0)
@@ -69,12 +69,12 @@ def test_each_is_woken_once_at_its_time() -> None:
 def test_what_is_set_again_is_woken_at_the_new_time_only() -> None:
     clock = Clock()
     some, woken = alarms(clock)
-    some.set("a", 1.0)
-    some.set("a", 3.0)
-    some.set("b", 3.0)
-    some.set("b", 2.0)
-    some.set("c", 2.0)
-    some.set("c", NEVER)
+    some.schedule("a", 1.0)
+    some.schedule("a", 3.0)
+    some.schedule("b", 3.0)
+    some.schedule("b", 2.0)
+    some.schedule("c", 2.0)
+    some.schedule("c", NEVER)
     clock.run(9.0)
     assert woken == [("b", 2.0, 2.0), ("a", 3.0, 3.0)]
 
@@ -82,9 +82,9 @@ def test_what_is_set_again_is_woken_at_the_new_time_only() -> None:
 def test_one_that_is_due_is_not_put_off_by_who_sets_it_again() -> None:
     clock = Clock()
     some, woken = alarms(clock)
-    some.set("a", 1.0)
+    some.schedule("a", 1.0)
     clock.now = 1.5
-    some.set("a", 1.6)
+    some.schedule("a", 1.6)
     clock.run(1.55)
     assert woken == [("a", 1.0, 1.5)]
 
@@ -93,7 +93,7 @@ def test_what_is_due_within_a_step_needs_one_timer() -> None:
     clock = Clock()
     some, woken = alarms(clock)
     for k in range(100):
-        some.set(str(k), 1.0 + k * STEP / 100)
+        some.schedule(str(k), 1.0 + k * STEP / 100)
     assert clock.run(2.0) <= 3
     assert len(woken) == 100
     assert all(was - wanted <= STEP for _, wanted, was in woken)
@@ -103,7 +103,7 @@ def test_who_wakes_for_long_lets_the_loop_do_other_things_in_between() -> None:
     clock = Clock()
     some, woken = alarms(clock, costs=TURN / 2)
     for k in range(12):
-        some.set(str(k), 1.0)
+        some.schedule(str(k), 1.0)
     assert clock.run(2.0) >= 4
     assert [thing for thing, *_ in woken] == [str(k) for k in range(12)]
 
@@ -114,10 +114,10 @@ def test_a_thing_may_set_itself_again_while_it_is_woken() -> None:
 
     def wake(thing: str, when: float) -> None:
         woken.append(when)
-        some.set(thing, when + 1.0)
+        some.schedule(thing, when + 1.0)
 
-    some = Alarms(clock, wake)
-    some.set("a", 1.0)
+    some = TimerWheel(clock, wake)
+    some.schedule("a", 1.0)
     clock.run(4.5)
     assert woken == [1.0, 2.0, 3.0, 4.0]
 
@@ -132,9 +132,9 @@ def test_one_that_fails_leaves_the_others() -> None:
         if thing == "a":
             raise ValueError(thing)
 
-    some = Alarms(clock, wake)
-    some.set("a", 1.0)
-    some.set("b", 1.0)
+    some = TimerWheel(clock, wake)
+    some.schedule("a", 1.0)
+    some.schedule("b", 1.0)
     clock.run(2.0)
     assert woken == ["a", "b"]
 
@@ -142,9 +142,9 @@ def test_one_that_fails_leaves_the_others() -> None:
 def test_after_close_nobody_is_woken() -> None:
     clock = Clock()
     some, woken = alarms(clock)
-    some.set("a", 1.0)
+    some.schedule("a", 1.0)
     some.close()
-    some.set("b", 1.0)
+    some.schedule("b", 1.0)
     clock.run(2.0)
     assert woken == []
 
@@ -155,7 +155,7 @@ def test_the_last_time_counts_whatever_was_set_before(steps: list[tuple[int, flo
     some, woken = alarms(clock)
     last: dict[str, float] = {}
     for thing, when in steps:
-        some.set(str(thing), when)
+        some.schedule(str(thing), when)
         if last.get(str(thing)) != 0.0 or when == NEVER:  # one that is due already stays
             last[str(thing)] = when
     clock.run(20.0)

@@ -10,7 +10,7 @@ import pytest
 
 from realizer.server.http.metrics import GAUGES, Metrics
 from realizer.server.runtime import worker_aggregation as module
-from realizer.server.runtime.worker_aggregation import gathered, is_for_all
+from realizer.server.runtime.worker_aggregation import aggregate, is_for_all_workers
 
 REQUEST = b"GET /metrics?token=x HTTP/1.1\r\nHost: here\r\nAuthorization: Bearer y\r\n\r\n"
 
@@ -55,7 +55,7 @@ def asked(*answers: bytes | None, request: bytes = REQUEST) -> tuple[bytes, list
             if not request.endswith(b"\r\n\r\n"):
                 ours.shutdown(socket.SHUT_WR)
             theirs.setblocking(False)
-            await gathered(theirs, len(answers), give)
+            await aggregate(theirs, len(answers), give)
             await asyncio.gather(*tasks)
             theirs.close()
             return b"".join(iter(lambda: ours.recv(10_000), b""))
@@ -130,4 +130,4 @@ def test_half_a_request_is_answered_by_nothing() -> None:
     ],
 )
 def test_only_a_request_that_names_no_worker_is_for_all(line: str, all_: bool) -> None:
-    assert is_for_all(line) is all_
+    assert is_for_all_workers(line) is all_

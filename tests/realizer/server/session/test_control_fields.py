@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.protocol.messages.requests import Feeling, SetMessage
+from realizer.protocol.messages.requests import EmotionFields, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
-from realizer.server.session.control_fields import Wrong, feeling_of, held, index_of
+from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 
 
 def asked(**fields: object) -> SetMessage:
@@ -26,7 +26,7 @@ def asked(**fields: object) -> SetMessage:
     ],
 )
 def test_names_are_those_of_sides_and_of_faps(message: SetMessage, values: dict[str, float | None]) -> None:
-    assert held(message, ["12L", "open_jaw"]) == values
+    assert direct_values(message, ["12L", "open_jaw"]) == values
 
 
 @pytest.mark.parametrize(
@@ -40,25 +40,25 @@ def test_names_are_those_of_sides_and_of_faps(message: SetMessage, values: dict[
     ],
 )
 def test_what_is_no_name_is_said_with_its_field(message: SetMessage, where: str, says: str) -> None:
-    with pytest.raises(Wrong) as wrong:
-        held(message, [])
+    with pytest.raises(FieldError) as wrong:
+        direct_values(message, [])
     assert wrong.value.where == where
     assert says in str(wrong.value)
 
 
 def test_a_feeling_is_what_it_moves() -> None:
-    assert feeling_of(None) == {}
-    assert feeling_of(Feeling(name="joy"))["12L"] > 0
-    with pytest.raises(Wrong) as wrong:
-        feeling_of(Feeling(name="nothing at all"))
+    assert emotion_values(None) == {}
+    assert emotion_values(EmotionFields(name="joy"))["12L"] > 0
+    with pytest.raises(FieldError) as wrong:
+        emotion_values(EmotionFields(name="nothing at all"))
     assert wrong.value.where == "emotion.name"
 
 
 def test_a_character_that_is_new_has_a_place_while_there_is_room(drive) -> None:
     session = drive().session
-    assert [index_of(session.player, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
+    assert [character_index(session.player, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
     for number in range(2, MAX_CHARACTERS):
-        assert index_of(session.player, f"c{number}") == number
-    with pytest.raises(Wrong, match="wanted at most 16 characters"):
-        index_of(session.player, "one more")
-    assert index_of(session.player, "Ben") == 1
+        assert character_index(session.player, f"c{number}") == number
+    with pytest.raises(FieldError, match="wanted at most 16 characters"):
+        character_index(session.player, "one more")
+    assert character_index(session.player, "Ben") == 1

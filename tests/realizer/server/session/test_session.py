@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.core.errors import RenderError, VoiceError
 from realizer.protocol.wire import unpack
-from realizer.server.journal.entry import Entry, JournalError, Lost
-from realizer.server.journal.journal_writer import Notes
-from realizer.server.journal.sqlite_journal import LocalJournal
+from realizer.server.journal.entry import Entry, JournalError, TakenOver
+from realizer.server.journal.journal_writer import JournalWriter
+from realizer.server.journal.sqlite_journal import SqliteJournal
 from realizer.server.session import feedback_log
 from realizer.server.session.effects import Close
 from realizer.speech.utterance import Phoneme, Utterance, Word
@@ -191,7 +191,7 @@ def test_no_documents_are_taken_while_the_service_ends(driver) -> None:
 
 
 def test_what_is_not_kept_has_no_number_and_leaves_what_is_told_as_it_was() -> None:
-    class Full(LocalJournal):
+    class Full(SqliteJournal):
         full = False
 
         def add(self, session: str, entry: Entry) -> None:
@@ -200,8 +200,8 @@ def test_what_is_not_kept_has_no_number_and_leaves_what_is_told_as_it_was() -> N
             super().add(session, entry)
 
     driver, journal = Driver(named=True), Full(":memory:")
-    driver.session.notes = Notes("test", journal)
-    driver.session.notes.begin(0.0)
+    driver.session.journal = JournalWriter("test", journal)
+    driver.session.journal.begin(0.0)
     client = driver.send({"type": "speech", "id": "turn", "append": "One. "})
     journal.full = True
     driver.send('<bml id="turn"><wait id="w"/></bml>')
@@ -297,7 +297,7 @@ def test_a_character_speaks_with_the_voice_it_was_given() -> None:
     driver = Driver(mute=True)
     driver.send({"type": "character", "id": "Ada", "voice": "silent"})
     driver.send(TALK.format("b").replace("<bml", '<bml characterId="Ada"'))
-    assert driver.spoken[0].say.voice == "silent"
+    assert driver.spoken[0].request.voice == "silent"
 
 
 # streams ----------------------------------------------------------------------------------------
@@ -371,13 +371,13 @@ def test_a_viewer_can_switch_feedback_off(driver) -> None:
 
 
 def test_a_slow_client_loses_frames_counted_and_never_feedback(driver) -> None:
-    driver.session.backlog(1, 10**6)
+    driver.session.update_backlog(1, 10**6)
     driver.send(FAP)
     driver.send(NOD.format("b"))
     client = driver.run(10)
     assert not client.frames
     assert "b:end" in client.ids
-    driver.session.backlog(1, 0)
+    driver.session.update_backlog(1, 0)
     driver.run(11)
     assert [f.frame for f in client.frames] == list(range(251, 276))
     driver.send({"type": "state"})
@@ -385,7 +385,7 @@ def test_a_slow_client_loses_frames_counted_and_never_feedback(driver) -> None:
 
 
 def test_a_client_that_never_reads_is_closed(driver) -> None:
-    driver.session.backlog(1, 10**9)
+    driver.session.update_backlog(1, 10**9)
     driver.collect()
     assert [c.connection for c in driver.closed] == [1]
 
@@ -447,7 +447,7 @@ def test_stop_takes_back_the_sound_that_was_sent_ahead(driver) -> None:
     before = len(sound_of(driver.clients[1]))
     driver.send({"type": "stop"})
     after = sound_of(driver.run(5))[before:]
-    assert after[0].forget
+    assert after[0].flush
     assert after[0].time == pytest.approx(0.5, abs=0.021)
     assert after[-1].time < 0.6
     assert abs(int(after[-1].values[-1])) < 2000, "it fades out"
@@ -506,7 +506,7 @@ def heard_of(client, seconds: float = 3.0):
     heard = np.zeros(round(seconds * RATE), np.int16)
     for frame in (f for f in client.frames if f.stream == "audio"):
         first = round(frame.time * RATE)
-        if frame.forget:
+        if frame.flush:
             heard[first:] = 0
         heard[first : first + len(frame.values)] = frame.values
     return heard
@@ -526,13 +526,13 @@ def test_the_newest_frame_is_drawn_and_late_ones_are_skipped(driver) -> None:
     client = driver.send({"type": "subscribe", "stream": "video", "size": [64, 64], "fps": 10})
     driver.run(1.0)
     (first,) = driver.draws
-    assert first.look.size == (64, 64)
+    assert first.options.size == (64, 64)
     assert first.pose.shape == (68,)
-    driver.session.drawn(first.id, b"jpeg", driver.opened + 1.0)
+    driver.session.on_picture(first.id, b"jpeg", driver.opened + 1.0)
     driver.collect()
     assert [(f.frame, f.payload) for f in client.frames] == [(0, b"jpeg")]
     assert len(driver.draws) == 2
-    driver.session.drawn(driver.draws[1].id, b"next", driver.opened + 1.05)
+    driver.session.on_picture(driver.draws[1].id, b"next", driver.opened + 1.05)
     driver.collect()
     assert client.frames[-1].frame == 10
     driver.send({"type": "state"})
@@ -545,7 +545,7 @@ def test_a_picture_is_drawn_once_for_all_who_look_at_it(driver) -> None:
         driver.send({"type": "subscribe", "stream": "video", "fps": 10}, connection)
     driver.run(0.05)
     assert len(driver.draws) == 1
-    driver.session.drawn(driver.draws[0].id, b"jpeg", driver.opened + 0.05)
+    driver.session.on_picture(driver.draws[0].id, b"jpeg", driver.opened + 0.05)
     driver.collect()
     assert [len(driver.clients[c].frames) for c in (1, 2)] == [1, 1]
 
@@ -553,7 +553,7 @@ def test_a_picture_is_drawn_once_for_all_who_look_at_it(driver) -> None:
 def test_pictures_that_cannot_be_drawn_end_with_one_error(driver) -> None:
     client = driver.send({"type": "subscribe", "stream": "video"})
     driver.run(0.1)
-    driver.session.drawn(driver.draws[0].id, RenderError("install EGL"), driver.opened + 0.1)
+    driver.session.on_picture(driver.draws[0].id, RenderError("install EGL"), driver.opened + 0.1)
     driver.collect()
     driver.run(2.0)
     assert [e["message"] for e in client.of("error")] == ["install EGL"]
@@ -571,7 +571,7 @@ def test_who_asks_for_another_light_gets_pictures_of_its_own(driver) -> None:
     look = {"camera": "profile", "light": "evening", "background": "#102030"}
     driver.send({"type": "subscribe", "stream": "video", **look}, 2)
     driver.run(0.05)
-    plain, own = (draw.look for draw in driver.draws)
+    plain, own = (draw.options for draw in driver.draws)
     assert (plain.camera, plain.light, plain.background) == ("front", None, None)
     assert (own.camera, own.light, own.background) == ("profile", "evening", "#102030")
 
@@ -592,7 +592,7 @@ def test_a_client_that_comes_back_gets_what_it_missed() -> None:
     driver.run(0.2)
     driver.leave(1)
     driver.run(10)
-    whole = driver.session.log.newest
+    whole = driver.session.feedback_log.newest
     again = driver.join(2, seen=2)
     assert [f.seq for f in again.feedback] == list(range(3, whole + 1))
     assert again.ids[-1] == "b:end"
@@ -639,8 +639,8 @@ def test_a_named_session_is_kept_for_a_while() -> None:
     driver = Driver(named=True, keep=60.0)
     driver.leave(1)
     assert not driver.session.closed
-    assert not driver.session.expired(driver.opened + 59)
-    assert driver.session.expired(driver.opened + 60)
+    assert not driver.session.is_expired(driver.opened + 59)
+    assert driver.session.is_expired(driver.opened + 60)
 
 
 # control ----------------------------------------------------------------------------------------
@@ -739,7 +739,7 @@ def act(driver: Driver, kind: str, value) -> None:
         case "subscribe":
             driver.send({"type": "subscribe", "stream": value, "fps": 25})
         case "slow":
-            driver.session.backlog(1, value)
+            driver.session.update_backlog(1, value)
         case "broken":
             driver.send(value)
         case "stop":
@@ -778,12 +778,12 @@ def test_in_any_order_of_events_frames_rise_and_feedback_is_whole(actions) -> No
 
 
 def test_one_who_joins_a_session_that_another_process_has_is_sent_there_with_all_others() -> None:
-    class Taken(LocalJournal):
+    class Taken(SqliteJournal):
         def add(self, session: str, entry: Entry) -> None:
-            raise Lost("another process has it")
+            raise TakenOver("another process has it")
 
     driver = Driver(named=True)
-    driver.session.notes = Notes("test", Taken(":memory:"))
+    driver.session.journal = JournalWriter("test", Taken(":memory:"))
     driver.join(2)
     assert driver.closed == [Close(k, 1012, "another process has it") for k in (1, 2)]
 
@@ -805,12 +805,12 @@ def test_a_feedback_stream_that_is_asked_for_again_begins_with_what_follows(driv
     driver.send(NOD.format("a"))
     client = driver.run(10)
     assert not client.feedback
-    told = driver.session.log.newest
+    told = driver.session.feedback_log.newest
     driver.send({"type": "subscribe", "stream": "feedback"})
     assert not client.feedback
     driver.send(NOD.format("b"))
     driver.run(20)
-    assert [f.seq for f in client.feedback] == list(range(told + 1, driver.session.log.newest + 1))
+    assert [f.seq for f in client.feedback] == list(range(told + 1, driver.session.feedback_log.newest + 1))
 
 
 def test_a_feedback_stream_can_be_narrowed_to_some_elements(driver) -> None:
@@ -900,7 +900,7 @@ def test_a_speech_that_has_to_last_longer_is_spoken_again_and_later_blocks_wait_
     driver.send('<bml id="a"><speech id="s" start="0" end="3"><text>Hello there</text></speech></bml>')
     driver.send('<bml id="b" composition="APPEND"/>')
     driver.say(driver.spoken[0].id, replace(spoken(2.0), stretch=(0.6, 1.8)))
-    assert [order.say.seconds for order in driver.spoken] == [None, pytest.approx(3.0)]
+    assert [order.request.seconds for order in driver.spoken] == [None, pytest.approx(3.0)]
     assert not any(id.endswith(":start") for id in driver.run(1).ids)
     driver.say(driver.spoken[1].id, spoken(3.0))
     times = {f.id: f.global_time for f in driver.run(9).feedback if isinstance(f, BlockProgress)}
@@ -972,15 +972,15 @@ def test_frames_go_on_while_documents_wait_to_be_read(driver) -> None:
     for k in range(3):
         driver.session.receive(1, CALM.format(id=f"b{k}"), now)
     driver.collect()
-    assert driver.session.reads
+    assert driver.session.has_documents
     for frame in range(1, 6):
         assert driver.session.next_due() == pytest.approx(now + frame / 25)
-        driver.session.tick(now + frame / 25, reads=False)
+        driver.session.tick(now + frame / 25, read_documents=False)
         driver.collect()
     assert [frame.frame for frame in driver.clients[1].frames] == list(range(6))
-    assert driver.session.reads
+    assert driver.session.has_documents
     driver.run(0.3)
-    assert not driver.session.reads
+    assert not driver.session.has_documents
     assert driver.clients[1].ids[-1] != "prediction"
     assert {"b0:end", "b1:end", "b2:start"} <= set(driver.clients[1].ids)
 

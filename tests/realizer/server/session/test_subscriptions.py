@@ -89,7 +89,7 @@ def test_videos_of_one_character_with_views_of_their_own_run_side_by_side(drive)
     assert plain == 0
     assert len({plain, side, far}) == 3
     for draw in driver.draws:
-        driver.session.drawn(draw.id, f"{draw.look.camera}".encode(), driver.opened)
+        driver.session.on_picture(draw.id, f"{draw.options.camera}".encode(), driver.opened)
     driver.collect()
     assert {frame.character: frame.payload for frame in driver.clients[1].frames} == {
         plain: b"front",

@@ -17,7 +17,7 @@ from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.serve import Server
 from realizer.server.speech import audio_clips
-from realizer.server.speech.audio_clips import ClipError, Clips
+from realizer.server.speech.audio_clips import AudioClips, ClipError
 
 RATE = 16000
 SOUND = np.rint(9000 * np.sin(np.arange(RATE) * 0.05)).astype("<i2")
@@ -43,41 +43,41 @@ def wav(pcm: np.ndarray) -> bytes:
 
 
 def test_pieces_of_pcm_are_one_recording_when_the_last_has_come() -> None:
-    known = Clips()
-    known.take(ClipPiece("c", 0, RATE, SOUND[:1000].tobytes(), final=False))
+    known = AudioClips()
+    known.add_chunk(ClipPiece("c", 0, RATE, SOUND[:1000].tobytes(), final=False))
     assert not known.recordings
-    known.take(ClipPiece("c", 1, RATE, SOUND[1000:].tobytes()))
+    known.add_chunk(ClipPiece("c", 1, RATE, SOUND[1000:].tobytes()))
     assert np.array_equal(known.recordings["c"].pcm, SOUND)
     assert known.recordings["c"].rate == RATE
 
 
 def test_a_file_may_come_in_pieces_too_and_says_its_rate_itself() -> None:
-    known, content = Clips(), wav(SOUND)
-    known.take(ClipPiece("c", 0, 0, content[:777], final=False))
-    known.take(ClipPiece("c", 1, 0, content[777:]))
+    known, content = AudioClips(), wav(SOUND)
+    known.add_chunk(ClipPiece("c", 0, 0, content[:777], final=False))
+    known.add_chunk(ClipPiece("c", 1, 0, content[777:]))
     assert known.recordings["c"].rate == RATE
     assert np.array_equal(known.recordings["c"].pcm, SOUND)
 
 
 def test_times_may_come_before_and_after_the_sound_and_in_parts() -> None:
-    known = Clips()
-    known.tell(told(clip="c", words=[{"start": 0, "text": "Hi"}], final=False))
-    known.take(ClipPiece("c", 0, RATE, SOUND.tobytes()))
+    known = AudioClips()
+    known.annotate(told(clip="c", words=[{"start": 0, "text": "Hi"}], final=False))
+    known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
     assert not known.recordings, "more is to be told"
-    known.tell(told(clip="c", words=[{"start": 0.5, "end": 0.9, "text": "you"}]))
+    known.annotate(told(clip="c", words=[{"start": 0.5, "end": 0.9, "text": "you"}]))
     recording = known.recordings["c"]
     assert [(w.start, w.end, w.text) for w in recording.words] == [(0, 0.5, "Hi"), (0.5, 0.9, "you")]
     assert recording.text == "Hi you"
-    known.tell(told(clip="c", visemes=[{"start": 0.2, "viseme": "PP"}, {"start": 0.3, "viseme": "sil"}]))
+    known.annotate(told(clip="c", visemes=[{"start": 0.2, "viseme": "PP"}, {"start": 0.3, "viseme": "sil"}]))
     assert [(p.start, p.ipa) for p in known.recordings["c"].phonemes] == [(0.2, "p"), (0.3, "")]
     assert known.recordings["c"].words == (), "what is told anew replaces what was told"
 
 
 def test_a_clip_that_begins_anew_is_another() -> None:
-    known = Clips()
-    known.take(ClipPiece("c", 0, RATE, SOUND.tobytes()))
-    known.tell(told(clip="c", text="Hello"))
-    known.take(ClipPiece("c", 0, RATE, SOUND[:80].tobytes()))
+    known = AudioClips()
+    known.add_chunk(ClipPiece("c", 0, RATE, SOUND.tobytes()))
+    known.annotate(told(clip="c", text="Hello"))
+    known.add_chunk(ClipPiece("c", 0, RATE, SOUND[:80].tobytes()))
     assert len(known.recordings["c"].pcm) == 80
     assert known.recordings["c"].text is None
 
@@ -93,22 +93,22 @@ def test_a_clip_that_begins_anew_is_another() -> None:
     ],
 )
 def test_a_piece_that_cannot_be_used_says_why(piece, says) -> None:
-    known = Clips()
+    known = AudioClips()
     with pytest.raises(ClipError, match=says) as error:
-        known.take(piece)
+        known.add_chunk(piece)
     assert error.value.where == "clip:c"
     assert not known.recordings
 
 
 def test_too_much_sound_is_refused_and_the_oldest_clips_make_room(monkeypatch) -> None:
-    monkeypatch.setattr(audio_clips, "MOST_BYTES", 100)
-    known = Clips()
-    known.take(ClipPiece("a", 0, RATE, bytes(60)))
-    known.take(ClipPiece("b", 0, RATE, bytes(60)))
+    monkeypatch.setattr(audio_clips, "MAX_BYTES", 100)
+    known = AudioClips()
+    known.add_chunk(ClipPiece("a", 0, RATE, bytes(60)))
+    known.add_chunk(ClipPiece("b", 0, RATE, bytes(60)))
     assert list(known.recordings) == ["b"]
-    known.take(ClipPiece("c", 0, RATE, bytes(30), final=False))
+    known.add_chunk(ClipPiece("c", 0, RATE, bytes(30), final=False))
     with pytest.raises(ClipError, match="at most 100 bytes"):
-        known.take(ClipPiece("c", 1, RATE, bytes(90)))
+        known.add_chunk(ClipPiece("c", 1, RATE, bytes(90)))
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_too_much_sound_is_refused_and_the_oldest_clips_make_room(monkeypatch) -
 )
 def test_times_that_cannot_be_used_say_where(fields, where) -> None:
     with pytest.raises(ClipError) as error:
-        Clips().tell(told(clip="c", **fields))
+        AudioClips().annotate(told(clip="c", **fields))
     assert error.value.where == where
 
 

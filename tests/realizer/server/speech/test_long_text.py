@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.speech.long_text import PART, SHORT, Growing
+from realizer.server.speech.long_text import PART, SHORT, LongText
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word
@@ -34,10 +34,10 @@ def voice():
 
 def grown(voice, say: SpeechRequest) -> tuple[list[SpeechRequest], list[Utterance]]:
     """The parts, and the utterance after each of them."""
-    growing, parts, made = Growing(say), [], []
+    growing, parts, made = LongText(say), [], []
     while (part := growing.next()) is not None:
         parts.append(part)
-        made.append(growing.take(voice.say(part)))
+        made.append(growing.add_part(voice.say(part)))
     return parts, made
 
 
@@ -115,10 +115,10 @@ def test_the_end_and_the_marks_that_are_to_come_are_guessed(voice) -> None:
 
 
 def test_a_part_that_comes_late_leaves_silence_before_it(voice) -> None:
-    growing = Growing(SpeechRequest(TEXT, MARKS))
-    first = growing.take(voice.say(growing.next()))
-    made = growing.made
-    second = growing.take(voice.say(growing.next()), made + 1.0)
+    growing = LongText(SpeechRequest(TEXT, MARKS))
+    first = growing.add_part(voice.say(growing.next()))
+    made = growing.ready_until
+    second = growing.add_part(voice.say(growing.next()), made + 1.0)
     start = second.sections[1][0]
     assert start == pytest.approx(made + 1.0, abs=1e-3)
     between = second.pcm[len(first.pcm) : round(start * second.sample_rate)]
@@ -128,22 +128,22 @@ def test_a_part_that_comes_late_leaves_silence_before_it(voice) -> None:
 
 
 def test_a_voice_that_fails_in_between_leaves_silence(voice) -> None:
-    growing = Growing(SpeechRequest(TEXT))
-    growing.take(SilentVoice().say(growing.next()))
-    made = growing.made
-    loud = growing.take(voice.say(growing.next()))
+    growing = LongText(SpeechRequest(TEXT))
+    growing.add_part(SilentVoice().say(growing.next()))
+    made = growing.ready_until
+    loud = growing.add_part(voice.say(growing.next()))
     assert loud.sample_rate
     assert not loud.pcm[: round(made * loud.sample_rate) - 1].any()
     assert loud.pcm[round(made * loud.sample_rate) :].any()
 
 
 def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
-    growing = Growing(SpeechRequest(TEXT))
+    growing = LongText(SpeechRequest(TEXT))
     growing.next()
     tone = np.full(800, 1000, np.int16)
-    growing.take(Utterance(0.1, (Word(0, 0.1, "a"),), (Phoneme(0, 0.1, "a"),), {}, 8000, tone))
+    growing.add_part(Utterance(0.1, (Word(0, 0.1, "a"),), (Phoneme(0, 0.1, "a"),), {}, 8000, tone))
     growing.next()
-    both = growing.take(Utterance(0.05, (), (), {}, 16000, tone))
+    both = growing.add_part(Utterance(0.05, (), (), {}, 16000, tone))
     assert both.sample_rate == 8000
     assert len(both.pcm) == 1200
 
@@ -158,7 +158,7 @@ def test_parts_at_another_rate_sound_at_the_first_ones() -> None:
     ],
 )
 def test_only_long_texts_that_take_as_long_as_they_take_are_made_in_parts(say, suits) -> None:
-    assert Growing.suits(say) is suits
+    assert LongText.is_applicable(say) is suits
 
 
 @given(

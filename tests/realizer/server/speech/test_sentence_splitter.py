@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.speech.sentence_splitter import Clauses
+from realizer.server.speech.sentence_splitter import SentenceSplitter
 
 
 def cut(text: str, *, close: bool = True) -> list[str]:
     """What is given out where the text comes letter by letter."""
-    clauses = Clauses()
+    clauses = SentenceSplitter()
     pieces = [piece for letter in text for piece in clauses.feed(letter)]
     return [p.strip() for p in (pieces + (clauses.feed("", close=True) if close else []))]
 
@@ -34,7 +34,7 @@ def test_sentences_end_where_people_end_them(text, pieces) -> None:
 
 
 def test_a_sentence_is_spoken_when_a_blank_follows_it_and_not_before() -> None:
-    clauses = Clauses()
+    clauses = SentenceSplitter()
     assert clauses.feed("Hello the") == []
     assert clauses.feed("re.") == []
     assert clauses.feed(" How") == ["Hello there."]
@@ -71,6 +71,6 @@ def test_the_first_piece_may_be_a_clause_and_long_sentences_are_divided() -> Non
 
 @given(st.lists(st.text(alphabet='ab.,!? <>/"=\n', max_size=12), max_size=12))
 def test_the_pieces_together_are_the_text(parts) -> None:
-    clauses = Clauses()
+    clauses = SentenceSplitter()
     pieces = [piece for part in parts for piece in clauses.feed(part)] + clauses.feed("", close=True)
     assert "".join("".join(pieces).split()) == "".join("".join(parts).split())

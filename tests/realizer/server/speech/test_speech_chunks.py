@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Block, write
-from realizer.server.speech.speech_chunks import Piece, clip_block, text_block
+from realizer.server.speech.speech_chunks import Chunk, clip_block, text_block
 
-PIECE = Piece("turn", 2)
+PIECE = Chunk("turn", 2)
 
 
 def said(block: Block) -> str:
@@ -41,7 +41,7 @@ def test_a_behaviour_with_references_is_taken_as_it_is() -> None:
 
 
 def test_a_reference_to_an_earlier_piece_finds_its_block() -> None:
-    piece = Piece("turn", 3, marks={"m": "turn.1"})
+    piece = Chunk("turn", 3, marks={"m": "turn.1"})
     block = text_block('And <head id="n" lexeme="NOD" start="turn:m + 1" end="turn:end"/>so.', piece)
     assert (block["n"].syncs["start"].block, block["n"].syncs["start"].offset) == ("turn.1", 1)
     assert block["n"].syncs["end"].block is None
@@ -77,7 +77,7 @@ def test_what_is_no_xml_is_spoken_without_its_tags(text) -> None:
 
 
 def test_character_and_language_are_told() -> None:
-    block = text_block("Ja", Piece("turn", 1, character="Eva", language="de"))
+    block = text_block("Ja", Chunk("turn", 1, character="Eva", language="de"))
     assert block.character_id == "Eva"
     assert block["turn"].text.language == "de"
 

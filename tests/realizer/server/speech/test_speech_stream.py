@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import AudioFile, Speech, write
-from realizer.server.speech.speech_chunks import Piece
-from realizer.server.speech.speech_stream import Turn
+from realizer.server.speech.speech_chunks import Chunk
+from realizer.server.speech.speech_stream import SpeechStream
 
 
-def turn(text: str = "", *, close: bool = False) -> Turn:
-    made = Turn("turn", 1, "MERGE", Piece("turn", 0, "bob", "en-US"))
+def turn(text: str = "", *, close: bool = False) -> SpeechStream:
+    made = SpeechStream("turn", 1, "MERGE", Chunk("turn", 0, "bob", "en-US"))
     made.add(text, None)
     if close:
         made.close()
@@ -19,40 +19,44 @@ def turn(text: str = "", *, close: bool = False) -> Turn:
 
 def test_its_own_block_waits_for_its_anticipator_and_is_composed_as_was_asked() -> None:
     speech = turn("One. Two.")
-    block = speech.around()
+    block = speech.own_block()
     assert (block.id, block.composition, block.character_id) == ("turn", "MERGE", "bob")
     assert f"anticipators:{speech.anticipator}:end" in write(block)
-    assert speech.asked
-    assert speech.left == []  # it is no piece
+    assert speech.is_announced
+    assert speech.open_chunks == []  # it is no piece
 
 
 def test_pieces_are_numbered_and_owed_until_they_are_planned() -> None:
     speech = turn("One. Two. ")
-    assert [speech.next_piece().id, speech.next_piece().id] == ["turn.1", "turn.2"]
-    assert (speech.owed, speech.ahead) == (["turn.1", "turn.2"], [])
-    speech.planned("turn.1")
-    assert (speech.owed, speech.ahead, speech.left) == (["turn.2"], ["turn.1"], ["turn.1", "turn.2"])
-    speech.done("turn.2")  # it was refused
-    speech.planned("turn.2")
-    assert speech.left == ["turn.1"]
-    speech.done("turn.1")
-    assert speech.left == []
+    assert [speech.next_chunk().id, speech.next_chunk().id] == ["turn.1", "turn.2"]
+    assert (speech.unplanned, speech.scheduled) == (["turn.1", "turn.2"], [])
+    speech.on_planned("turn.1")
+    assert (speech.unplanned, speech.scheduled, speech.open_chunks) == (
+        ["turn.2"],
+        ["turn.1"],
+        ["turn.1", "turn.2"],
+    )
+    speech.on_done("turn.2")  # it was refused
+    speech.on_planned("turn.2")
+    assert speech.open_chunks == ["turn.1"]
+    speech.on_done("turn.1")
+    assert speech.open_chunks == []
 
 
 def test_what_is_not_whole_waits_until_it_is_closed() -> None:
     speech = turn("One. And tw")
-    assert speech.waiting == len("One.")
+    assert speech.unspoken_length == len("One.")
     speech.add("o", None)
-    assert speech.waiting == len("One.")
+    assert speech.unspoken_length == len("One.")
     speech.close()
-    assert speech.waiting == len("One. And two")
+    assert speech.unspoken_length == len("One. And two")
 
 
 def test_a_clip_ends_the_text_before_it_and_is_no_character_that_waits() -> None:
     speech = turn()
     speech.add("Listen", "c1")
-    assert speech.waiting == len("Listen")
-    first, second = speech.next_piece(), speech.next_piece()
+    assert speech.unspoken_length == len("Listen")
+    first, second = speech.next_chunk(), speech.next_chunk()
     assert "Listen" in write(first)
     (said,) = (node for node in second.behaviours if isinstance(node, Speech))
     assert AudioFile.tag.rpartition("}")[2] in said.descriptions[0].content
@@ -67,23 +71,23 @@ def test_a_piece_is_part_of_a_sentence_while_more_of_that_may_come(
     text: str, close: bool, part: bool
 ) -> None:
     speech = turn(f"{text}{'two and three, ' * 20 if part else ''}", close=close)
-    assert (speech.next_piece().id in speech.parts) is part
+    assert (speech.next_chunk().id in speech.partial_chunks) is part
 
 
 def test_a_sync_is_lacking_until_its_piece_is_planned_or_nothing_follows() -> None:
     speech = turn('See <sync id="m"/>this. ')
-    assert speech.lacks("m")
-    speech.next_piece()
+    assert speech.awaits_sync("m")
+    speech.next_chunk()
     assert speech.marks == {"m": "turn.1"}
-    assert speech.lacks("m")
-    speech.planned("turn.1")
-    assert not speech.lacks("m")
-    assert speech.lacks("never")
+    assert speech.awaits_sync("m")
+    speech.on_planned("turn.1")
+    assert not speech.awaits_sync("m")
+    assert speech.awaits_sync("never")
     speech.close()
-    assert not speech.lacks("never")
+    assert not speech.awaits_sync("never")
 
 
 def test_a_piece_knows_the_syncs_of_those_before_it() -> None:
     speech = turn('See <sync id="m"/>this. Nod <head lexeme="NOD" start="turn:m"/>now. ')
-    speech.next_piece()
-    assert 'start="turn.1:turn:m"' in write(speech.next_piece())
+    speech.next_chunk()
+    assert 'start="turn.1:turn:m"' in write(speech.next_chunk())

@@ -40,7 +40,7 @@ class Talker(Driver):
             super().do(effect)
             return
         self.spoken.append(effect)
-        self.session.spoken(effect.id, said(effect), self.opened + self.now)
+        self.session.on_speech(effect.id, said(effect), self.opened + self.now)
         self.collect()
 
     def append(self, text: str = "", **more) -> Client:
@@ -48,9 +48,9 @@ class Talker(Driver):
 
 
 def said(order: Speak) -> Utterance:
-    if order.say.recording is not None:
-        return speak_to_length(SilentVoice(), order.say)
-    silent = SilentVoice().say(order.say)
+    if order.request.recording is not None:
+        return speak_to_length(SilentVoice(), order.request)
+    silent = SilentVoice().say(order.request)
     part = EACH / (silent.duration or 1.0)
     ends = np.linspace(0, EACH, len(silent.words) + 1)
     words = tuple(Word(*span, w.text) for *span, w in zip(ends, ends[1:], silent.words, strict=False))
@@ -66,7 +66,7 @@ def times(client: Client) -> dict[str, float]:
 
 
 def texts(driver: Driver) -> list[str]:
-    return [order.say.ssml.strip() for order in driver.spoken]
+    return [order.request.ssml.strip() for order in driver.spoken]
 
 
 def test_a_sentence_is_heard_when_it_is_whole_and_the_next_follows_it() -> None:
@@ -180,7 +180,7 @@ def test_between_the_pieces_of_a_sentence_is_the_pause_of_a_comma() -> None:
                 self.spoken.append(effect)
                 pause = (Phoneme(0.0, EACH - 0.4, "a"), Phoneme(EACH - 0.4, EACH, ""))
                 answer = replace(said(effect), phonemes=pause)
-                self.session.spoken(effect.id, answer, self.opened + self.now)
+                self.session.on_speech(effect.id, answer, self.opened + self.now)
                 self.collect()
             else:
                 super().do(effect)
@@ -229,9 +229,7 @@ def test_an_interruption_stops_the_sound_in_50_ms_says_what_was_said_and_lets_no
     heard = np.zeros(RATE * 6)
     for frame in (f for f in client.frames if f.stream == "audio"):
         first = round(frame.time * RATE)
-        heard[first : None if frame.forget else first + len(frame.values)] = (
-            0 if frame.forget else frame.values
-        )
+        heard[first : None if frame.flush else first + len(frame.values)] = 0 if frame.flush else frame.values
     assert heard[round(0.8 * RATE) : round(0.84 * RATE)].all()
     assert not heard[round(0.9 * RATE) :].any()
     end = next(f for f in client.feedback if getattr(f, "id", "") == "turn:end")
@@ -423,7 +421,7 @@ def test_a_barge_in_over_a_websocket_leaves_no_sound_50_ms_later() -> None:
     end = told_at(messages)["turn:end"]
     played: dict[int, float] = {}  # packet -> when its sound ends, as a client keeps it
     for packet in packets(messages):
-        if packet.forget:
+        if packet.flush:
             played = {frame: until for frame, until in played.items() if frame < packet.frame}
         if len(packet.values):
             last = np.flatnonzero(np.append(1, packet.values))[-1]

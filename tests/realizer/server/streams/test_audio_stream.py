@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.playback.audio_mix import render_utterance
-from realizer.server.streams.audio_stream import Sound
+from realizer.server.streams.audio_stream import AudioStream
 from realizer.speech.utterance import Utterance
 from tests.realizer.server.conftest import RATE, Driver
 
@@ -24,7 +24,7 @@ def test_sound_made_block_by_block_is_that_of_a_film(rate: int, stopped: float |
         driver.send({"type": "stop"})
     (speaking,) = driver.session.player.speech()
     whole, offset = render_utterance(speaking, rate), round(speaking.start * rate)
-    sound = Sound(driver.session.player, rate, None)
+    sound = AudioStream(driver.session.player, rate, None)
     packets = [sound.packet(n) for n in range(501)]
     made = np.concatenate([np.frombuffer(p or bytes(rate // 25), "<i2") for p in packets])
     assert np.array_equal(made[offset:][: len(whole)], np.clip(np.rint(whole), -32768, 32767))

@@ -11,8 +11,8 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.fap.au_fap_mapping import FapMapping, standard
 from realizer.playback.player import Player
 from realizer.protocol.streams import STREAMS
-from realizer.server.streams.audio_stream import Sound
-from realizer.server.streams.frame_windows import TURNS, Timeline
+from realizer.server.streams.audio_stream import AudioStream
+from realizer.server.streams.frame_windows import TURNS, FrameTimeline
 
 TURN = '<bml id="b"><head id="h" lexeme="SHAKE" start="0"/><faceLexeme id="f" lexeme="SMILE" end="2"/></bml>'
 
@@ -64,7 +64,7 @@ def test_all_streams_run_side_by_side_on_one_connection(driver) -> None:
 def test_rates_that_nobody_gets_any_more_are_forgotten(driver) -> None:
     def alive() -> int:
         gc.collect()
-        return sum(isinstance(o, Timeline | Sound) for o in gc.get_objects())
+        return sum(isinstance(o, FrameTimeline | AudioStream) for o in gc.get_objects())
 
     before = alive()
     for k in range(20):
@@ -79,7 +79,7 @@ def test_a_picture_is_asked_for_in_its_form(driver, form) -> None:
     client = driver.send(subscribe("video", size=[64, 64], format=form, quality=70))
     assert client.of("subscribed")[0]["media_type"] == f"image/{form}"
     driver.run(0.05)
-    assert [(draw.look.form, draw.look.quality) for draw in driver.draws] == [(form, 70)]
+    assert [(draw.options.form, draw.options.quality) for draw in driver.draws] == [(form, 70)]
 
 
 def test_what_is_transparent_is_no_jpeg(driver) -> None:
@@ -87,7 +87,7 @@ def test_what_is_transparent_is_no_jpeg(driver) -> None:
     assert client.of("error")[0]["where"] == "subscribe.background"
     driver.send(subscribe("video", background="transparent", format="png"))
     driver.run(0.05)
-    assert [draw.look.background for draw in driver.draws] == ["transparent"]
+    assert [draw.options.background for draw in driver.draws] == ["transparent"]
 
 
 def test_a_camera_that_is_not_there_is_refused_with_those_that_are(driver) -> None:
@@ -125,9 +125,9 @@ def test_timeline_finds_its_mapping_again_when_the_face_has_changed() -> None:
         found.append(standard())
         return found[-1]
 
-    timeline = Timeline(Player(), 0, 25.0, lambda: pytest.fail("no face is wanted"), mapping)
+    timeline = FrameTimeline(Player(), 0, 25.0, lambda: pytest.fail("no face is wanted"), mapping)
     assert timeline.window(0, 0) is not timeline.window(1000, 1000)
     assert len(found) == 1
-    timeline.forget()
+    timeline.invalidate()
     timeline.window(1000, 1000)
     assert len(found) == 2

@@ -186,12 +186,12 @@ def test_a_slow_client_gets_one_whole_state_for_all_it_missed(driver) -> None:
     fast = driver.join(2)
     driver.send(SCHEDULE, 2)
     client = driver.send(SCHEDULE)
-    driver.session.backlog(1, 10**6)
+    driver.session.update_backlog(1, 10**6)
     for name in "abc":
         driver.send(WAIT.format(name, ' composition="APPEND"', 2))
     driver.run(3)
     assert len(client.of("schedule")) == 1
-    driver.session.backlog(1, 0)
+    driver.session.update_backlog(1, 0)
     driver.run(4.5)
     assert [m["whole"] for m in client.of("schedule")][:2] == [True, True]
     # From there on it is told what everybody is told, and has missed nothing.
@@ -204,7 +204,7 @@ def test_a_slow_client_gets_one_whole_state_for_all_it_missed(driver) -> None:
 
 def test_a_slow_client_for_whom_there_is_nothing_new_is_not_waited_for(driver) -> None:
     driver.send(SCHEDULE)
-    driver.session.backlog(1, 10**6)
+    driver.session.update_backlog(1, 10**6)
     driver.run(5)
     assert wakes(driver.session) == math.inf
 
@@ -260,8 +260,8 @@ def test_who_was_told_every_change_knows_what_who_comes_last_is_told(drive, move
         elif move == "beat":
             driver.send({"type": "anticipate", "id": "m", "syncs": {"beat": driver.now + value}})
         else:
-            driver.session.backlog(1, value)
-    driver.session.backlog(1, 0)
+            driver.session.update_backlog(1, value)
+    driver.session.update_backlog(1, 0)
     driver.run(driver.now + 0.2)
     last = driver.join(2)
     driver.send(SCHEDULE, 2)

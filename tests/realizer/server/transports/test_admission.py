@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatu
 from realizer.core.settings import Settings, SettingsError
 from realizer.server.documents import limits
 from realizer.server.http import access
-from realizer.server.http.jwt_tokens import Pass
+from realizer.server.http.jwt_tokens import Grant
 from realizer.server.serve import Server
 
 LIMIT = 60  # s; a hung test ends
@@ -149,7 +149,9 @@ def test_one_whose_token_ends_is_let_go_and_the_others_stay(monkeypatch: pytest.
     async def test(server: Server) -> None:
         until = int(time.time()) + 1000
         async with connect(f"{server.url}?token={signed()}") as stays:
-            monkeypatch.setattr(Pass, "left", property(lambda self: None if self.until is None else 0.0))
+            monkeypatch.setattr(
+                Grant, "seconds_left", property(lambda self: None if self.until is None else 0.0)
+            )
             async with connect(f"{server.url}?token={signed(exp=until)}") as socket:
                 with pytest.raises(ConnectionClosed) as closed:
                     await socket.recv()
@@ -327,7 +329,7 @@ def test_with_a_certificate_everything_speaks_tls(certificate: tuple[Path, Path]
     async def test(server: Server) -> None:
         assert server.url.startswith("wss://")
         assert server.page.startswith("https://")
-        assert server.doors[0].lines[0] == f"listening on {server.url}"
+        assert server.transports[0].startup_lines[0] == f"listening on {server.url}"
         context = ssl.create_default_context(cafile=str(cert))
         assert (await welcomed(server.url, ssl=context))["type"] == "welcome"
         with pytest.raises(InvalidMessage):

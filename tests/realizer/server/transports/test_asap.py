@@ -23,7 +23,7 @@ from bml_schema.feedback import (
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports import asap
-from realizer.server.transports.asap import AsapDoor
+from realizer.server.transports.asap import AsapTransport
 
 LIMIT = 30  # s; a hung test ends
 CORE = "{http://www.bml-initiative.org/bml/bml-1.0}"
@@ -124,7 +124,7 @@ def serving(test: Callable[[Server, int, int], Awaitable[None]], loop=None, **se
         feedback = free_port()
         wanted = Settings(port=0, asap_ports=(0, feedback), voice="silent", **settings)
         async with asyncio.timeout(LIMIT), Server(wanted) as server:
-            (door,) = [d for d in server.doors if isinstance(d, AsapDoor)]
+            (door,) = [d for d in server.transports if isinstance(d, AsapTransport)]
             await test(server, door.port, feedback)
 
     with asyncio.Runner(loop_factory=loop) as runner:
@@ -133,9 +133,9 @@ def serving(test: Callable[[Server, int, int], Awaitable[None]], loop=None, **se
 
 async def until_played(server: Server) -> None:
     """Wait until something plays, then until nothing does any more."""
-    while not server._shell.busy:
+    while not server._sessions.busy:
         await asyncio.sleep(0)
-    while server._shell.busy:
+    while server._sessions.busy:
         await asyncio.sleep(0)
 
 
@@ -278,7 +278,7 @@ def test_a_second_client_on_one_address_shares_its_session_and_is_called_back_wh
 
 async def until_alone(server: Server) -> None:
     """Wait until no connection is left."""
-    while server._shell.health()["connections"]:
+    while server._sessions.health()["connections"]:
         await asyncio.sleep(0)
 
 
@@ -300,7 +300,7 @@ def test_a_client_that_never_opens_its_feedback_port_leaves_nothing_behind() -> 
         client = Client(bml, port)
         await client.connect()
         client.send(WAIT.format("b", 60) + '<bml id="half">')
-        while not server._shell.busy:
+        while not server._sessions.busy:
             await asyncio.sleep(0)
         client.leave()
         await until_alone(server)
@@ -337,7 +337,7 @@ def test_ten_mebibytes_of_garbage_cost_one_warning() -> None:
 
 
 def test_feedback_that_nobody_takes_is_bounded_and_its_loss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asap, "KEPT", 2000)
+    monkeypatch.setattr(asap, "MAX_QUEUED", 2000)
 
     async def test(server: Server, bml: int, port: int) -> None:
         client = Client(bml, port)
@@ -476,9 +476,9 @@ def test_the_limits_of_the_service_hold_here_too_and_are_named(limit: dict[str, 
 
 def test_the_door_says_where_it_is_and_a_port_in_use_is_an_os_error() -> None:
     async def test(server: Server, bml: int, port: int) -> None:
-        (door,) = [d for d in server.doors if isinstance(d, AsapDoor)]
+        (door,) = [d for d in server.transports if isinstance(d, AsapTransport)]
         told = f"asap: BML at 127.0.0.1:{bml}, feedback to port {port} of the client, session asap-ADDRESS"
-        assert door.lines == (told,)
+        assert door.startup_lines == (told,)
         with pytest.raises(OSError, match="in use"):
             await Server(Settings(port=0, asap_ports=(bml, port))).start()
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.transports.document_framing import Assembler, Fault
+from realizer.server.transports.document_framing import DocumentFramer, Fault
 
 LIMIT = 300
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
@@ -14,7 +14,7 @@ NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
 def assemble(data: bytes | str, *, limit: int = LIMIT, step: int | None = None) -> list[str | Fault]:
     data = data.encode() if isinstance(data, str) else data
-    assembler = Assembler(limit)
+    assembler = DocumentFramer(limit)
     reads = [data] if step is None else [data[n : n + step] for n in range(0, len(data), step)]
     return [found for read in reads for found in assembler.feed(read)]
 
@@ -89,7 +89,7 @@ def test_the_end_tag_of_a_document_that_was_given_up_is_no_second_fault() -> Non
 
 
 def test_half_a_document_gives_nothing_yet() -> None:
-    assembler = Assembler(LIMIT)
+    assembler = DocumentFramer(LIMIT)
     assert assembler.feed(NOD[:-1].encode()) == []
     assert assembler.feed(b">") == [NOD]
 
@@ -105,7 +105,7 @@ PIECES = [
 @given(st.lists(st.sampled_from(PIECES), max_size=8), st.lists(st.integers(0, 400), max_size=30))
 def test_how_a_stream_is_cut_changes_nothing(pieces: list[str], cuts: list[int]) -> None:
     data = "".join(pieces).encode("latin-1", "replace")
-    assembler = Assembler(LIMIT)
+    assembler = DocumentFramer(LIMIT)
     found: list[str | Fault] = []
     at = 0
     for cut in cuts:
@@ -122,7 +122,7 @@ def test_bytes_of_any_kind_do_not_keep_the_next_document_away(garbage: bytes) ->
 
 
 def test_what_is_kept_is_bounded_by_the_limit() -> None:
-    assembler = Assembler(1000)
+    assembler = DocumentFramer(1000)
     for junk in (b"x" * 999, b"<bml>" * 200, b"<!--" + b"y" * 900, b'<bml id="b">' + b"z" * 900, b"<" * 999):
         for _ in range(50):
             assembler.feed(junk)
@@ -132,7 +132,7 @@ def test_what_is_kept_is_bounded_by_the_limit() -> None:
 @pytest.mark.parametrize("inside", ["{}", "<!--{}-->", "<![CDATA[{}]]>", "<?x {}?>", '<wait id="{}"/>'])
 def test_a_document_that_drips_in_is_not_read_again_from_its_start(inside: str) -> None:
     data = f'<bml id="{"v" * 2000}">{inside.format("ab < ]] -- ? " * 200)}</bml>'.encode()
-    assembler = Assembler(2**20)
+    assembler = DocumentFramer(2**20)
     for n in range(len(data) - 1):
         assert assembler.feed(data[n : n + 1]) == []
         # What the next byte makes it look at again: never more than the longest mark.

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from bml_schema.feedback import WarningFeedback, parse_feedback
 from realizer.core.settings import Settings
-from realizer.server.transports.message_format import Message, ToSession
-from realizer.server.transports.message_formats import DIALECTS, AsapJson, AsapXml
+from realizer.server.transports.message_format import Inbound, Message
+from realizer.server.transports.message_formats import MESSAGE_FORMATS, AsapJson, AsapXml
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 TRICKY = '<bml id="b"><speech id="s"><text>50 % + é &amp; more</text></speech></bml>'
@@ -22,7 +22,7 @@ TRICKY = '<bml id="b"><speech id="s"><text>50 % + é &amp; more</text></speech><
 @pytest.mark.parametrize("text", [NOD, TRICKY, "\n" + NOD])
 def test_json_is_decoded_whichever_way_its_blanks_are_written(encode, text: str) -> None:
     body = json.dumps({"bml": {"content": encode(text)}}).encode()
-    assert AsapJson("in", "out").incoming(body) == [ToSession(text)]
+    assert AsapJson("in", "out").incoming(body) == [Inbound(text)]
 
 
 def test_feedback_in_json_is_text_that_every_decoder_reads() -> None:
@@ -59,7 +59,7 @@ def test_a_message_that_is_no_bml_gets_one_warning_in_the_same_form(body: bytes)
 
 def test_bare_xml_goes_as_it_is() -> None:
     dialect = AsapXml("in", "out")
-    assert dialect.incoming(TRICKY.encode()) == [ToSession(TRICKY)]
+    assert dialect.incoming(TRICKY.encode()) == [Inbound(TRICKY)]
     assert dialect.outgoing("<a/>") == [Message("out", "<a/>")]
 
 
@@ -86,16 +86,16 @@ WORDS = [
 
 @given(st.lists(st.sampled_from(WORDS), max_size=8), st.binary(max_size=20))
 def test_whatever_comes_is_taken_apart_without_a_fault(words: list[str], noise: bytes) -> None:
-    made = [make(Settings()) for make in DIALECTS.values()]
+    made = [make(Settings()) for make in MESSAGE_FORMATS.values()]
     for dialect in [dialect for dialect in made if dialect is not None]:
         for body in (" ".join(words).encode(), quote(" ".join(words)).encode(), noise):
             for action in dialect.incoming(body):
-                if isinstance(action, ToSession):
+                if isinstance(action, Inbound):
                     assert action.text.lstrip("\ufeff \t\r\n")[0] in "<{"
 
 
 def test_settings_switch_dialects_off() -> None:
-    made = {name: make(Settings()) for name, make in DIALECTS.items()}
+    made = {name: make(Settings()) for name, make in MESSAGE_FORMATS.items()}
     assert all(dialect is not None for dialect in made.values())
     off = Settings(stomp_json_in="", stomp_xml_in="", stomp_vhmsg="")
-    assert {make(off) for make in DIALECTS.values()} == {None}
+    assert {make(off) for make in MESSAGE_FORMATS.values()} == {None}

@@ -8,12 +8,12 @@ import pytest
 
 from realizer.core.settings import Settings
 from realizer.server.transports.registry import TRANSPORTS, requested
-from realizer.server.transports.xface.server import XfaceDoor
+from realizer.server.transports.xface.server import XfaceTransport
 
 
 def test_transports_are_opened_as_the_settings_ask() -> None:
     assert list(requested(Settings())) == []
-    assert list(requested(Settings(xface_port=0))) == [XfaceDoor]
+    assert list(requested(Settings(xface_port=0))) == [XfaceTransport]
 
 
 def test_transports_are_named_after_settings() -> None:

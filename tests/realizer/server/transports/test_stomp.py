@@ -17,7 +17,7 @@ from bml_schema.feedback import BlockProgress, Feedback, WarningFeedback, parse_
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from realizer.server.transports.stomp import StompDoor
+from realizer.server.transports.stomp import StompTransport
 
 pytestmark = pytest.mark.xdist_group("brokers")
 
@@ -98,8 +98,8 @@ class Peer(stomp.ConnectionListener):
         return found
 
 
-def door_of(server: Server) -> StompDoor:
-    (door,) = [d for d in server.doors if isinstance(d, StompDoor)]
+def door_of(server: Server) -> StompTransport:
+    (door,) = [d for d in server.transports if isinstance(d, StompTransport)]
     return door
 
 
@@ -267,7 +267,7 @@ def test_topics_are_settings_and_a_dialect_can_be_off(broker) -> None:
     }
 
     async def test(server: Server) -> None:
-        assert door_of(server).lines == (
+        assert door_of(server).startup_lines == (
             f"stomp: {broker.address} reads /topic/mine.in in session stomp-json, "
             "/topic/MINE in session stomp-vhmsg",
         )
@@ -292,7 +292,7 @@ def test_a_component_that_is_told_to_go_says_what_it_leaves_and_goes(broker) -> 
             leaving = door_of(server)._leaving
             assert leaving is not None
             await leaving
-            assert server._shell.health()["connections"] == 0
+            assert server._sessions.health()["connections"] == 0
             async with connect(server.url) as socket:  # the other doors stay open
                 await socket.send(WAIT.format("b", 0))
                 assert "feedback" in str(await socket.recv()).lower()
@@ -329,7 +329,7 @@ def test_a_broker_that_dies_and_comes_back_is_found_again(own_broker, caplog) ->
             await asyncio.to_thread(own_broker.kill)
             await peer._gone.wait()
         await gone(server)
-        while server._shell.busy:  # what plays, plays on
+        while server._sessions.busy:  # what plays, plays on
             await asyncio.sleep(0)
         door = door_of(server)
         assert any("over%3Aend" in message.body for message in door._out)

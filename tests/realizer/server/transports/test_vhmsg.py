@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema import parse
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
-from realizer.server.transports.message_format import Leave, ToSession
+from realizer.server.transports.message_format import Disconnect, Inbound
 from realizer.server.transports.vhmsg import Vhmsg
 
 pytestmark = pytest.mark.xdist_group("brokers")
@@ -32,8 +32,8 @@ def vhmsg() -> Vhmsg:
 def spoken(dialect: Vhmsg, text: str) -> list[str]:
     """The documents a message gives."""
     actions = dialect.incoming(quote(text).encode())
-    assert all(isinstance(action, ToSession) for action in actions)
-    return [action.text for action in actions if isinstance(action, ToSession)]
+    assert all(isinstance(action, Inbound) for action in actions)
+    return [action.text for action in actions if isinstance(action, Inbound)]
 
 
 def said(messages) -> list[str]:
@@ -54,7 +54,7 @@ ACT = '<?xml version="1.0"?><act><participant id="Brad" role="actor"/>{}</act>'
 def test_the_bml_of_a_vrspeak_is_found_and_gets_the_agent_as_its_character(encode, around: str) -> None:
     text = f"vrSpeak Brad ALL m1 {around.format(TRICKY)}"
     ((document),) = vhmsg().incoming(encode(text).encode())
-    assert isinstance(document, ToSession)
+    assert isinstance(document, Inbound)
     block = parse(document.text)
     assert (block.id, block.character_id) == ("b", "Brad")
     assert "50 % + é &amp; more" in document.text
@@ -158,7 +158,7 @@ def test_a_vrspoke_of_somebody_else_stops_what_still_plays() -> None:
     assert dialect.incoming(b"vrSpoke Brad ALL m2") == []
     assert dialect.incoming(b"vrSpoke Rachel ALL m1") == []
     (stop,) = dialect.incoming(b"vrSpoke%20Brad%20ALL%20m1%20words")
-    assert isinstance(stop, ToSession)
+    assert isinstance(stop, Inbound)
     assert json.loads(stop.text) == {"type": "stop", "blocks": ["x"]}
     dialect.outgoing(progress("x", "end", "INTERRUPTED"))
     assert dialect.incoming(b"vrSpoke Brad ALL m1") == []
@@ -169,7 +169,7 @@ def test_components_are_answered_and_may_send_us_away() -> None:
     here = ["vrComponent renderer bml-realizer"]
     assert said(dialect.hello()) == said(dialect.incoming(b"vrAllCall")) == here
     for who in ("renderer", "all", "bml-realizer"):
-        assert dialect.incoming(f"vrKillComponent%20{who}".encode()) == [Leave()]
+        assert dialect.incoming(f"vrKillComponent%20{who}".encode()) == [Disconnect()]
     for text in (
         "vrKillComponent tts",
         "vrComponent renderer x",

@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from realizer.core.settings import Settings
 from realizer.server.journal import JournalError
 from realizer.server.serve import Server
-from realizer.server.transports.websocket.connection import WebSocketClient
+from realizer.server.transports.websocket.connection import WebSocketWriter
 
 LIMIT = 30  # s
 TOKEN = "a-token-of-many-letters-and-0123456789"
@@ -53,7 +53,7 @@ def test_who_comes_to_a_session_that_cannot_be_read_is_told_to_come_again(
     def broken(self: object, session: str) -> None:
         raise JournalError("the disk does not answer")
 
-    monkeypatch.setattr("realizer.server.journal.sqlite_journal.LocalJournal.take", broken)
+    monkeypatch.setattr("realizer.server.journal.sqlite_journal.SqliteJournal.claim", broken)
     told, code, reason = closed("?session=s", journal=str(tmp_path / "journal.db"))
     assert (told, code, reason) == ([], 1013, "the disk does not answer")
 
@@ -78,7 +78,7 @@ def test_a_visit_is_logged_from_its_beginning_to_its_end(caplog: pytest.LogCaptu
     assert (left.session, left.code) == ("show", 1000)  # type: ignore[attr-defined]
 
 
-def between(test: Callable[[WebSocketClient, ClientConnection], Awaitable[None]]) -> None:
+def between(test: Callable[[WebSocketWriter, ClientConnection], Awaitable[None]]) -> None:
     """Run a test with both ends of a connection."""
 
     async def run() -> None:
@@ -91,7 +91,7 @@ def between(test: Callable[[WebSocketClient, ClientConnection], Awaitable[None]]
         async with asyncio.timeout(LIMIT), serve(handle, "127.0.0.1", 0, compression=None) as server:
             port = server.sockets[0].getsockname()[1]
             async with connect(f"ws://127.0.0.1:{port}", max_size=None, max_queue=None) as theirs:
-                await test(WebSocketClient(await ours), theirs)
+                await test(WebSocketWriter(await ours), theirs)
 
     asyncio.run(run())
 
@@ -104,7 +104,7 @@ def test_messages_of_any_length_come_whole_and_in_order() -> None:
             bytes(range(256)) * (length // 256) + bytes(length % 256),
         ]
 
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         for message in sent:
             client.send(message)
         assert [await theirs.recv() for _ in sent] == sent
@@ -113,7 +113,7 @@ def test_messages_of_any_length_come_whole_and_in_order() -> None:
 
 
 def test_what_the_package_sends_in_between_disturbs_nothing() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         client.send("one")
         assert await asyncio.wait_for(await theirs.ping(), LIMIT) >= 0
         client.send(b"two")
@@ -123,38 +123,38 @@ def test_what_the_package_sends_in_between_disturbs_nothing() -> None:
 
 
 def test_after_the_end_nothing_more_is_sent() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         client.send("last")
-        client.end(1013, "enough")
+        client.disconnect(1013, "enough")
         client.send("too late")
-        client.end(1011, "a second end")
+        client.disconnect(1011, "a second end")
         assert await theirs.recv() == "last"
         with pytest.raises(ConnectionClosed) as closed:
             await theirs.recv()
         assert closed.value.rcvd is not None
         assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1013, "enough")
         client.send("to nobody")
-        assert client.waiting == 0
+        assert client.unsent_bytes == 0
 
     between(test)
 
 
 def test_what_is_not_read_waits_and_is_counted() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
         theirs.transport.pause_reading()
-        while client.waiting < 100_000:
+        while client.unsent_bytes < 100_000:
             client.send(bytes(1_000_000))
             await asyncio.sleep(0)
         theirs.transport.resume_reading()
-        while client.waiting:
+        while client.unsent_bytes:
             assert len(await theirs.recv()) == 1_000_000
 
     between(test)
 
 
 def test_of_a_long_reason_is_told_what_there_is_room_for() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
-        client.end(1013, "é" * 100)  # two bytes each, and room for 123
+    async def test(client: WebSocketWriter, theirs: ClientConnection) -> None:
+        client.disconnect(1013, "é" * 100)  # two bytes each, and room for 123
         with pytest.raises(ConnectionClosed) as closed:
             await theirs.recv()
         assert closed.value.rcvd is not None

@@ -6,8 +6,8 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from realizer.server.http.http_site import Answer
-from realizer.server.runtime.session_registry import HubError
+from realizer.server.http.http_site import HttpResponse
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.websocket.request import headers_of, query_of, response_to, session_of
 
 
@@ -32,7 +32,7 @@ def test_a_session_is_named_in_the_address(query: str, session: str | None, seen
 
 @pytest.mark.parametrize("seen", ["", "abc", "-1", "1.5", "9" * 16])
 def test_a_seen_that_is_no_number_is_refused(seen: str) -> None:
-    with pytest.raises(HubError, match="seen: wanted the number of the last feedback that came") as refused:
+    with pytest.raises(JoinError, match="seen: wanted the number of the last feedback that came") as refused:
         session_of(request(f"/ws?session=show&seen={seen}"))
     assert refused.value.status == 400
 
@@ -44,7 +44,7 @@ def test_of_several_of_one_name_the_last_counts_and_of_none_there_is_nothing() -
 
 
 def test_an_answer_says_what_it_is_and_closes() -> None:
-    response = response_to(Answer(404, "text/plain", b"no\n", (("Cache-Control", "no-cache"),)))
+    response = response_to(HttpResponse(404, "text/plain", b"no\n", (("Cache-Control", "no-cache"),)))
     assert (response.status_code, response.reason_phrase, response.body) == (404, "Not Found", b"no\n")
     assert response.headers["Content-Length"] == "3"
     assert response.headers["Cache-Control"] == "no-cache"

@@ -10,7 +10,7 @@ import pytest
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
-from realizer.server.transports.xface.attachments import Empty, Script, prepare
+from realizer.server.transports.xface.attachments import MissingAttachment, Script, prepare
 from realizer.server.transports.xface.wire import Task
 
 MASK = " ".join("1" if fap == 3 else "0" for fap in range(1, 69))
@@ -66,7 +66,7 @@ def test_other_tasks_bring_nothing(name: str) -> None:
 def test_what_cannot_be_understood_is_said(task: Task, says: str) -> None:
     with pytest.raises(RealizerError, match=re.escape(says)) as raised:
         prepare(task, Settings())
-    assert not isinstance(raised.value, Empty)
+    assert not isinstance(raised.value, MissingAttachment)
 
 
 def test_a_file_that_is_too_long_to_play_is_refused_when_it_comes() -> None:
@@ -95,5 +95,5 @@ def test_a_script_may_be_as_large_as_the_settings_let_it() -> None:
 @pytest.mark.parametrize("name", ["UPLOAD_FAP", "LOAD_FAP", "UPLOAD_SCRIPT"])
 @pytest.mark.parametrize("params", [(), ("",), (" \n",)])
 def test_a_task_without_what_it_should_bring_is_told_apart(name: str, params: tuple[str, ...]) -> None:
-    with pytest.raises(Empty, match="wanted params, got none, or empty ones"):
+    with pytest.raises(MissingAttachment, match="wanted params, got none, or empty ones"):
         prepare(Task(name, params=params), Settings())

@@ -15,8 +15,8 @@ from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.xface import player as xface_player
-from realizer.server.transports.xface.player import XfacePlayerDoor
-from realizer.server.transports.xface.server import XfaceDoor
+from realizer.server.transports.xface.player import XfacePlayerTransport
+from realizer.server.transports.xface.server import XfaceTransport
 
 LIMIT = 30  # s; a hung test ends
 CHUNK = 40_000  # bytes that the player reads at once
@@ -171,7 +171,7 @@ def test_the_player_may_be_another_service_of_ours() -> None:
     async def run() -> None:
         common = {"port": 0, "voice": "silent", "idle": False}
         async with asyncio.timeout(LIMIT), Server(Settings(**common, xface_port=0)) as showing:  # type: ignore[arg-type]
-            port = next(door for door in showing.doors if isinstance(door, XfaceDoor)).port
+            port = next(door for door in showing.transports if isinstance(door, XfaceTransport)).port
             pushing = Settings(**common, xface_player=f"127.0.0.1:{port}", xface_player_interval=0.0)  # type: ignore[arg-type]
             async with Server(pushing) as server, connect(f"{showing.url}?session=xface-127.0.0.1") as viewer:
                 await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
@@ -185,9 +185,9 @@ def test_the_player_may_be_another_service_of_ours() -> None:
 
 def test_the_door_says_what_it_shows_once_the_player_has_greeted() -> None:
     async def test(server: Server, player: Player) -> None:
-        door = next(door for door in server.doors if isinstance(door, XfacePlayerDoor))
+        door = next(door for door in server.transports if isinstance(door, XfacePlayerTransport))
         await door.ready()
-        assert door.lines == (f"xface player: 127.0.0.1:{player.port} shows session xface-player",)
+        assert door.startup_lines == (f"xface player: 127.0.0.1:{player.port} shows session xface-player",)
 
     playing(test)
 
@@ -216,7 +216,9 @@ def test_the_connection_is_made_anew_after(lost: str, monkeypatch: pytest.Monkey
         await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
         await player.until(lambda: {3: 500} in player.shown)
         if lost == "a session that fails":
-            next(d for d in server.doors if isinstance(d, XfacePlayerDoor)).end(1011, "internal error")
+            next(d for d in server.transports if isinstance(d, XfacePlayerTransport)).disconnect(
+                1011, "internal error"
+            )
         else:
             monkeypatch.setattr(xface_player, "STUCK", -1)  # so much always waits
             await hold(server, '{"type":"set","faps":{"open_jaw":600}}')

@@ -36,8 +36,8 @@ def due(link: PlayerLink, now: float) -> Task | None:
 def link() -> PlayerLink:
     """Connected, greeted as client 3, with Paul's interval."""
     link = PlayerLink(0.25)
-    link.opened()
-    link.heard(pack_note("CONNECTION_OK", 3, 0, 0))
+    link.on_connect()
+    link.receive(pack_note("CONNECTION_OK", 3, 0, 0))
     return link
 
 
@@ -46,11 +46,11 @@ def shown(link: PlayerLink, now: float) -> dict[int, int]:
     upload = due(link, now)
     assert upload is not None
     assert upload.name == "UPLOAD_FAP"
-    link.heard(note(upload, 1, 2, 3))
+    link.receive(note(upload, 1, 2, 3))
     stop = due(link, now)
     assert stop is not None
     assert (stop.name, stop.params) == ("STOP_PLAYBACK", ())
-    link.heard(note(stop, 1, 3))
+    link.receive(note(stop, 1, 3))
     clip = read_fap(upload.params[0])
     assert clip.notes == ()
     assert len(clip.values) == 1
@@ -61,11 +61,11 @@ def test_nothing_is_sent_before_the_player_has_greeted() -> None:
     link = PlayerLink(0.25)
     link.show(frame(fap3=100))
     assert link.due(0.0) is None
-    link.opened()
+    link.on_connect()
     assert (link.state, link.due(0.0), link.next_deadline()) == (State.GREETING, None, None)
-    link.heard(pack_note("CONNECTION_OK", 3, 0, 0)[:30])
+    link.receive(pack_note("CONNECTION_OK", 3, 0, 0)[:30])
     assert link.due(0.0) is None
-    link.heard(pack_note("CONNECTION_OK", 3, 0, 0)[30:])
+    link.receive(pack_note("CONNECTION_OK", 3, 0, 0)[30:])
     assert due(link, 0.0) is not None
 
 
@@ -76,14 +76,14 @@ def test_a_frame_is_an_upload_of_one_and_the_stop_that_shows_it(link: PlayerLink
     assert (upload.name, upload.owner, upload.id) == ("UPLOAD_FAP", 3, 3 * NUMBERS + 1)
     assert upload.params[0].startswith("2.1 realizer 25 1\n")
     assert due(link, 0.0) is None, "the player takes two tasks in one read for one"
-    link.heard(note(upload, 1, 2))
+    link.receive(note(upload, 1, 2))
     assert (due(link, 0.0), link.state) == (None, State.UPLOADING)
-    link.heard(note(upload, 3))
+    link.receive(note(upload, 3))
     stop = due(link, 0.0)
     assert stop == Task("STOP_PLAYBACK", 3, 3 * NUMBERS + 2)
-    link.heard(note(stop, 1))
+    link.receive(note(stop, 1))
     assert link.state is State.STOPPING
-    link.heard(note(stop, 3))
+    link.receive(note(stop, 3))
     assert link.state.name == "READY"
 
 
@@ -106,8 +106,8 @@ def test_the_next_frame_waits_for_its_time_and_is_the_newest(link: PlayerLink) -
 
 def test_without_an_interval_only_the_player_is_waited_for() -> None:
     link = PlayerLink(0.0)
-    link.opened()
-    link.heard(pack_note("CONNECTION_OK", 1, 0, 0))
+    link.on_connect()
+    link.receive(pack_note("CONNECTION_OK", 1, 0, 0))
     for value in (1, 2, 3):
         link.show(frame(fap3=value))
         assert shown(link, 5.0) == {3: value}
@@ -142,10 +142,10 @@ def test_a_task_that_fails_ends_too_and_is_said_once(
         link.show(frame(fap3=value))
         upload = due(link, time)
         assert upload is not None
-        link.heard(note(upload, 1, 7, 3))
+        link.receive(note(upload, 1, 7, 3))
         stop = due(link, time)
         assert stop is not None
-        link.heard(note(stop, 1, 3))
+        link.receive(note(stop, 1, 3))
     assert [record.getMessage() for record in caplog.records] == ["xface player: it cannot do UPLOAD_FAP"]
 
 
@@ -153,17 +153,17 @@ def test_notes_about_tasks_of_the_past_change_nothing(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     upload = due(link, 0.0)
     assert upload is not None
-    link.heard(note(Task("UPLOAD_FAP", 3, 77), 3) + note(Task("STOP_PLAYBACK", 3, upload.id - 1), 3))
+    link.receive(note(Task("UPLOAD_FAP", 3, 77), 3) + note(Task("STOP_PLAYBACK", 3, upload.id - 1), 3))
     assert link.state is State.UPLOADING
 
 
 def test_another_connection_begins_anew(link: PlayerLink) -> None:
     link.show(frame(fap3=1))
     shown(link, 0.0)
-    link.closed()
+    link.on_disconnect()
     assert (link.due(9.0), link.next_deadline()) == (None, None)
-    link.opened()
-    link.heard(pack_note("CONNECTION_OK", 8, 0, 0))
+    link.on_connect()
+    link.receive(pack_note("CONNECTION_OK", 8, 0, 0))
     upload = due(link, 0.1)
     assert upload is not None
     assert (upload.owner, upload.id) == (8, 8 * NUMBERS + 1)
@@ -171,4 +171,4 @@ def test_another_connection_begins_anew(link: PlayerLink) -> None:
 
 def test_nobody_connects_while_a_connection_stands(link: PlayerLink) -> None:
     with pytest.raises(AssertionError, match="connected already"):
-        link.opened()
+        link.on_connect()

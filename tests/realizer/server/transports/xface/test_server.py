@@ -14,7 +14,7 @@ from websockets.asyncio.client import connect
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.xface import server as xface
-from realizer.server.transports.xface.server import XfaceDoor
+from realizer.server.transports.xface.server import XfaceTransport
 
 LIMIT = 30  # s; a hung test ends
 MASK = " ".join("1" if fap in (3, 48) else "0" for fap in range(1, 69))
@@ -84,25 +84,25 @@ class Client:
         return [status for _, _, number, status in self.notes if number == id]
 
 
-def serving(test: Callable[[Server, XfaceDoor], Awaitable[None]], **settings: object) -> None:
+def serving(test: Callable[[Server, XfaceTransport], Awaitable[None]], **settings: object) -> None:
     async def run() -> None:
         chosen = Settings(port=0, xface_port=0, idle=False, voice="silent", **settings)  # type: ignore[arg-type]
         async with asyncio.timeout(LIMIT), Server(chosen) as server:
-            door = next(door for door in server.doors if isinstance(door, XfaceDoor))
+            door = next(door for door in server.transports if isinstance(door, XfaceTransport))
             await test(server, door)
 
     asyncio.run(run())
 
 
 def test_the_door_says_where_it_is() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
-        assert door.lines == (f"xface: tasks at 127.0.0.1:{door.port}, session xface-ADDRESS",)
+    async def test(server: Server, door: XfaceTransport) -> None:
+        assert door.startup_lines == (f"xface: tasks at 127.0.0.1:{door.port}, session xface-ADDRESS",)
 
     serving(test)
 
 
 def test_the_greeting_is_the_literal_that_clients_compare() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as first, Client(door.port) as second:
             wanted = b'<notify name="CONNECTION_OK" ownerId="1" taskId="0" status="0"/>\0\0'
             assert first.raw == wanted
@@ -159,7 +159,7 @@ def test_the_player_s_own_client_byte_by_byte() -> None:
         (b'<task name="KILL_APP" ownerId="1" taskId="1000006">\n</task>\0', note(b"KILL_APP", 1000006, 3)),
     ]
 
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         await exchange(door.port, talk)
 
     serving(test)
@@ -177,14 +177,14 @@ def test_the_streaming_client_byte_by_byte() -> None:
         talk.append((upload % (id, JAW, 100 * id), note(b"UPLOAD_FAP", id, 1, 2, 3)))
         talk.append((stop % (id + 1), note(b"STOP_PLAYBACK", id + 1, 1, 3)))
 
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         await exchange(door.port, talk)
 
     serving(test)
 
 
 def test_the_player_s_own_client_uploads_plays_and_stops() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", client.owner, 1000001, fap(1000)))
             assert await client.statuses(1000001) == [1, 2, 3]
@@ -199,7 +199,7 @@ def test_the_player_s_own_client_uploads_plays_and_stops() -> None:
 
 
 def test_playback_that_nobody_stops_is_finished_when_the_file_ends() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 1, 1, fap(5)) + task("RESUME_PLAYBACK", 1, 2))
             assert await client.statuses(2) == [1, 2, 3]
@@ -221,7 +221,7 @@ async def face(server: Server, wanted: Callable[[list[int]], bool], after: Calla
 def test_the_streaming_client_without_nuls_moves_the_face_frame_by_frame() -> None:
     """Its files have one frame, a fixed Windows path for a name, and no FAP that is 0."""
 
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
 
             def send(value: int, id: int) -> None:
@@ -244,7 +244,7 @@ def test_the_streaming_client_without_nuls_moves_the_face_frame_by_frame() -> No
 
 
 def test_a_frame_of_the_next_client_stands_alone() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as first:
             await face(
                 server,
@@ -263,7 +263,7 @@ def test_a_frame_of_the_next_client_stands_alone() -> None:
 
 
 def test_a_file_that_plays_is_seen_by_viewers() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
 
             def play() -> None:
@@ -277,7 +277,7 @@ def test_a_file_that_plays_is_seen_by_viewers() -> None:
 @pytest.mark.parametrize("end", ["", "\0", "\0\0", "\n\0", "\r\n"])
 @pytest.mark.parametrize("cut", [1, 7, 100, 10_000])
 def test_tasks_come_in_reads_of_any_size_with_any_end(end: str, cut: int) -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             data = "".join(task("UPLOAD_FAP", 1, id, fap(2), end=end) for id in (1, 2, 3)).encode()
             for begin in range(0, len(data), cut):
@@ -290,7 +290,7 @@ def test_tasks_come_in_reads_of_any_size_with_any_end(end: str, cut: int) -> Non
 
 
 def test_a_script_of_bml_is_started_and_finished_with_its_blocks() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             script = SCRIPT.format("a") + SCRIPT.format("b").replace(" id=", ' composition="APPEND" id=', 1)
             client.send(task("UPLOAD_SCRIPT", 1, 9, script, "BML"))
@@ -300,7 +300,7 @@ def test_a_script_of_bml_is_started_and_finished_with_its_blocks() -> None:
 
 
 def test_a_script_that_talks_on_is_ended_by_a_stop() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(
                 task("UPLOAD_SCRIPT", 1, 9, '<bml id="a"><wait id="w" duration="1000"/></bml>', "BML")
@@ -334,7 +334,7 @@ def test_a_script_that_talks_on_is_ended_by_a_stop() -> None:
     ],
 )
 def test_a_script_that_cannot_be_played_is_an_error(params: tuple[str, ...], statuses: list[int]) -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_SCRIPT", 1, 9, *params))
             assert await client.statuses(9, last=7) == statuses
@@ -343,7 +343,7 @@ def test_a_script_that_cannot_be_played_is_an_error(params: tuple[str, ...], sta
 
 
 def test_a_file_that_is_none_is_an_error_and_finished_as_clients_expect() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 1, 1, "hello world"))
             assert await client.statuses(1) == [1, 7, 3]
@@ -358,7 +358,7 @@ def test_a_file_that_is_none_is_an_error_and_finished_as_clients_expect() -> Non
 def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None:
     (tmp_path / "clip.fap").write_text(fap(3))
 
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("LOAD_FAP", 1, 1, "C:\\faps\\clip.fap"))
             assert await client.statuses(1) == [1, 2, 3]
@@ -369,7 +369,7 @@ def test_a_file_on_the_server_is_one_of_the_media_folder(tmp_path: Path) -> None
 
 
 def test_who_wants_no_notes_gets_none() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 0, 1, fap(2)) + task("UPLOAD_FAP", 1, 2, fap(2)))
             await client.statuses(2)
@@ -379,7 +379,7 @@ def test_who_wants_no_notes_gets_none() -> None:
 
 
 def test_kill_app_ends_the_client_and_not_the_service() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client, Client(door.port) as other:
             client.send(task("KILL_APP", 1, 1))
             assert await client.statuses(1) == [3]
@@ -411,7 +411,7 @@ BAD = {
 def test_what_is_no_task_is_one_error_and_the_next_task_counts(
     data: bytes, note: tuple[str, int, int, int]
 ) -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(data + task("STOP_PLAYBACK", 1, 9).encode())
             assert await client.statuses(9) == [1, 3]
@@ -426,7 +426,7 @@ def test_a_task_that_is_too_large_is_an_error_and_others_notice_nothing(
 ) -> None:
     monkeypatch.setattr(xface, "LIMIT", 100_000)
 
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client, Client(door.port) as other:
             client.send(task("UPLOAD_FAP", 1, 5, "9 " * 500_000))
             other.send(task("UPLOAD_FAP", 2, 6, fap(3)))
@@ -439,7 +439,7 @@ def test_a_task_that_is_too_large_is_an_error_and_others_notice_nothing(
 
 
 def test_a_million_bytes_of_frames_are_loaded() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             client.send(task("UPLOAD_FAP", 1, 5, fap(7000)))
             assert await client.statuses(5) == [1, 2, 3]
@@ -448,7 +448,7 @@ def test_a_million_bytes_of_frames_are_loaded() -> None:
 
 
 def test_a_thousand_connections_are_let_in_one_after_the_other() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as other:
             for _ in range(1000):
                 async with Client(door.port):
@@ -460,12 +460,12 @@ def test_a_thousand_connections_are_let_in_one_after_the_other() -> None:
 
 
 def test_of_many_connections_at_once_those_beyond_the_limit_are_told_and_the_others_play_on() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as one:
             pairs = [await asyncio.open_connection("127.0.0.1", door.port) for _ in range(300)]
             first = [await reader.readuntil(b"\0\0") for reader, _ in pairs]
             refused = b'<notify name="ERROR" ownerId="0" taskId="0" status="7"/>\0\0'
-            assert sum(answer == refused for answer in first) == 300 - (xface.MOST_CLIENTS - 1)
+            assert sum(answer == refused for answer in first) == 300 - (xface.MAX_CLIENTS - 1)
             one.send(task("UPLOAD_FAP", 1, 2, fap(3)))
             assert await one.statuses(2) == [1, 2, 3]
             for _, writer in pairs:
@@ -475,9 +475,9 @@ def test_of_many_connections_at_once_those_beyond_the_limit_are_told_and_the_oth
 
 
 def test_more_clients_than_there_may_be_are_turned_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xface, "MOST_CLIENTS", 2)
+    monkeypatch.setattr(xface, "MAX_CLIENTS", 2)
 
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as one, Client(door.port):
             reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
             assert await reader.read() == b'<notify name="ERROR" ownerId="0" taskId="0" status="7"/>\0\0'
@@ -491,7 +491,7 @@ def test_more_clients_than_there_may_be_are_turned_away(monkeypatch: pytest.Monk
 def test_a_flood_of_tasks_is_read_slowly_and_nothing_of_it_is_lost(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             for id in range(1, 9):
                 client.send(task("UPLOAD_FAP", client.owner, id, fap(1)))
@@ -502,7 +502,7 @@ def test_a_flood_of_tasks_is_read_slowly_and_nothing_of_it_is_lost(
 
 
 def test_one_address_has_no_more_connections_than_its_share() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client:
             reader, writer = await asyncio.open_connection("127.0.0.1", door.port)
             assert await reader.read() == b""
@@ -514,7 +514,7 @@ def test_one_address_has_no_more_connections_than_its_share() -> None:
 
 
 def test_a_client_that_never_reads_is_not_read_either_and_others_notice_nothing() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as deaf, Client(door.port) as other:
             deaf.reader._transport.pause_reading()  # type: ignore[attr-defined]
             for _ in range(200):
@@ -526,7 +526,7 @@ def test_a_client_that_never_reads_is_not_read_either_and_others_notice_nothing(
 
 
 def test_half_a_file_of_sound_holds_nobody_up_and_a_whole_one_is_passed_over() -> None:
-    async def test(server: Server, door: XfaceDoor) -> None:
+    async def test(server: Server, door: XfaceTransport) -> None:
         async with Client(door.port) as client, Client(door.port) as half:
             half.send(task("UPLOAD_WAV", 2, 1, "a.wav", "1000") + "RIFF")
             client.send(task("UPLOAD_WAV", 1, 1, "a.wav", "1000"))

@@ -11,9 +11,9 @@ import pytest
 from bml_schema import BlockProgress, WarningFeedback
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.core.errors import RealizerError
-from realizer.server.transports.message_format import Leave, ToSession
-from realizer.server.transports.xface.attachments import Brought, Empty, Script
-from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, Desk
+from realizer.server.transports.message_format import Disconnect, Inbound
+from realizer.server.transports.xface.attachments import Attachment, MissingAttachment, Script
+from realizer.server.transports.xface.tasks import ABLE, UNABLE, Answer, TaskRunner
 from realizer.server.transports.xface.wire import Task, read_notes
 
 
@@ -30,11 +30,11 @@ class Talk:
     """A desk, and what it answers in short: ("NAME", id, status) for notes, text for the session."""
 
     def __init__(self) -> None:
-        self.desk = Desk(1)
+        self.desk = TaskRunner(1)
         self.count = 0
         self.now = 0.0
 
-    def ask(self, name: str, brought: Brought = None) -> list[object]:
+    def ask(self, name: str, brought: Attachment = None) -> list[object]:
         self.count += 1
         task = Task(name, 1, self.count)
         return self._short([*self.desk.accept(task), *self.desk.run(task, brought, self.now)])
@@ -45,7 +45,7 @@ class Talk:
             if warning
             else BlockProgress(id=id, global_time=self.now)
         )
-        return self._short(self.desk.told(feedback.to_xml(), self.now))
+        return self._short(self.desk.on_feedback(feedback.to_xml(), self.now))
 
     def _short(self, answers: Iterable[Answer]) -> list[object]:
         out: list[object] = []
@@ -53,9 +53,9 @@ class Talk:
             match answer:
                 case bytes():
                     out += [(note.name, note.id, note.status) for note in read_notes(bytearray(answer))]
-                case ToSession(text):
+                case Inbound(text):
                     out.append(_short(text))
-                case Leave():
+                case Disconnect():
                     out.append("leave")
         return out
 
@@ -212,7 +212,7 @@ def test_a_script_whose_blocks_are_all_refused_is_an_error() -> None:
     [
         ("UPLOAD_FAP", RealizerError("no"), (1, 7, 3)),
         ("LOAD_FAP", RealizerError("no"), (1, 7, 3)),
-        ("UPLOAD_FAP", Empty("none"), (1, 7)),
+        ("UPLOAD_FAP", MissingAttachment("none"), (1, 7)),
         ("UPLOAD_SCRIPT", RealizerError("no"), (1, 7)),
     ],
 )
@@ -236,7 +236,7 @@ def test_an_unknown_task_is_an_error_with_its_ids() -> None:
 
 @pytest.mark.parametrize("name", sorted(ABLE | UNABLE))
 def test_owner_0_gets_no_notes(name: str) -> None:
-    desk, task = Desk(1), Task(name, 0, 5)
+    desk, task = TaskRunner(1), Task(name, 0, 5)
     assert not [a for a in (*desk.accept(task), *desk.run(task, None, 0.0)) if isinstance(a, bytes)]
 
 
