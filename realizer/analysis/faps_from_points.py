@@ -114,7 +114,7 @@ def faps_from_features(features: Any) -> tuple[Float32, Bool]:
     return frames, seen
 
 
-def as_features_see(profile: Profile) -> Profile:
+def measurable_profile(profile: Profile) -> Profile:
     """Return the profile that `faps_from_features` would find on a face which shows this one.
 
     Distances are taken between outer points of the lips, and lids are seen together: what a profile says of

@@ -40,13 +40,13 @@ class Likeness:
     """A recognised picture: face, light and expression.
 
     Attributes:
-        found: (expression, cosine 0..1 between what both change in the neutral face), the best first.
+        matches: (expression, cosine 0..1 between what both change in the neutral face), the best first.
         neutral: it looks like no expression, but like the neutral face.
     """
 
     face: str
     light: str
-    found: Sequence[tuple[Expression, float]]
+    matches: Sequence[tuple[Expression, float]]
     neutral: bool
 
 

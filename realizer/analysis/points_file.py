@@ -12,7 +12,7 @@ from realizer.core.array_types import Float64
 from realizer.face.features import NAMES
 
 COLUMNS = ["frame", "point", "x", "y", "z"]
-MOST_FRAMES = 100_000  # an hour at 25 frames a second, and a little
+MAX_FRAMES = 100_000  # an hour at 25 frames a second, and a little
 
 
 def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], dict[str, Float64]]:
@@ -38,9 +38,9 @@ def read_points(text: str, where: str = "points") -> tuple[dict[str, Float64], d
             frame, name, (x, y, z) = int(cells[0]), cells[1].strip(), map(float, cells[2:])
         except (ValueError, IndexError):
             raise ValueError(f"{place}: wanted {','.join(COLUMNS)}, got {line[:60]!r}") from None
-        if not (0 <= frame < MOST_FRAMES and all(map(math.isfinite, (x, y, z)))):
+        if not (0 <= frame < MAX_FRAMES and all(map(math.isfinite, (x, y, z)))):
             raise ValueError(
-                f"{place}: wanted a frame 0..{MOST_FRAMES - 1} and finite places, got {line[:60]!r}"
+                f"{place}: wanted a frame 0..{MAX_FRAMES - 1} and finite places, got {line[:60]!r}"
             )
         if name not in NAMES:
             raise ValueError(f"{place}: wanted a point of MPEG-4, 2.1 to 11.6, got {name[:20]!r}")

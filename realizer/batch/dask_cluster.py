@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, failed, perform
+from realizer.batch.worker import Outcome, failure, perform
 from realizer.core.errors import RealizerError
 
 log = logging.getLogger(__name__)
@@ -17,7 +17,7 @@ AHEAD = 4  # tasks a worker has waiting, so that it never waits for us; their ou
 PATIENCE = 20.0  # s to find the scheduler
 
 
-class Cluster:
+class DaskCluster:
     """The workers of a scheduler; they need the same realizer, face and files at the same places.
 
     A task whose worker dies is given to another one by the scheduler itself.
@@ -75,7 +75,7 @@ class Cluster:
                     "where one is there again"
                 )
             error = future.exception()
-            outcome = future.result() if error is None else failed(task, f"{type(error).__name__}: {error}")
+            outcome = future.result() if error is None else failure(task, f"{type(error).__name__}: {error}")
             future.release()
             if (following := next(source, None)) is not None:
                 completed.add(submit(following))

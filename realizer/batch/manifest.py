@@ -48,7 +48,7 @@ class Manifest:
             BusyError: another batch writes here.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        with _alone(self.folder / LOCK):
+        with _exclusive(self.folder / LOCK):
             self._rows = {row["document"]: row for row in _read(self.path)}
             self._file = self.path.open("a", encoding="utf-8")
             # A line that a crash cut short is ended, so that the next one stands by itself.
@@ -60,12 +60,12 @@ class Manifest:
                 self._file.close()
                 write_text(self.path, "".join(_line(self._rows[name]) for name in sorted(self._rows)))
 
-    def has(self, name: str, key: str) -> Row | None:
+    def is_done(self, name: str, key: str) -> Row | None:
         """The row of a document that need not be played again: same key, not failed, outputs as they were."""
         row = self._rows.get(name)
         if row is None or row["key"] != key or row["status"] == "failed":
             return None
-        return row if all(self._as_it_was(output) for output in row["outputs"].values()) else None
+        return row if all(self._is_unchanged(output) for output in row["outputs"].values()) else None
 
     def add(self, row: Row) -> None:
         """Keep a row; it is in the file when this returns."""
@@ -74,7 +74,7 @@ class Manifest:
         self._file.write(_line(row))
         self._file.flush()
 
-    def _as_it_was(self, output: Mapping[str, Any]) -> bool:
+    def _is_unchanged(self, output: Mapping[str, Any]) -> bool:
         try:
             content = (self.folder / output["file"]).read_bytes()
         except OSError:
@@ -102,7 +102,7 @@ def _read(path: Path) -> Iterator[Row]:
 
 
 @contextmanager
-def _alone(path: Path) -> Iterator[None]:
+def _exclusive(path: Path) -> Iterator[None]:
     """One process at a time; the lock goes with the process that holds it, however that ends."""
     try:
         import fcntl

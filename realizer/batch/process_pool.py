@@ -13,14 +13,14 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, Worker, failed
+from realizer.batch.worker import Outcome, Worker, failure
 
 TRIES = 3  # a document that ends its process so often is the reason for it
 # A process a core is the rule: libraries that start threads of their own would only be in each other's way.
 ALONE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-class Processes:
+class ProcessPool:
     """Workers that are started fresh (spawned, not forked), one task at a time each.
 
     Args:
@@ -31,12 +31,12 @@ class Processes:
     def __init__(self, options: Options, count: int) -> None:
         self.options = options
         self.count = count
-        self._crew: list[_Member] = []
+        self._workers: list[_WorkerProcess] = []
 
     @property
     def pids(self) -> tuple[int, ...]:
         """The processes that are there."""
-        return tuple(member.pid for member in self._crew)
+        return tuple(member.pid for member in self._workers)
 
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         """The outcome of each task, as they come. A task whose process dies is given to another one."""
@@ -50,24 +50,24 @@ class Processes:
             return None if task is None else (task, 1)
 
         try:
-            while len(self._crew) < self.count and (work := following()) is not None:
-                self._crew.append(_Member(self.options))
-                self._crew[-1].give(*work)
-            while busy := {member.pipe: member for member in self._crew if member.work is not None}:
+            while len(self._workers) < self.count and (work := following()) is not None:
+                self._workers.append(_WorkerProcess(self.options))
+                self._workers[-1].send(*work)
+            while busy := {member.pipe: member for member in self._workers if member.work is not None}:
                 for pipe in wait(list(busy)):
                     member = busy[pipe]  # type: ignore[index]
-                    task, tried = member.taken()
+                    task, tried = member.take_back()
                     outcome = member.answer()
                     if outcome is None:
                         code = member.end()
-                        self._crew[self._crew.index(member)] = member = _Member(self.options)
+                        self._workers[self._workers.index(member)] = member = _WorkerProcess(self.options)
                         if tried < TRIES:
                             again.append((task, tried + 1))
                         else:
                             words = f"its process ended {TRIES} times (exit status {code})"
-                            outcome = failed(task, words)
+                            outcome = failure(task, words)
                     if (work := following()) is not None:
-                        member.give(*work)
+                        member.send(*work)
                     if outcome is not None:
                         yield outcome
         finally:
@@ -75,12 +75,12 @@ class Processes:
 
     def close(self) -> None:
         """End the workers, also in the middle of a task."""
-        for member in self._crew:
+        for member in self._workers:
             member.end()
-        self._crew.clear()
+        self._workers.clear()
 
 
-class _Member:
+class _WorkerProcess:
     """One worker process and what it is at."""
 
     def __init__(self, options: Options) -> None:
@@ -103,12 +103,12 @@ class _Member:
         assert self._process.pid is not None
         return self._process.pid
 
-    def give(self, task: Task, tried: int) -> None:
+    def send(self, task: Task, tried: int) -> None:
         self.work = task, tried
         with contextlib.suppress(OSError):  # it is dead; its answer says so
             self.pipe.send(task)
 
-    def taken(self) -> tuple[Task, int]:
+    def take_back(self) -> tuple[Task, int]:
         assert self.work is not None
         work, self.work = self.work, None
         return work

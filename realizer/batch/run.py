@@ -10,12 +10,12 @@ from typing import Protocol
 from realizer.batch.documents import Document
 from realizer.batch.manifest import Manifest, Row
 from realizer.batch.task import Options, Task, fingerprint, key_of
-from realizer.batch.worker import Outcome, failed
+from realizer.batch.worker import Outcome, failure
 from realizer.core.atomic_files import write_bytes
 
 
-class Crew(Protocol):
-    """Whoever plays documents: `Processes` or a `Cluster`."""
+class Workers(Protocol):
+    """Whoever plays documents: `ProcessPool` or a `DaskCluster`."""
 
     def perform(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         """The outcome of each task, in any order."""
@@ -27,7 +27,7 @@ class Crew(Protocol):
 
 
 def batch(
-    documents: Iterable[Document], folder: Path, options: Options, crew: Crew
+    documents: Iterable[Document], folder: Path, options: Options, workers: Workers
 ) -> Iterator[tuple[Row, bool]]:
     """Play what was not played yet; (row of the manifest, whether it was there already) for each document.
 
@@ -45,12 +45,12 @@ def batch(
         unread: list[Outcome] = []
         for document in documents:
             for task in _tasks([document], mark, unread):
-                row = manifest.has(task.name, task.key)
+                row = manifest.is_done(task.name, task.key)
                 if row is None:
                     left.append(document)
                 else:
                     yield row, True
-        for outcome in chain(crew.perform(_tasks(left, mark, unread)), unread):
+        for outcome in chain(workers.perform(_tasks(left, mark, unread)), unread):
             for name, content in outcome.files.items():
                 path = folder / name
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -66,6 +66,6 @@ def _tasks(documents: Iterable[Document], mark: str, unread: list[Outcome]) -> I
             text = document.path.read_bytes()
         except OSError as error:
             words = f"{document.path}: {error.strerror}"
-            unread.append(failed(Task(document.name, "", b"", mark), words))
+            unread.append(failure(Task(document.name, "", b"", mark), words))
         else:
             yield Task(document.name, key_of(text, mark), text, mark)

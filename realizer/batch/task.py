@@ -39,7 +39,7 @@ class Options(PlayOptions):
             named["cooccurrence"] = Path(self.cooccurrence)
         return {option: path for option, path in named.items() if path is not None}
 
-    def told(self) -> str:
+    def to_json(self) -> str:
         """All but the files, as JSON."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self.files}
         return json.dumps(values, sort_keys=True)
@@ -73,7 +73,7 @@ def fingerprint(options: Options) -> str:
     """
     from realizer.face.load import folder_of
 
-    digest = hashlib.sha256(options.told().encode())
+    digest = hashlib.sha256(options.to_json().encode())
     for package in (bml_schema, realizer):
         root = Path(package.__path__[0])
         for suffix in (".py", ".csv", ".toml"):

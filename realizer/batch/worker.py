@@ -31,14 +31,14 @@ class Outcome:
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
-def failed(task: Task, error: str) -> Outcome:
+def failure(task: Task, error: str) -> Outcome:
     """A task without outputs, and why."""
     return Outcome(
         {"document": task.name, "key": task.key, "status": "failed", "error": error, "outputs": {}}
     )
 
 
-class UnspokenError(RealizerError):
+class SpeechFailedError(RealizerError):
     """The voice failed twice. Not a VoiceError, after which a document would be played in silence."""
 
 
@@ -61,7 +61,7 @@ class _Speaker:
         try:
             return self._voice.say(request)
         except VoiceError as error:
-            raise UnspokenError(str(error)) from None
+            raise SpeechFailedError(str(error)) from None
 
     @property
     def pid(self) -> int | None:
@@ -72,7 +72,7 @@ class _Speaker:
             self._voice.close()
 
 
-class _Staying(Renderer):
+class _PersistentRenderer(Renderer):
     """A renderer that outlives the films it draws: its process takes longer to start than many films."""
 
     def __exit__(
@@ -101,7 +101,7 @@ class Worker:
             }
         except Exception as error:
             words = str(error) if isinstance(error, RealizerError) else f"{type(error).__name__}: {error}"
-            return failed(task, words)
+            return failure(task, words)
         row = {
             "document": task.name,
             "key": task.key,
@@ -142,7 +142,7 @@ class Worker:
             if draws is not None:
                 size, alpha = draws(drawing)
                 if (size, alpha) not in self._renderers:
-                    self._renderers[size, alpha] = _Staying(
+                    self._renderers[size, alpha] = _PersistentRenderer(
                         o.face,
                         size,
                         o.camera,
@@ -170,7 +170,7 @@ def perform(options: Options, task: Task) -> Outcome:
             _HERE[:] = [(Worker(options), fingerprint(options))]
         worker, here = _HERE[0]
         if here != task.fingerprint:
-            return failed(
+            return failure(
                 task,
                 f"the machine that played it has another realizer, face, voice or file: fingerprint "
                 f"{here[:12]}, wanted {task.fingerprint[:12]}; install the same there",

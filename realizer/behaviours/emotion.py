@@ -17,7 +17,7 @@ from realizer.behaviours import pose_channels
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.behaviours.table_timing import timing_from_table
 from realizer.core.array_types import Float64
-from realizer.emotions.wheel import affect, place_of_affect, shares, strength_at, wheel
+from realizer.emotions.wheel import affect, blend_weights, place_of_affect, strength_at, wheel
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
 from realizer.emotions.words import emotion as profile_of
 from realizer.scheduling.timing import Timing
@@ -161,15 +161,15 @@ def _mix(feeling: EmotionRequest) -> tuple[Mapping[str, float], float]:
     arousal. A word is a kind of face, as strong as `strength_of` has it; `intensity` is how much of it shows.
     """
     if feeling.angle is not None:
-        return shares(feeling.angle), strength_at(feeling.activation)
+        return blend_weights(feeling.angle), strength_at(feeling.activation)
     if feeling.valence is not None and feeling.arousal is not None:
         angle, away = place_of_affect(feeling.valence, feeling.arousal)
-        parts = shares(angle, "own", "affect")
+        parts = blend_weights(angle, "own", "affect")
         return {name: share for name, share in parts.items() if name in emotion_faces()}, away
     place = place_of(feeling.name or "", feeling.profiles)
     if place is None:
         return {}, 0.0
-    return shares(place.angle, "own", place.ring), strength_of(place)
+    return blend_weights(place.angle, "own", place.ring), strength_of(place)
 
 
 KINDS = (

@@ -9,7 +9,7 @@ from typing import Any
 
 from realizer.animation.channel import Channel
 from realizer.core.array_types import Float64
-from realizer.expressions.library import Library, shipped
+from realizer.expressions.library import Library, builtin
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 
@@ -38,7 +38,7 @@ class PlanningContext:
     seed: int = 0
     media: Path | None = None
     clips: Mapping[str, Recording] = field(default_factory=dict)
-    library: Library = field(default_factory=shipped)
+    library: Library = field(default_factory=builtin)
     face_inputs: Callable[[], Sequence[str] | None] = lambda: None
 
 

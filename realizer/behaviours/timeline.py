@@ -12,7 +12,7 @@ from realizer.animation.channel import Channel
 from realizer.behaviours import media, pose_channels
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.core.array_types import Float64
-from realizer.expressions.spans import lasts, spans
+from realizer.expressions.spans import duration_of, spans
 from realizer.expressions.timeline import Timeline, Track, faults_of, remarks
 from realizer.expressions.timeline_reader import read_timeline
 from realizer.scheduling.timing import Timing
@@ -25,7 +25,7 @@ CHANGE = 0.2
 
 def timing(node: Node, context: PlanningContext) -> Timing:
     """As long as its longest channel; it stretches as a whole."""
-    length = lasts(_timeline(node, context), context.library)
+    length = duration_of(_timeline(node, context), context.library)
     return Timing(("start", "end"), np.array([length]), np.array([0.04]), np.array([STIFFNESS]))
 
 
@@ -33,7 +33,7 @@ def expand(node: Node, times: Float64, context: PlanningContext) -> tuple[Channe
     """Its tracks side by side; where two show one action unit the stronger one shows."""
     timeline = _timeline(node, context)
     start, end = float(times[0]), float(times[-1])
-    scale = (end - start) / lasts(timeline, context.library)
+    scale = (end - start) / duration_of(timeline, context.library)
     shown = (
         channel for track in timeline.tracks for channel in _channels(track, start, scale, node, context)
     )

@@ -10,17 +10,17 @@ from realizer.charts.links import Link
 from realizer.charts.rows import ABOVE, BAR, SMALL
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
-from realizer.charts.timeline import BlockLine, Line
+from realizer.charts.timeline import BehaviourRow, BlockChart
 
 # block, behaviour -> its line, the start of its block, and the top of its row
-Place = Mapping[tuple[str, str], tuple[Line, float, float]]
+Place = Mapping[tuple[str, str], tuple[BehaviourRow, float, float]]
 BEND = 28  # pieces of a curve
 
 
-def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine, places: Place) -> None:
+def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockChart, places: Place) -> None:
     """Draw the links of a block: curves into `picture`, below the bars; ends into `marks`, above."""
     start = block.start or 0.0
-    for line in block.lines:
+    for line in block.rows:
         _, _, top = places[block.block, line.id]
         when = {point.name: start + point.time for point in line.points}
         pinned: set[str] = set()
@@ -36,7 +36,9 @@ def draw_links(picture: Picture, marks: Picture, scale: Scale, block: BlockLine,
                 _pin(marks, x, top, link)
 
 
-def _end_of(scale: Scale, link: Link, there: tuple[Line, float, float] | None) -> tuple[float, float] | None:
+def _end_of(
+    scale: Scale, link: Link, there: tuple[BehaviourRow, float, float] | None
+) -> tuple[float, float] | None:
     """Return the position of a link's other point, and the top of its row, or None if it is not drawn."""
     if there is None:
         return None

@@ -7,24 +7,24 @@ from collections.abc import Callable, Iterable
 
 from bml_schema import Behaviour, Block, Place
 from realizer.charts.links import Link, links_of
-from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Point, Spoken
+from realizer.charts.timeline import BehaviourRow, BlockChart, Dropped, Gap, Point, WordSpan
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_links import external_times
 from realizer.playback.block_store import BlockStore
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
 
-def lines_of(cast: BlockStore, schedules: Iterable[Schedule]) -> list[BlockLine]:
+def charts_of(cast: BlockStore, schedules: Iterable[Schedule]) -> list[BlockChart]:
     """The blocks of a player, one for each schedule that its `submit` gave."""
     playing = {id(p.first_schedule): p for p in cast.all()}
     out = []
     for schedule in schedules:
         known = playing.get(id(schedule))
-        out.append(_refused(schedule) if known is None else line_of(known, cast.schedule_of))
+        out.append(_refused(schedule) if known is None else chart_of(known, cast.schedule_of))
     return out
 
 
-def line_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]) -> BlockLine:
+def chart_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]) -> BlockChart:
     """Return the chart of a block in its present state.
 
     Args:
@@ -35,7 +35,7 @@ def line_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None])
     start = schedule.start if known else None
     links = links_of(block, schedule, external_times(schedule_of, schedule.start if known else 0.0))
     own = tuple(
-        _line(playing, node, start, tuple(links.get(node.id, ())))
+        _behaviour_row(playing, node, start, tuple(links.get(node.id, ())))
         for node in block.behaviours
         if node.id in schedule.times
     )
@@ -46,12 +46,14 @@ def line_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None])
         _cut(playing, id) for id in playing.first_schedule.times if id not in (*names, *schedule.times)
     ]
     end = playing.end if known else None
-    return BlockLine(
+    return BlockChart(
         block.id, block.character_id, playing.state.value, start, end, own, tuple(dropped), warnings
     )
 
 
-def _line(playing: ActiveBlock, node: Behaviour, start: float | None, links: tuple[Link, ...]) -> Line:
+def _behaviour_row(
+    playing: ActiveBlock, node: Behaviour, start: float | None, links: tuple[Link, ...]
+) -> BehaviourRow:
     names, times = playing.schedule.points[node.id], playing.schedule.times[node.id].tolist()
     points = tuple(
         Point(name, time, None if start is None else start + time)
@@ -60,7 +62,7 @@ def _line(playing: ActiveBlock, node: Behaviour, start: float | None, links: tup
     place = playing.block.places.get(node.id)
     utterance = playing.context.utterances.get(node.id)
     words = utterance.words if utterance is not None else ()
-    return Line(
+    return BehaviourRow(
         node.id,
         node.tag.rpartition("}")[2],
         place.line if place is not None else None,
@@ -69,7 +71,7 @@ def _line(playing: ActiveBlock, node: Behaviour, start: float | None, links: tup
         _gaps(names, times, playing.plan.timings.get(node.id)),
         links,
         tuple(
-            Spoken(times[0] + w.start, times[0] + w.end, w.text)
+            WordSpan(times[0] + w.start, times[0] + w.end, w.text)
             for w in words
             if times[0] + w.start < times[-1]
         ),
@@ -137,10 +139,10 @@ def _cut(playing: ActiveBlock, id: str) -> Dropped:
     )
 
 
-def _refused(schedule: Schedule) -> BlockLine:
+def _refused(schedule: Schedule) -> BlockChart:
     """A block that failed."""
     gone = tuple(Dropped(w.id, None, None, w.type, w.text) for w in schedule.warnings)
-    return BlockLine(
+    return BlockChart(
         schedule.block,
         schedule.character,
         "FAILED",

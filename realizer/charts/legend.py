@@ -9,7 +9,7 @@ from realizer.charts.diverging_scale import FAINT, HELD, LINK, LOST, RIGID, ROOM
 from realizer.charts.rows import NAME
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, hatch, width_of
-from realizer.charts.timeline import BlockLine
+from realizer.charts.timeline import BlockChart
 
 SIZE = 10.5
 TITLE = "length of gaps"
@@ -17,7 +17,7 @@ STEPS = 40  # of the colour scale
 WIDE = 168.0
 
 
-def draw(picture: Picture, scale: Scale, top: float, blocks: Sequence[BlockLine]) -> float:
+def draw(picture: Picture, scale: Scale, top: float, blocks: Sequence[BlockChart]) -> float:
     """Draw the legend; of marks only those that the picture has. Returns where the picture ends."""
     y = top + 14
     x = NAME
@@ -43,8 +43,8 @@ def draw(picture: Picture, scale: Scale, top: float, blocks: Sequence[BlockLine]
 Mark = Callable[[Picture, float, float], None]
 
 
-def _marks(blocks: Sequence[BlockLine]) -> list[tuple[Mark, str]]:
-    lines = [line for block in blocks for line in block.lines]
+def _marks(blocks: Sequence[BlockChart]) -> list[tuple[Mark, str]]:
+    lines = [line for block in blocks for line in block.rows]
     links = [link for line in lines for link in line.links]
     marks: list[tuple[Mark, str, bool]] = [
         (_rigid, "cannot give way", any(g.rigid or g.preferred is None for line in lines for g in line.gaps)),

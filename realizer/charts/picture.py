@@ -8,10 +8,10 @@ from dataclasses import replace
 from realizer.charts import legend
 from realizer.charts.arrows import draw_links
 from realizer.charts.diverging_scale import FAINT, GRID, INK, PAPER, TIGHT
-from realizer.charts.rows import HEIGHT, NAME, draw_dropped, draw_line, height_of
+from realizer.charts.rows import HEIGHT, NAME, draw_dropped, draw_row, height_of
 from realizer.charts.scale import Scale, last_of, scale_of
 from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut_inside, width_of
-from realizer.charts.timeline import BlockLine, Line
+from realizer.charts.timeline import BehaviourRow, BlockChart
 
 AXIS = 30.0
 TALL = 600.0  # a picture that is taller has an axis below too
@@ -39,13 +39,13 @@ GROUPS = {
 QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a chart need not name
 
 
-def timeline(blocks: Sequence[BlockLine]) -> Picture:
+def timeline(blocks: Sequence[BlockChart]) -> Picture:
     """The picture of blocks that share a clock."""
     scale = scale_of(blocks)
     names = ", ".join(block.block for block in blocks)
     picture = Picture(scale.width, title=f"Timeline of {names or 'nothing'}", paper=PAPER)
     below, bars, above = (Picture(scale.width) for _ in range(3))
-    places: dict[tuple[str, str], tuple[Line, float, float]] = {}
+    places: dict[tuple[str, str], tuple[BehaviourRow, float, float]] = {}
     y = AXIS
     for block in blocks:
         y = _block(picture, bars, scale, block, y, places) + APART
@@ -62,24 +62,24 @@ def _block(
     picture: Picture,
     bars: Picture,
     scale: Scale,
-    block: BlockLine,
+    block: BlockChart,
     top: float,
-    places: dict[tuple[str, str], tuple[Line, float, float]],
+    places: dict[tuple[str, str], tuple[BehaviourRow, float, float]],
 ) -> float:
     """Draw the ground and the rows of a block; returns where they end."""
     start = block.start or 0.0
     y = top + HEAD
     ground = len(picture.shapes)
-    tied = _tied(block)
+    tied = _linked_points(block)
     said = ""
-    for group, line in sorted(((_group(line), line) for line in block.lines), key=lambda row: _rank(row[0])):
+    for group, line in sorted(((_group(line), line) for line in block.rows), key=lambda row: _rank(row[0])):
         if group != said:
             if said:
                 picture.add(Path(((8, y), (scale.right, y)), GRID, 1.0))
             picture.add(Text(12, y + 22, group, 10, FAINT))
             said = group
         places[block.block, line.id] = (line, start, y)
-        draw_line(bars, scale, line, start, y, frozenset(tied.get(line.id, ())))
+        draw_row(bars, scale, line, start, y, frozenset(tied.get(line.id, ())))
         y += HEIGHT
     for dropped in block.dropped:
         height = height_of(dropped, scale)
@@ -87,8 +87,8 @@ def _block(
         y += height
     left, right = scale.x(start), scale.x(last_of(block))
     frame: list[Shape] = [Box(8, top + 4, scale.width - 16, 24, "#eef1f6", radius=4)]
-    if block.lines:
-        frame.append(Box(left, top + HEAD - 2, right - left, HEIGHT * len(block.lines) + 2, "#f8fafc"))
+    if block.rows:
+        frame.append(Box(left, top + HEAD - 2, right - left, HEIGHT * len(block.rows) + 2, "#f8fafc"))
     picture.shapes[ground:ground] = frame
     name = cut_inside(block.block, 14, scale.left - 24)
     bars.add(Text(14, top + 21, name, 14, INK))
@@ -102,16 +102,16 @@ def _block(
     return y
 
 
-def _about(block: BlockLine) -> list[str]:
+def _about(block: BlockChart) -> list[str]:
     words = []
     if block.start is None:
         words.append(f"not started: {last_of(block):.2f} s long")
-    elif block.lines:
+    elif block.rows:
         words.append(f"{block.start:.2f} to {last_of(block):.2f} s")
     if block.character is not None:
         words.append(f"character {block.character}")
-    if block.lines:
-        words.append(f"{len(block.lines)} behaviour{'s' if len(block.lines) > 1 else ''}")
+    if block.rows:
+        words.append(f"{len(block.rows)} behaviour{'s' if len(block.rows) > 1 else ''}")
     if block.cost > 5e-5:
         words.append(f"cost {block.cost:.3g}")
     if block.dropped:
@@ -131,10 +131,10 @@ def _grid(scale: Scale, bottom: float) -> list[Shape]:
     return shapes
 
 
-def _tied(block: BlockLine) -> dict[str, set[str]]:
+def _linked_points(block: BlockChart) -> dict[str, set[str]]:
     """Behaviour -> its points that take part in a link."""
     tied: dict[str, set[str]] = {}
-    for line in block.lines:
+    for line in block.rows:
         for link in line.links:
             tied.setdefault(line.id, set()).add(link.sync)
             if link.behaviour is not None and link.block is None:
@@ -142,7 +142,7 @@ def _tied(block: BlockLine) -> dict[str, set[str]]:
     return tied
 
 
-def _group(line: Line) -> str:
+def _group(line: BehaviourRow) -> str:
     return next((group for group, elements in GROUPS.items() if line.element in elements), "other")
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from realizer.charts.diverging_scale import FAINT, INK, LOST, PAPER, RIGID, colour_of, on
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Box, Path, Picture, Text, cut, cut_inside, fold, hatch, width_of
-from realizer.charts.timeline import Dropped, Gap, Line
+from realizer.charts.timeline import BehaviourRow, Dropped, Gap
 
 HEIGHT = 46.0
 # Above the bar there is room for pins and for what orders leave, below it for the names of the points.
@@ -17,12 +17,12 @@ ABOVE, BAR = 13.0, 18.0
 NAME = 62.0  # where ids begin; kinds stand before them
 SMALL, PLAIN = 9.5, 12.5
 SAME = 1e-6  # s; a word at a sync point begins there, however it was rounded
-MOST_WHY = 4  # lines of a reason
+MAX_WHY = 4  # lines of a reason
 _AT = re.compile(r"line \d+, /\S*: ")
 
 
-def draw_line(
-    picture: Picture, scale: Scale, line: Line, start: float, top: float, tied: frozenset[str]
+def draw_row(
+    picture: Picture, scale: Scale, line: BehaviourRow, start: float, top: float, tied: frozenset[str]
 ) -> None:
     """Draw the row of a behaviour.
 
@@ -81,7 +81,7 @@ def _name(picture: Picture, id: str, about: str, top: float, ink: str, faint: st
     picture.add(Text(NAME, top + 35, cut(about, SMALL, room), SMALL, faint))
 
 
-def _about(line: Line) -> str:
+def _about(line: BehaviourRow) -> str:
     words = [line.element]
     if line.line is not None:
         words.append(f"line {line.line}")
@@ -90,7 +90,7 @@ def _about(line: Line) -> str:
     return ", ".join(words)
 
 
-def _tip(line: Line, gap: Gap) -> str:
+def _tip(line: BehaviourRow, gap: Gap) -> str:
     words = [f"{line.id}: {gap.begin} to {gap.end} {gap.actual:.3f} s"]
     if gap.rigid:
         words.append("rigid")
@@ -116,7 +116,7 @@ def _percent(picture: Picture, gap: Gap, left: float, right: float, bar: float) 
             return
 
 
-def _say(picture: Picture, scale: Scale, line: Line, start: float, bar: float) -> None:
+def _say(picture: Picture, scale: Scale, line: BehaviourRow, start: float, bar: float) -> None:
     """The words, each at its time; where they do not fit, as a line from point to point."""
     spans = [(scale.x(start + w.start), scale.x(start + w.end), w.text) for w in line.words]
     if all(width_of(text, 10.5) <= max(right - left, 12) + 3 for left, right, text in spans):
@@ -158,4 +158,4 @@ def _shifts(wide: float, k: int, count: int) -> Iterable[float]:
 def _why(dropped: Dropped, scale: Scale) -> Sequence[str]:
     # The line of the document is below the name.
     text = _AT.sub("", dropped.text)
-    return fold(text, 10.5, scale.right - scale.left - 36, MOST_WHY)
+    return fold(text, 10.5, scale.right - scale.left - 36, MAX_WHY)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from realizer.charts.timeline import BlockLine
+from realizer.charts.timeline import BlockChart
 
 GUTTER = 190.0  # where the names stand
 MARGIN = 26.0  # on the right
@@ -49,7 +49,7 @@ class Scale:
             yield number * step, f"{number * step:.{digits}f}"
 
 
-def scale_of(blocks: Iterable[BlockLine]) -> Scale:
+def scale_of(blocks: Iterable[BlockChart]) -> Scale:
     """Return a scale for all blocks; one that has not started begins at 0."""
     spans = [(block.start or 0.0, last_of(block)) for block in blocks]
     first = min((start for start, _ in spans), default=0.0)
@@ -58,9 +58,9 @@ def scale_of(blocks: Iterable[BlockLine]) -> Scale:
     return Scale(first, last, min(WIDEST, max(WIDTH, GUTTER + MARGIN + SECOND * (last - first))))
 
 
-def last_of(block: BlockLine) -> float:
+def last_of(block: BlockChart) -> float:
     """When a block ends, as if one that was not started began at 0."""
-    ends = [line.points[-1].time for line in block.lines]
+    ends = [line.points[-1].time for line in block.rows]
     return (block.start or 0.0) + max(ends, default=0.0)
 
 

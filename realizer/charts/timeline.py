@@ -24,7 +24,7 @@ class Point(NamedTuple):
     at: float | None
 
 
-class Spoken(NamedTuple):
+class WordSpan(NamedTuple):
     """A word and its time, seconds from block start."""
 
     start: float
@@ -77,7 +77,7 @@ class Gap(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Line:
+class BehaviourRow:
     """One behaviour.
 
     Attributes:
@@ -93,7 +93,7 @@ class Line:
     points: tuple[Point, ...]
     gaps: tuple[Gap, ...]
     links: tuple[Link, ...] = ()
-    words: tuple[Spoken, ...] = ()
+    words: tuple[WordSpan, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         out: dict[str, Any] = {
@@ -131,7 +131,7 @@ class Dropped(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BlockLine:
+class BlockChart:
     """One block.
 
     Attributes:
@@ -146,13 +146,13 @@ class BlockLine:
     state: str
     start: float | None
     end: float | None
-    lines: tuple[Line, ...] = ()
+    rows: tuple[BehaviourRow, ...] = ()
     dropped: tuple[Dropped, ...] = ()
     warnings: tuple[Warning, ...] = ()
 
     @property
     def cost(self) -> float:
-        return sum(gap.cost for line in self.lines for gap in line.gaps)
+        return sum(gap.cost for line in self.rows for gap in line.gaps)
 
     def head(self) -> dict[str, Any]:
         """Return the behaviour and its state as plain data."""
@@ -169,7 +169,7 @@ class BlockLine:
         return {
             **self.head(),
             "cost": _seconds(self.cost),
-            "behaviours": [line.to_json() for line in self.lines],
+            "behaviours": [line.to_json() for line in self.rows],
             "dropped": [dropped.to_json() for dropped in self.dropped],
             "warnings": [warning.to_json() for warning in self.warnings],
         }
@@ -179,8 +179,8 @@ class BlockLine:
         return {
             "state": self.state,
             "cost": self.cost,
-            "gaps": {line.id: [gap.to_json() for gap in line.gaps] for line in self.lines},
-            "links": {line.id: [link.to_json() for link in line.links] for line in self.lines},
+            "gaps": {line.id: [gap.to_json() for gap in line.gaps] for line in self.rows},
+            "links": {line.id: [link.to_json() for link in line.links] for line in self.rows},
             "dropped": [dropped.to_json() for dropped in self.dropped],
         }
 

@@ -9,7 +9,7 @@ from realizer.charts.picture import timeline
 from realizer.charts.raster import png
 from realizer.charts.shapes import Picture
 from realizer.charts.svg import svg
-from realizer.charts.timeline import BlockLine
+from realizer.charts.timeline import BlockChart
 from realizer.core.atomic_files import write_bytes
 
 Writer = Callable[[Picture], bytes]
@@ -28,7 +28,7 @@ def writer_for(path: str | Path) -> Writer:
     return WRITERS[suffix]
 
 
-def write_timeline(blocks: Sequence[BlockLine], path: str | Path) -> None:
+def write_timeline(blocks: Sequence[BlockChart], path: str | Path) -> None:
     """Write the picture whole or not at all.
 
     Raises:

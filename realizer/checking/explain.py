@@ -12,9 +12,9 @@ from bml_schema import Block
 from bml_schema.node_schema import Attribute, local, schema_of
 from bml_schema.source import Source, Spot
 from bml_schema.tolerant_scanner import Element
-from realizer.checking.explain_conflicts import explain_clash
+from realizer.checking.explain_conflicts import explain_conflict
 from realizer.checking.finding import Finding, Label
-from realizer.checking.finding_builder import Draft
+from realizer.checking.finding_builder import FindingBuilder
 from realizer.scheduling.timing import Warning
 
 _PLACED = re.compile(r"line (\d+)(?:, (/[^\s:]+))?: (.*)", re.DOTALL)
@@ -29,7 +29,7 @@ _NO_BEHAVIOUR = re.compile(r'no behaviour "?([^"]+?)"? in this block')
 _TAKEN = re.compile(r"which line (\d+) has")
 _HELD = re.compile(r"but (\S+) has it from")
 _UNKNOWN_PREFIX = re.compile(r"Namespace prefix (\S+)(?: for \S+)? on (\S+) is not defined")
-_MOST_LISTED = 12
+_MAX_LISTED = 12
 
 
 def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[str, type[Any]]) -> Finding:
@@ -43,22 +43,22 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
     """
     placed = _PLACED.fullmatch(warning.text)
     line, path, text = (int(placed[1]), placed[2] or "", placed[3]) if placed else (None, "", warning.text)
-    draft = Draft(source, warning.id, line, path)
+    builder = FindingBuilder(source, warning.id, line, path)
     lost = _LOST.fullmatch(text)
     said = lost[1] if lost else text
-    if not explain_clash(draft, warning, said):
-        _Sentences(draft, vocabulary).explain(said)
+    if not explain_conflict(builder, warning, said):
+        _Sentences(builder, vocabulary).explain(said)
     if lost:
-        draft.notes.append(f"note: with it went {lost[2]}")
+        builder.notes.append(f"note: with it went {lost[2]}")
     return Finding(
         file=file,
         type=warning.type,
         id=warning.id,
-        path=path or draft.path,
+        path=path or builder.path,
         text=text,
-        head=draft.head or text,
-        labels=tuple(draft.labels),
-        notes=tuple(dict.fromkeys(draft.notes)),
+        head=builder.head or text,
+        labels=tuple(builder.labels),
+        notes=tuple(dict.fromkeys(builder.notes)),
     )
 
 
@@ -82,26 +82,26 @@ def attributes_of(text: str) -> list[str]:
 class _Sentences:
     """Explains the warnings of the parser and the behaviour kinds: sentences about one element each."""
 
-    def __init__(self, draft: Draft, vocabulary: Mapping[str, type[Any]]) -> None:
-        self.draft, self.vocabulary = draft, vocabulary
-        self.source, self.labels, self.notes = draft.source, draft.labels, draft.notes
+    def __init__(self, builder: FindingBuilder, vocabulary: Mapping[str, type[Any]]) -> None:
+        self.builder, self.vocabulary = builder, vocabulary
+        self.source, self.labels, self.notes = builder.source, builder.labels, builder.notes
 
     def explain(self, text: str) -> None:
-        draft = self.draft
-        if draft.element is None and draft.line is None:
+        builder = self.builder
+        if builder.element is None and builder.line is None:
             # A fault of the whole block; of several with one id, the last.
-            draft.element = self.source.document(draft.block)
-            draft.path = "/bml" if draft.element is not None else ""
-        if draft.element is None:
+            builder.element = self.source.document(builder.block)
+            builder.path = "/bml" if builder.element is not None else ""
+        if builder.element is None:
             self.broken(text)
         else:
-            pieces = [self.piece(piece, draft.element) for piece in _PIECE.split(text)]
-            draft.head = "; ".join(pieces)
+            pieces = [self.piece(piece, builder.element) for piece in _PIECE.split(text)]
+            builder.head = "; ".join(pieces)
 
     # a document that gave no block
 
     def broken(self, text: str) -> None:
-        source, line = self.source, self.draft.line
+        source, line = self.source, self.builder.line
         if line is None:
             return
         bad = source.line(line).find("\N{REPLACEMENT CHARACTER}")
@@ -161,7 +161,7 @@ class _Sentences:
         self.labels.append(Label(self.spot_in(span, said), said))
         if taken := _TAKEN.search(said):
             id = self.source.id(element)
-            first = self.source.named(id, line=int(taken[1]), block=self.draft.block)
+            first = self.source.named(id, line=int(taken[1]), block=self.builder.block)
             if first is not None and first is not element:
                 spot = self.source.locate_in(first, "id")
                 self.labels.append(Label(spot, "the first one is here", primary=False))
@@ -171,7 +171,7 @@ class _Sentences:
     def holder(self, name: str, element: Element) -> None:
         """Return the holder of a resource: "behaviour", or "block:behaviour" of an earlier block."""
         block, _, id = name.rpartition(":")
-        other = self.source.named(id, block=block or self.draft.block)
+        other = self.source.named(id, block=block or self.builder.block)
         if other is not None and other is not element:
             self.labels.append(Label(self.source.name_spot(other), f"{name} is here", primary=False))
 
@@ -225,7 +225,7 @@ class _Sentences:
         """The first other behaviours of the document of an element."""
         known = {local(tag) for tag in self.vocabulary}
         others = (e for e in self.source.inside(element) if e is not element and "id" in e.attributes)
-        return islice((e for e in others if e.name.rpartition(":")[2] in known), _MOST_LISTED)
+        return islice((e for e in others if e.name.rpartition(":")[2] in known), _MAX_LISTED)
 
     def class_of(self, element: Element) -> type[Any] | None:
         name = element.name.rpartition(":")[2]
@@ -234,7 +234,7 @@ class _Sentences:
         return next((cls for tag, cls in self.vocabulary.items() if local(tag) == name), None)
 
     def points_of(self, id: str) -> list[str]:
-        element = self.source.named(id, block=self.draft.block)
+        element = self.source.named(id, block=self.builder.block)
         cls = self.class_of(element) if element else None
         if element is None or cls is None:
             return []

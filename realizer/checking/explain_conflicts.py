@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from bml_schema.source import Spot
 from bml_schema.tolerant_scanner import Element
 from realizer.checking.finding import Label
-from realizer.checking.finding_builder import Draft
+from realizer.checking.finding_builder import FindingBuilder
 from realizer.scheduling.timing import Clause, Warning
 
 _STATED = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")
@@ -23,94 +23,99 @@ _REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
 _BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)$|(all of this is required)$")
 
 
-def explain_clash(draft: Draft, warning: Warning, text: str) -> bool:
+def explain_conflict(builder: FindingBuilder, warning: Warning, text: str) -> bool:
     """Add the explanation of a scheduling conflict; returns whether the warning is one.
 
     Args:
         text: of the warning, without its place.
     """
     if warning.clash:
-        _clash(draft, warning.clash, text)
+        _conflict(builder, warning.clash, text)
         return True
     if (astray := _ASTRAY.fullmatch(text)) is None:
         return False
     name, constraint, id, line, said = astray.groups()
-    _astray(draft, name, bool(constraint), id, int(line) if line else draft.line, said)
+    _dangling_reference(builder, name, bool(constraint), id, int(line) if line else builder.line, said)
     return True
 
 
-def _clash(draft: Draft, clash: Iterable[Clause], text: str) -> None:
+def _conflict(builder: FindingBuilder, clash: Iterable[Clause], text: str) -> None:
     """Add a label for every line that takes part, and the behaviours' own needs."""
-    draft.path = draft.path or "/bml"
+    builder.path = builder.path or "/bml"
     for clause in clash:
         of_behaviour = ":" in clause.id
         stated = _STATED.fullmatch(clause.text)
         # Of a behaviour's own points only equalities are in the document; their order is implied.
         if stated is None or clause.line is None or (of_behaviour and stated[2] != "="):
-            draft.notes.append(f"note: {clause.text}")
+            builder.notes.append(f"note: {clause.text}")
             continue
         left, _, right = stated.groups()
         if of_behaviour:
-            spot = _in_behaviour(draft, left, clause.line)
+            spot = _in_behaviour(builder, left, clause.line)
         else:
-            spot = _in_constraint(draft, clause.id, (right, left), clause.line)
-            own = _constraint(draft, clause.id, clause.line) if clause.id == draft.id else None
-            draft.path = draft.source.path(own) if own is not None else draft.path
-        draft.labels.append(Label(spot, clause.text.replace(" is ", " ", 1)))
+            spot = _in_constraint(builder, clause.id, (right, left), clause.line)
+            own = _constraint(builder, clause.id, clause.line) if clause.id == builder.id else None
+            builder.path = builder.source.path(own) if own is not None else builder.path
+        builder.labels.append(Label(spot, clause.text.replace(" is ", " ", 1)))
     cannot = _CANNOT.match(text)
-    draft.head = cannot[0] if cannot else "these cannot all hold"
+    builder.head = cannot[0] if cannot else "these cannot all hold"
     if why := _BECAUSE.search(text):
-        draft.notes.append(f"note: {next(filter(None, why.groups()))}")
+        builder.notes.append(f"note: {next(filter(None, why.groups()))}")
 
 
-def _astray(
-    draft: Draft, name: str, is_constraint: bool, constraint: str | None, line: int | None, said: str
+def _dangling_reference(
+    builder: FindingBuilder,
+    name: str,
+    is_constraint: bool,
+    constraint: str | None,
+    line: int | None,
+    said: str,
 ) -> None:
     """A reference that leads nowhere the scheduler knows."""
-    element = draft.element
+    element = builder.element
     if element is None and is_constraint:
-        element = _constraint(draft, constraint, line)
+        element = _constraint(builder, constraint, line)
     elif element is None:
-        element = draft.source.named(name, line=line, block=draft.block)
-    draft.path = draft.source.path(element) if element is not None else draft.path or "/bml"
-    draft.head = said
+        element = builder.source.named(name, line=line, block=builder.block)
+    builder.path = builder.source.path(element) if element is not None else builder.path or "/bml"
+    builder.head = said
     if element is None:
         if line is not None:
-            draft.labels.append(Label(draft.source.whole_line(line), said))
+            builder.labels.append(Label(builder.source.whole_line(line), said))
         return
     found = _REFERENCE.match(said)
     wanted = "".join(found[1].split()) if found else ""
-    for one in (element, *draft.source.below(element)):
+    for one in (element, *builder.source.below(element)):
         for attribute in one.attributes:
-            if wanted and "".join(draft.source.value(one, attribute).split()) == wanted:
-                draft.labels.append(Label(draft.source.locate_in(one, attribute), said))
+            if wanted and "".join(builder.source.value(one, attribute).split()) == wanted:
+                builder.labels.append(Label(builder.source.locate_in(one, attribute), said))
                 return
-    draft.labels.append(Label(draft.source.name_spot(element), said))
+    builder.labels.append(Label(builder.source.name_spot(element), said))
 
 
-def _in_behaviour(draft: Draft, point: str, line: int) -> Spot:
+def _in_behaviour(builder: FindingBuilder, point: str, line: int) -> Spot:
     id, _, sync = point.partition(":")
-    element = draft.source.named(id, line=line, block=draft.block)
+    element = builder.source.named(id, line=line, block=builder.block)
     if element is None:
-        return draft.source.whole_line(line)
-    if draft.source.value_span(element, sync) is None:
-        for mark in draft.source.below(element):
-            if draft.source.id(mark) == sync:
-                return draft.source.locate_in(mark, "ref")
-    return draft.source.locate_in(element, sync)
+        return builder.source.whole_line(line)
+    if builder.source.value_span(element, sync) is None:
+        for mark in builder.source.below(element):
+            if builder.source.id(mark) == sync:
+                return builder.source.locate_in(mark, "ref")
+    return builder.source.locate_in(element, sync)
 
 
-def _constraint(draft: Draft, id: str | None, line: int | None) -> Element | None:
+def _constraint(builder: FindingBuilder, id: str | None, line: int | None) -> Element | None:
     """A constraint by its id, or the first one on a line."""
-    found = draft.source.named(id, line=line) if id else None
+    found = builder.source.named(id, line=line) if id else None
     if found is None and line is not None:
-        on = (e for e in draft.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")
+        on = (e for e in builder.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")
         found = next(on, None)
     return found
 
 
-def _in_constraint(draft: Draft, id: str | None, refs: tuple[str, ...], line: int) -> Spot:
-    source, found = draft.source, _constraint(draft, id, line)
+def _in_constraint(builder: FindingBuilder, id: str | None, refs: tuple[str, ...], line: int) -> Spot:
+    source, found = builder.source, _constraint(builder, id, line)
     if found is None:
         return source.whole_line(line)
     wanted = ["".join(str(ref).split()) for ref in refs]

@@ -10,7 +10,7 @@ from realizer.checking.finding import Label
 
 
 @dataclass
-class Draft:
+class FindingBuilder:
     """A finding in the making.
 
     Attributes:

@@ -14,7 +14,7 @@ from realizer.playback.player import Player
 from realizer.scheduling.timing import Warning
 
 
-def told_of(block: Block, id: str, type: str, text: str) -> Warning:
+def located_warning(block: Block, id: str, type: str, text: str) -> Warning:
     """A warning of a behaviour, with its place."""
     place = block.places.get(id)
     return Warning(f"{block.id}:{id}", type, text if place is None else place.with_place(text))
@@ -44,7 +44,7 @@ def without_faults(source: Source, items: Sequence[Block | BMLError]) -> list[Bl
     return [item if isinstance(item, Block) else None for item in again]
 
 
-def hidden(block: Block, whole: Block, player: Player, world: PlanningContext) -> Iterator[Warning]:
+def masked_faults(block: Block, whole: Block, player: Player, context: PlanningContext) -> Iterator[Warning]:
     """Return the faults of the behaviours that a block has only without its faults.
 
     Args:
@@ -54,8 +54,8 @@ def hidden(block: Block, whole: Block, player: Player, world: PlanningContext) -
     for node in whole.behaviours:
         kind = player.kinds.get(node.tag)
         if node.id not in known and kind is not None:
-            for fault in kind.check(node, world):
-                yield told_of(whole, node.id, fault.type, fault.text)
+            for fault in kind.check(node, context):
+                yield located_warning(whole, node.id, fault.type, fault.text)
 
 
 def _spans(source: Source, problems: Iterable[Problem]) -> Iterator[tuple[int, int]]:

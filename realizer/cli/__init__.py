@@ -49,7 +49,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
 
     DOC may be - for standard input. Settings may also come from REALIZER_* variables.
     """
-    options.speak_up(context, quiet=quiet, verbose=verbose)
+    options.configure_logging(context, quiet=quiet, verbose=verbose)
 
 
 for command in (
@@ -72,7 +72,7 @@ for command in (
     doctor,
     demo,
 ):
-    options.loudness(command)
+    options.verbosity(command)
     cli.add_command(command)
 
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.realize import PICTURES, performance
+from realizer.cli.realize import PICTURES, performance_options
 
 if TYPE_CHECKING:
-    from realizer.batch.run import Crew
+    from realizer.batch.run import Workers
     from realizer.batch.task import Options
 
 STATUS = ("done", "refused", "failed")
@@ -54,7 +54,7 @@ def _formats(context: click.Context, parameter: click.Parameter, value: tuple[st
 )
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes here.  [default: one a core]")
 @click.option("--dask", metavar="ADDRESS", help="Work on the machines of this Dask scheduler instead.")
-@performance
+@performance_options
 @click.pass_context
 def batch(
     context: click.Context,
@@ -88,7 +88,7 @@ def batch(
         raise click.UsageError(str(error)) from None
     counts: Counter[str] = Counter()
     dropped = 0
-    crew = _crew(how, min(workers or _cores(), len(documents)), dask)
+    crew = _workers(how, min(workers or _cores(), len(documents)), dask)
     try:
         with click.progressbar(
             run(documents, folder, how, crew),
@@ -125,7 +125,7 @@ def _options(formats: tuple[str, ...], asked: dict[str, Any]) -> Options:
     played = chosen.play_options(options.read_scene(chosen.scene))
     voice = find_voice(chosen.voice)
     voice.close()
-    options.tell_silence(chosen.voice)
+    options.warn_no_voice(chosen.voice)
     return Options(
         **vars(played),
         formats=formats,
@@ -145,14 +145,14 @@ def _listed(places: tuple[str, ...]) -> list[str]:
     return named
 
 
-def _crew(how: Options, workers: int, dask: str | None) -> Crew:
+def _workers(how: Options, workers: int, dask: str | None) -> Workers:
     if dask is not None:
-        from realizer.batch.dask_cluster import Cluster
+        from realizer.batch.dask_cluster import DaskCluster
 
-        return Cluster(how, dask)
-    from realizer.batch.process_pool import Processes
+        return DaskCluster(how, dask)
+    from realizer.batch.process_pool import ProcessPool
 
-    return Processes(how, workers)
+    return ProcessPool(how, workers)
 
 
 def _cores() -> int:

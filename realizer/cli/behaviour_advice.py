@@ -9,7 +9,7 @@ from bml_schema import Block, Speech
 from bml_schema.source import Source
 from realizer.checking.advice import ADVICE
 from realizer.checking.finding import Finding, Label
-from realizer.knowledge.advice import Seen, advise
+from realizer.knowledge.advice import VisibleExpression, advise
 from realizer.knowledge.enrich import template_of
 from realizer.speech.words import words_in
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
 
 
-def habits(
+def advise_on_behaviours(
     file: str,
     source: Source,
     block: Block,
@@ -38,7 +38,7 @@ def habits(
         lists: the words that count.
     """
     seen = [
-        Seen(node.id, template, (start + peak) / 2, (relax + end) / 2)
+        VisibleExpression(node.id, template, (start + peak) / 2, (relax + end) / 2)
         for node in block.behaviours
         if (template := template_of(node)) and node.id in schedule.times
         for start, peak, relax, end in [schedule.times[node.id].tolist()]
@@ -57,5 +57,5 @@ def habits(
         path, line = (where.path, where.line) if where is not None else ("/bml", None)
         spot = source.locate(path, line=line, block=block.id)
         id = f"{block.id}:{one.id}" if one.id else block.id
-        whole = f"{one.said}; {one.hint}"
-        yield Finding(file, ADVICE, id, path, whole, one.said, (Label(spot, ""),), (f"help: {one.hint}",))
+        whole = f"{one.text}; {one.hint}"
+        yield Finding(file, ADVICE, id, path, whole, one.text, (Label(spot, ""),), (f"help: {one.hint}",))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.enrich import language, languages_in, mood, role, tell_unknown, words, words_for
+from realizer.cli.enrich import language, languages_in, mood, role, warn_unknown_languages, words, words_for
 from realizer.cli.timeline import advice_on, faults_in, is_timeline
 from realizer.core.options import PlayOptions
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from realizer.tables.knowledge import Mood, Role
 
-MOST_ADVICE = 20  # on one block: one slip is often made all over a document
+MAX_ADVICE = 20  # on one block: one slip is often made all over a document
 
 
 @click.command()
@@ -60,9 +60,9 @@ def check(
     """
     from bml_schema.source import Source
     from realizer.checking.advice import advice
-    from realizer.checking.document import checked
+    from realizer.checking.document import check_document
     from realizer.checking.finding import Finding
-    from realizer.cli.behaviour_advice import habits
+    from realizer.cli.behaviour_advice import advise_on_behaviours
     from realizer.cli.diagnostics import one_line, render
     from realizer.playback.player import Player
 
@@ -97,17 +97,19 @@ def check(
         )
         source = Source(text)
         blocks = found = 0
-        for part in checked(name, source, text, player):
+        for part in check_document(name, source, text, player):
             blocks += part.block is not None
             found += len(part.findings)
             for finding in part.findings:
                 show(finding, source)
             if part.block is not None and part.schedule is not None and not context.obj["quiet"]:
                 slips = advice(name, source, part.block, part.schedule, player)
-                unusual = habits(name, source, part.block, part.schedule, part.said, role, mood, lists)
+                unusual = advise_on_behaviours(
+                    name, source, part.block, part.schedule, part.utterances, role, mood, lists
+                )
                 if context.obj["verbose"]:
-                    tell_unknown(lists, languages_in(part.block, lists), told_languages)
-                for finding in islice(chain(slips, unusual), MOST_ADVICE):
+                    warn_unknown_languages(lists, languages_in(part.block, lists), told_languages)
+                for finding in islice(chain(slips, unusual), MAX_ADVICE):
                     show(finding, source, err=True)
         if not found and not context.obj["quiet"]:
             click.echo(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}", err=True)

@@ -37,7 +37,7 @@ def demo(once: bool, port: int, voice: str | None, face: str) -> None:
 
 def _film(documents: list[str], voice: str | None, face: str) -> None:
     """All examples one after the other into demo.fap and demo.mp4."""
-    from realizer.cli.options import tell_silence
+    from realizer.cli.options import warn_no_voice
     from realizer.core.errors import RealizerError
     from realizer.offline import realize
     from realizer.outputs.output import RenderSettings
@@ -45,7 +45,7 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
 
     appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
     realization = realize(appended, face=face, voice=voice)
-    tell_silence(voice)
+    warn_no_voice(voice)
     for path in (FRAMES, FILM):
         click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
         try:

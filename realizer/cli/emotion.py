@@ -79,18 +79,18 @@ def emotion(
             raise click.UsageError(f"{path}: wanted a name that ends in {' or '.join(suffixes)}")
     if output or chart:
         options.check_camera(face, camera)
-    profile = _asked(word, profiles, angle, activation, valence, arousal, bool(chart))
+    profile = _requested_profile(word, profiles, angle, activation, valence, arousal, bool(chart))
     if profile is not None:
         if output is not None:  # before it is told: who reads only the first lines gets the file too
             _write(profile, seed, output, face, camera)
-        _tell(profile, _mixed(profiles, angle, valence, arousal), seed, as_json)
+        _print_profile(profile, _archetype_shares(profiles, angle, valence, arousal), seed, as_json)
     elif output is not None or as_json or seed is not None:
         raise click.UsageError("wanted a WORD, or a place, for what was asked; got only --wheel")
     if chart is not None:
         _draw_wheel(profiles, chart, face, camera)
 
 
-def _asked(
+def _requested_profile(
     word: str | None,
     profiles: str,
     angle: float | None,
@@ -140,20 +140,20 @@ def _read(path: Path) -> Profile:
     return found[0]
 
 
-def _mixed(
+def _archetype_shares(
     profiles: str, angle: float | None, valence: float | None, arousal: float | None
 ) -> Mapping[str, float]:
     """How much of which archetype is at a place; nothing of a word, whose name says what it is."""
-    from realizer.emotions.wheel import shares
+    from realizer.emotions.wheel import blend_weights
 
     if angle is not None:
-        return shares(angle, profiles)
+        return blend_weights(angle, profiles)
     if valence is not None and arousal is not None:
-        return shares(math.degrees(math.atan2(arousal, valence)), profiles, "affect")
+        return blend_weights(math.degrees(math.atan2(arousal, valence)), profiles, "affect")
     return {}
 
 
-def _tell(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_json: bool) -> None:
+def _print_profile(profile: Profile, mixed: Mapping[str, float], seed: int | None, as_json: bool) -> None:
     from realizer.emotions.profile import Profile
     from realizer.tables import faps
 

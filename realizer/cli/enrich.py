@@ -16,7 +16,7 @@ from realizer.core.options import PlayOptions
 
 if TYPE_CHECKING:
     from bml_schema import Block
-    from realizer.knowledge.enrich import Enricher, Heard
+    from realizer.knowledge.enrich import Enricher, SpokenText
     from realizer.knowledge.word_languages import Words
 
 FILES = (".bml", ".xml", ".txt")  # a single word that ends so is meant to be a file
@@ -83,11 +83,11 @@ def words_for(language: str | None, file: Path | None) -> Words:
     return Words(options.settings(language=language).language, own, everywhere=language is None)
 
 
-def tell_unknown(words: Words, languages: Iterable[str], told: set[str]) -> None:
+def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[str]) -> None:
     """A word on standard error for each language without a list of words that is not told yet."""
     for language in languages:
-        if language not in told and words.of(language) is None:
-            told.add(language)
+        if language not in warned and words.of(language) is None:
+            warned.add(language)
             click.echo(
                 f"no emotional words for language {language!r}: none of its words counts; see --words",
                 err=True,
@@ -151,8 +151,8 @@ def enrich(
         blocks = list(enricher.texts(clean, MAX_TEXT))
         languages = [lists.language]
     if not context.obj["quiet"]:
-        tell_unknown(lists, languages, set())
-        if language is None and words is None and _elsewhere(said, lists.language):
+        warn_unknown_languages(lists, languages, set())
+        if language is None and words is None and _is_foreign(said, lists.language):
             click.echo(
                 f"none of this is in the letters of {lists.language!r}, so that none of its words counts; see"
                 " --language and --words",
@@ -163,12 +163,12 @@ def enrich(
         sys.stdout.write(result)
     else:
         output.write_text(result, "utf-8")
-        placed = sum(map(_placed, blocks)) - before
+        placed = sum(map(_count_placed, blocks)) - before
         click.echo(f"{output}: {placed} expression{'s' * (placed != 1)} placed", err=True)
     return 1 if faults else 0
 
 
-def _elsewhere(said: str | bytes, language: str) -> bool:
+def _is_foreign(said: str | bytes, language: str) -> bool:
     """Whether a text that is taken for English has letters, and none of them are English ones."""
     if isinstance(said, bytes) or language.partition("-")[0].lower() != "en":
         return False
@@ -176,7 +176,7 @@ def _elsewhere(said: str | bytes, language: str) -> bool:
     return bool(letters) and not any(letter.isascii() for letter in letters)
 
 
-def _placed(block: Block) -> int:
+def _count_placed(block: Block) -> int:
     """How many expressions of a block say which rule placed them."""
     return sum(bool(getattr(node, "because", "")) for node in block.behaviours)
 
@@ -243,18 +243,18 @@ def _documents(text: str | bytes, enricher: Enricher) -> tuple[list[Block], int,
                         " of ours is: nothing is placed in it",
                         err=True,
                     )
-            before += _placed(item)
+            before += _count_placed(item)
             blocks.append(enricher.block(item))
         else:
-            heard = _heard(item, enricher.words.language)
+            heard = _spoken_texts(item, enricher.words.language)
             blocks.append(enricher.listener(heard, f"{item.id}-listener"))
     return blocks, before, faults, languages
 
 
-def _heard(block: Block, language: str) -> list[Heard]:
+def _spoken_texts(block: Block, language: str) -> list[SpokenText]:
     """The texts of a block, each when it begins as the block is scheduled."""
     from bml_schema import Speech
-    from realizer.knowledge.enrich import Heard
+    from realizer.knowledge.enrich import SpokenText
     from realizer.knowledge.word_languages import language_of
     from realizer.playback.player import Player
     from realizer.playback.speaking import submit_with_speech
@@ -262,7 +262,7 @@ def _heard(block: Block, language: str) -> list[Heard]:
 
     times = submit_with_speech(Player(PlayOptions(language=language)), block, SilentVoice()).times
     said = [
-        Heard(str(node.text), float(times[node.id][0]), language_of(node, block, language))
+        SpokenText(str(node.text), float(times[node.id][0]), language_of(node, block, language))
         for node in block.behaviours
         if isinstance(node, Speech) and node.text is not None and node.id in times
     ]

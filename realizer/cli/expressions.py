@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from realizer.analysis.picture_search import Likeness
     from realizer.expressions.expression import Expression
 
-LEAST_LIKE = 0.4  # the best cosine of a picture that shows anything: a head that idles makes 0.3
+MIN_LIKE = 0.4  # the best cosine of a picture that shows anything: a head that idles makes 0.3
 as_json = click.option("--json", "as_json", is_flag=True, help="As JSON instead of lines.")
 picture = click.option(
     "-o", "--output", metavar="SHEET.png", type=click.Path(path_type=Path), help="Draw what is told."
@@ -62,7 +62,7 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
 
     _check_picture(output, face)
     known = list(library_of(options.settings(expressions=expressions).expressions).values())
-    _tell(known, [""] * len(known), as_json)
+    _print_matches(known, [""] * len(known), as_json)
     if output is not None:
         _draw(known, [one.units for one in known], output, face)
 
@@ -111,14 +111,14 @@ def find(
         found = by_action_units(units, known)
     else:
         assert like is not None
-        seen = _looked_up(like, known, face)
-        face, found = seen.face, [pair for pair in seen.found if pair[1] > 0]
-        if found and found[0][1] < LEAST_LIKE:
+        seen = _find_similar(like, known, face)
+        face, found = seen.face, [pair for pair in seen.matches if pair[1] > 0]
+        if found and found[0][1] < MIN_LIKE:
             found = []
         click.echo(f"{like}: {seen.face}, {seen.light}{', neutral' if seen.neutral else ''}", err=True)
     found = found[:most]
     scores = [f"{score:.2f}" for _, score in found]
-    _tell([one for one, _ in found], scores, as_json)
+    _print_matches([one for one, _ in found], scores, as_json)
     if not found:
         asked = repr(text) if text is not None else "that"
         click.echo(f"nothing in the library goes with {asked}; `realizer expressions list` has all", err=True)
@@ -127,7 +127,7 @@ def find(
     return 0 if found else 1
 
 
-def _looked_up(like: Path, known: Sequence[Expression], face: str | None) -> Likeness:
+def _find_similar(like: Path, known: Sequence[Expression], face: str | None) -> Likeness:
     from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
     try:
@@ -143,7 +143,7 @@ def _check_picture(output: Path | None, face: str) -> None:
         options.check_camera(face, "close")
 
 
-def _tell(found: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
+def _print_matches(found: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:
     if as_json:
         told = [
             one.to_json() | ({"score": float(score)} if score else {})

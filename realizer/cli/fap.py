@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
-from realizer.cli.realize import perform, performing
+from realizer.cli.realize import output_options, play_documents
 
 if TYPE_CHECKING:
     from realizer.animation.fap.fap_clip import FAPClip
@@ -98,7 +98,7 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
     clip = clip if fps is None else clip.resampled(fps)
     if suffix == ".fap":
         clip = clip_to_range(clip)
-    _tell(context, file, clip)
+    _print_info(context, file, clip)
     name = clip.name or Path(output).stem
     try:
         write_text(Path(output), ENCODINGS[suffix](replace(clip, name=name)))
@@ -110,7 +110,7 @@ def convert(context: click.Context, file: str, output: str, fps: float | None, e
 
 @fap.command()
 @file
-@performing
+@output_options
 @click.pass_context
 def play(context: click.Context, /, file: str, **asked: Any) -> int:
     """Play a file into any output of `realizer outputs`, visemes and expressions (FAP 1, 2) too.
@@ -129,7 +129,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
     from realizer.core.errors import RealizerError
 
     clip = expand_compound(_read(file))
-    _tell(context, file, clip)
+    _print_info(context, file, clip)
     if len(clip.values) == 1:
         count = 1 + max(1, round(HELD * clip.fps))
         values, visemes, expressions = (
@@ -147,7 +147,7 @@ def play(context: click.Context, /, file: str, **asked: Any) -> int:
             "`realizer fap convert --fps` makes fewer of them"
         )
     fps = asked["fps"] if asked["fps"] is not None else min(clip.fps, FASTEST)
-    return perform(context, lambda: [document.encode()], asked | {"fps": fps})
+    return play_documents(context, lambda: [document.encode()], asked | {"fps": fps})
 
 
 def _read(file: str) -> FAPClip:
@@ -161,7 +161,7 @@ def _read(file: str) -> FAPClip:
         raise _refused(file, error) from None
 
 
-def _tell(context: click.Context, file: str, clip: FAPClip) -> None:
+def _print_info(context: click.Context, file: str, clip: FAPClip) -> None:
     if not context.obj["quiet"]:
         for note in clip.notes:
             click.echo(f"{file}: {note}", err=True)

@@ -102,7 +102,7 @@ def play_settings(asked: Mapping[str, Any], **flags: Any) -> Settings:
     return settings(**flags, idle=False if asked["no_idle"] else None)
 
 
-def playing(command: Command) -> Command:
+def playback_options(command: Command) -> Command:
     """--voice, --scene, --media, --expressions and --strict."""
     for option in (
         click.option("--strict", is_flag=True, help="Exit 1 if any behaviour was dropped."),
@@ -143,7 +143,7 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
         raise click.UsageError(f"{path}: {error}") from None
 
 
-def tell_silence(voice: str | None) -> None:
+def warn_no_voice(voice: str | None) -> None:
     """A word on standard error where nobody asked for silence and there is no voice."""
     from realizer.speech.registry import find_voice, voices
 
@@ -152,7 +152,7 @@ def tell_silence(voice: str | None) -> None:
         click.echo(f"realizer: no voice is installed, speech is silent; {missing}", err=True)
 
 
-def tell(warnings: Iterable[Warning]) -> None:
+def print_warnings(warnings: Iterable[Warning]) -> None:
     """Warnings of documents, one line each, on standard error."""
     for warning in warnings:
         click.echo(f"{warning.id}: {warning.type}: {warning.text}", err=True)
@@ -178,7 +178,7 @@ def check_light(name: str | None) -> None:
     from realizer.render.light import preset
 
     if name is not None:
-        _asked(preset, name)
+        _checked_value(preset, name)
 
 
 def background(command: Command) -> Command:
@@ -196,7 +196,7 @@ def colour(command: Command) -> Command:
 def _background(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
     from realizer.render.backdrop import colour_of
 
-    return None if value is None else _asked(colour_of, value)
+    return None if value is None else _checked_value(colour_of, value)
 
 
 def _colour(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
@@ -205,7 +205,7 @@ def _colour(context: click.Context, parameter: click.Parameter, value: str | Non
     return _background(context, parameter, value)
 
 
-def _asked(check: Callable[[str], object], value: str) -> str:
+def _checked_value(check: Callable[[str], object], value: str) -> str:
     """The value, where `check` takes it; what it says otherwise is about how it was called."""
     from realizer.core.errors import RenderError
 
@@ -227,33 +227,35 @@ def check_camera(face: str, name: str) -> None:
 
     if name not in PRESETS:  # a face may bring its own
         try:
-            _asked(lambda name: camera_for(load_face(face), name), name)
+            _checked_value(lambda name: camera_for(load_face(face), name), name)
         except click.BadParameter as error:
             raise click.BadParameter(error.message, param_hint="--camera") from None
 
 
-def loudness(command: click.Command) -> None:
+def verbosity(command: click.Command) -> None:
     """Let a command, or each command of a group, take -q and -v as `realizer` itself does."""
     if isinstance(command, click.Group):
         for member in command.commands.values():
-            loudness(member)
+            verbosity(member)
         return
     taken = {flag for parameter in command.params for flag in parameter.opts}
     for flags, words in ((("-q", "--quiet"), QUIET), (("-v", "--verbose"), VERBOSE)):
         if not taken & set(flags):
-            option = click.Option(flags, is_flag=True, expose_value=False, callback=_loud, help=words)
+            option = click.Option(
+                flags, is_flag=True, expose_value=False, callback=_set_verbosity, help=words
+            )
             command.params.append(option)
 
 
 VERBOSE, QUIET = "Say more on standard error.", "Say nothing but errors on standard error."
 
 
-def _loud(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+def _set_verbosity(context: click.Context, parameter: click.Parameter, value: bool) -> None:
     if value:
-        speak_up(context, **{str(parameter.name): True})
+        configure_logging(context, **{str(parameter.name): True})
 
 
-def speak_up(context: click.Context, *, quiet: bool = False, verbose: bool = False) -> None:
+def configure_logging(context: click.Context, *, quiet: bool = False, verbose: bool = False) -> None:
     """Say as much on standard error as was asked for, before or after the command's name."""
     import logging
 

@@ -16,7 +16,7 @@ from realizer.core.options import PlayOptions
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from realizer.charts.timeline import BlockLine
+    from realizer.charts.timeline import BlockChart
     from realizer.playback.player import Player
     from realizer.scheduling.timing import Schedule
 
@@ -27,10 +27,10 @@ DRAWN = ("size", "camera", "at", "light", "background", "visemes")  # fields of 
 FULL = (errno.ENOSPC, errno.EFBIG)
 
 
-def performance(command: options.Command) -> options.Command:
+def performance_options(command: options.Command) -> options.Command:
     """What can be asked of any performance: how documents are played, and how they are drawn."""
     for option in (
-        options.playing,
+        options.playback_options,
         options.mapping,
         options.cooccurrence,
         options.prosody,
@@ -52,10 +52,10 @@ def performance(command: options.Command) -> options.Command:
     return command
 
 
-def performing(command: options.Command) -> options.Command:
+def output_options(command: options.Command) -> options.Command:
     """What can be asked of a performance that is written to a file."""
     for option in (
-        performance,
+        performance_options,
         click.option(
             "--visemes", is_flag=True, help="With .fap: FAP 1 too, the two visemes that are said most."
         ),
@@ -78,18 +78,18 @@ def performing(command: options.Command) -> options.Command:
 
 @click.command()
 @options.documents
-@performing
+@output_options
 @click.pass_context
 def realize(context: click.Context, /, documents: tuple[str, ...], **asked: Any) -> int:
     """Play documents offline and write frames, pictures, sound or film.
 
     Several documents are submitted at 0 s in order; their composition attributes apply.
     """
-    return perform(context, lambda: options.read_documents(documents), asked)
+    return play_documents(context, lambda: options.read_documents(documents), asked)
 
 
-def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict[str, Any]) -> int:
-    """Play the documents that `read` gives, as the options of `performing` ask; returns the exit status.
+def play_documents(context: click.Context, read: Callable[[], list[bytes]], asked: dict[str, Any]) -> int:
+    """Play the documents that `read` gives, as the options of `output_options` ask; returns the exit status.
 
     They are read when all that was asked has been found possible.
 
@@ -127,8 +127,8 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
 
     realization = play(texts, chosen.play_options(options.read_scene(chosen.scene)), chosen.voice)
     if any(speaking.utterance.pcm is None for speaking in realization.speeches):
-        options.tell_silence(chosen.voice)
-    options.tell(realization.warnings)
+        options.warn_no_voice(chosen.voice)
+    options.print_warnings(realization.warnings)
     if writer is None:
         json.dump(realization.to_json(), sys.stdout)
         sys.stdout.write("\n")
@@ -163,7 +163,7 @@ def perform(context: click.Context, read: Callable[[], list[bytes]], asked: dict
 @click.option("--detail", is_flag=True, help="With --json: gaps, what ties them, and what was dropped, too.")
 @click.option("-o", "--output", metavar="FILE", help="Where to, instead of here.")
 @click.option("--plot", metavar="FILE", help="Draw the timeline, as .svg or .png, instead of a table.")
-@options.playing
+@options.playback_options
 def schedule(
     documents: tuple[str, ...],
     as_json: bool,
@@ -206,18 +206,18 @@ def schedule(
     )
     texts = options.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
-    schedules = [_moved(player, planned) for planned in accepted]
+    schedules = [_final_schedule(player, planned) for planned in accepted]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
-        options.tell_silence(chosen.voice)
-    options.tell(w for w in refused if not any(w in s.warnings for s in schedules))
+        options.warn_no_voice(chosen.voice)
+    options.print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
-        options.tell(planned.warnings)
+        options.print_warnings(planned.warnings)
     if as_bml:
         words = _as_documents(texts, schedules)
     elif as_json:
         out: Any = [s.to_json() for s in schedules]
         if detail:
-            out = [told | line.detail() for told, line in zip(out, _lines(player, accepted), strict=True)]
+            out = [told | line.detail() for told, line in zip(out, _charts(player, accepted), strict=True)]
         words = json.dumps(out[0] if len(out) == 1 and len(documents) == 1 else out, indent=1) + "\n"
     else:
         words = "" if plot is not None else "".join(_table(planned) for planned in schedules)
@@ -233,7 +233,7 @@ def schedule(
     return 1 if refused or (strict and any(s.dropped for s in schedules)) else 0
 
 
-def _moved(player: Player, planned: Schedule) -> Schedule:
+def _final_schedule(player: Player, planned: Schedule) -> Schedule:
     """The schedule as later documents moved it; as it was planned where they ended it before its time."""
     latest = player.latest(planned)
     return latest if latest.times.keys() == planned.times.keys() else planned
@@ -253,16 +253,16 @@ def _plot(player: Player, accepted: list[Schedule], plot: str) -> None:
     from realizer.charts.write_chart import write_timeline
 
     try:
-        write_timeline(_lines(player, accepted), plot)
+        write_timeline(_charts(player, accepted), plot)
     except OSError as error:
         raise click.UsageError(f"{plot}: {error.strerror or error}") from None
 
 
-def _lines(player: Player, accepted: list[Schedule]) -> list[BlockLine]:
+def _charts(player: Player, accepted: list[Schedule]) -> list[BlockChart]:
     """The blocks of these schedules as charts and their data show them."""
-    from realizer.charts.chart_data import lines_of
+    from realizer.charts.chart_data import charts_of
 
-    return lines_of(player.blocks, accepted)
+    return charts_of(player.blocks, accepted)
 
 
 def _table(planned: Schedule) -> str:

@@ -132,5 +132,5 @@ def serve(config: Path | None, **flags: Any) -> None:
     options.check_camera(settings.face, settings.camera)
     options.check_light(settings.light)
     find_voice(settings.voice).close()  # a voice that is not installed is said before a door opens
-    options.tell_silence(settings.voice)
+    options.warn_no_voice(settings.voice)
     run(start(settings))

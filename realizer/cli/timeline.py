@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import click
 
 from realizer.cli import options
-from realizer.cli.realize import perform, performing
+from realizer.cli.realize import output_options, play_documents
 
 if TYPE_CHECKING:
     from realizer.expressions.library import Library
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
 
 SUFFIXES = (".toml", ".json")
-MOST_ADVICE = 20
+MAX_ADVICE = 20
 OWN = "urn:bml-realizer:1"
 CORE = "http://www.bml-initiative.org/bml/bml-1.0"
 
 
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@performing
+@output_options
 @click.pass_context
 def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
     """Play a timeline: channels of expressions that grow out of each other (Wojdel 2005, 5.4).
@@ -66,7 +66,7 @@ def timeline(context: click.Context, /, file: Path, **asked: Any) -> int:
         return 1
     node = f'<own:timeline id="timeline" fileName={quoteattr(file.name)}/>'
     document = f'<bml xmlns="{CORE}" xmlns:own="{OWN}" id="timeline">{node}</bml>'
-    return perform(context, lambda: [document.encode()], asked | {"media": file.parent})
+    return play_documents(context, lambda: [document.encode()], asked | {"media": file.parent})
 
 
 def is_timeline(name: str) -> bool:
@@ -93,24 +93,24 @@ def advice_on(content: bytes, library: Library, role: Role, mood: Mood | None) -
 
     timeline = read_timeline(content)
     found = chain(remarks(timeline), _advice(timeline, library, role, mood))
-    return list(islice(found, MOST_ADVICE))
+    return list(islice(found, MAX_ADVICE))
 
 
 def _advice(timeline: Timeline, library: Library, role: Role, mood: Mood | None) -> Iterator[str]:
     from bml_schema import Block
-    from realizer.expressions.spans import evident
-    from realizer.knowledge.advice import Seen, advise, lasting
+    from realizer.expressions.spans import visible_spans
+    from realizer.knowledge.advice import VisibleExpression, advise, duration_advice
 
     seen = []
-    for place, expression, begin, end in evident(timeline, library):
+    for place, expression, begin, end in visible_spans(timeline, library):
         family, _, template = expression.name.rpartition(":")
         if family == "template" and expression.file is None:
-            seen.append(Seen(place, template, begin, end))
+            seen.append(VisibleExpression(place, template, begin, end))
             continue
         source = str(expression.file or expression.source)
-        for one in lasting(
+        for one in duration_advice(
             place, expression.name, end - begin, expression.possible, expression.probable, source
         ):
-            yield f"{one.id}: {one.said}; {one.hint}"
+            yield f"{one.id}: {one.text}; {one.hint}"
     for one in advise(Block(id="timeline"), seen, {}, role, mood):
-        yield f"{one.id + ': ' if one.id else ''}{one.said}; {one.hint}"
+        yield f"{one.id + ': ' if one.id else ''}{one.text}; {one.hint}"

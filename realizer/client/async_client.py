@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
-from realizer.client.message_router import ClientError, Frame, Mail, Until, blank
+from realizer.client.message_router import BlockWaiter, ClientError, Frame, Router, is_blank
 from realizer.client.speech import Speech
 from realizer.protocol.messages.common import ANSWERS
 
@@ -34,12 +34,12 @@ class Client:
         self._connect = connect
         self.welcome: Mapping[str, Any] = {}
         self._socket = socket
-        self._mail = Mail()
+        self._router = Router()
         self._news = asyncio.Condition()
         self._ended = False
-        self._why = ""
+        self._close_reason = ""
         self._reader = asyncio.create_task(self._read())
-        self._asking = asyncio.Lock()
+        self._request_lock = asyncio.Lock()
 
     @property
     def session(self) -> str:
@@ -49,7 +49,7 @@ class Client:
     @property
     def errors(self) -> list[dict[str, Any]]:
         """What the service refused of messages that have no answer."""
-        return list(self._mail.errors)
+        return list(self._router.errors)
 
     async def send(self, bml: str) -> None:
         """Send one or more BML documents.
@@ -57,7 +57,7 @@ class Client:
         Raises:
             ClientError: the connection has ended.
         """
-        self._mail.sent(bml)
+        self._router.on_sent(bml)
         await self._post(bml)
 
     async def control(self, type: str, **fields: Any) -> None:
@@ -77,11 +77,11 @@ class Client:
         """
         if type not in ANSWERS:
             raise ValueError(f"wanted one of {', '.join(ANSWERS)}, which are answered; got {type}")
-        async with self._asking:
-            self._mail.ask(type)
+        async with self._request_lock:
+            self._router.expect_answer(type)
             await self.control(type, **fields)
-            await self.wait_for(lambda: self._mail.answered)
-            return self._mail.answer()
+            await self.wait_for(lambda: self._router.has_answer)
+            return self._router.answer()
 
     async def subscribe(self, stream: str, **fields: Any) -> dict[str, Any]:
         """Ask for a stream (fap, au, arkit, mesh, audio, video, schedule); returns what its values mean.
@@ -101,21 +101,21 @@ class Client:
         Raises:
             ClientError: the block was refused, or the connection ended.
         """
-        until = await self.follow(bml)
-        await self.wait_for(lambda: until.over)
+        until = await self.send_and_follow(bml)
+        await self.wait_for(lambda: until.is_finished)
         return until.end()
 
-    async def follow(self, bml: str) -> Until:
+    async def send_and_follow(self, bml: str) -> BlockWaiter:
         """Send BML and return what its last block does from now on: when it starts, whether it has ended.
 
         Raises:
             ClientError: there is nothing in the text, or the connection has ended.
         """
-        if blank(bml):
+        if is_blank(bml):
             raise ClientError("wanted <bml>, got nothing", "refused")
-        self._mail.sent(bml)
-        until = Until(self._mail.last_block)
-        self._mail.follow(until)
+        self._router.on_sent(bml)
+        until = BlockWaiter(self._router.last_block)
+        self._router.add_listener(until)
         await self._post(bml)
         return until
 
@@ -141,7 +141,7 @@ class Client:
             opening: composition, character, language of the message `speech`.
         """
         speech = Speech(id, self.control, self.wait_for, self._check, opening)
-        self._mail.follow(speech.heard)
+        self._router.add_listener(speech.progress)
         try:
             yield speech
         except BaseException:
@@ -155,16 +155,16 @@ class Client:
         """Feedback as it comes, until the connection ends; each is given to one iterator."""
         with contextlib.suppress(ClientError):
             while True:
-                await self.wait_for(lambda: bool(self._mail.feedback))
-                yield self._mail.feedback.popleft()
+                await self.wait_for(lambda: bool(self._router.feedback))
+                yield self._router.feedback.popleft()
 
     async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
         """Feedback up to the end (or the refusal) of a block: by default the last one that was sent."""
-        until = Until(block or self._mail.last_block)
+        until = BlockWaiter(block or self._router.last_block)
         async for feedback in self.feedback():
             yield feedback
-            until.tell(feedback)
-            if until.over:
+            until.on_feedback(feedback)
+            if until.is_finished:
                 return
 
     async def frames(self, stream: str) -> AsyncIterator[Frame]:
@@ -173,7 +173,7 @@ class Client:
         A WireFrame has in `told` what the service has told of its stream when it came. That changes while a
         mesh runs, when its character gets another face; `vertices` of a mesh goes by it.
         """
-        kept = self._mail.of(stream)
+        kept = self._router.queue_of(stream)
         with contextlib.suppress(ClientError):
             while True:
                 await self.wait_for(lambda: bool(kept))
@@ -196,7 +196,7 @@ class Client:
         from realizer.client.record import record
 
         # A connection of its own: what this one has subscribed to stays.
-        return await record(self._connect(_joining(self.url, self.session)), Path(path), bml, fps, look)
+        return await record(self._connect(_join_url(self.url, self.session)), Path(path), bml, fps, look)
 
     async def close(self) -> None:
         """Say goodbye."""
@@ -217,11 +217,11 @@ class Client:
         try:
             while True:
                 message = await self._socket.recv()
-                self._mail.put(message)
+                self._router.receive(message)
                 async with self._news:
                     self._news.notify_all()
         except ConnectionClosed as closed:
-            self._why = closed.rcvd.reason if closed.rcvd is not None else ""
+            self._close_reason = closed.rcvd.reason if closed.rcvd is not None else ""
         finally:
             self._ended = True
             async with self._news:
@@ -229,10 +229,12 @@ class Client:
 
     def _check(self) -> None:
         if self._ended:
-            raise ClientError("the connection has ended" + (f": {self._why}" if self._why else ""))
+            raise ClientError(
+                "the connection has ended" + (f": {self._close_reason}" if self._close_reason else "")
+            )
 
 
-def _joining(url: str, session: str) -> str:
+def _join_url(url: str, session: str) -> str:
     """Return the address of another connection to the same session."""
     parts = urlsplit(url)
     others = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]

@@ -11,7 +11,7 @@ from realizer.client.sync_client import SyncClient
 from realizer.protocol.messages.common import PROTOCOL
 
 
-def connect(url: str, *, token: str | None = None) -> Connecting:
+def connect(url: str, *, token: str | None = None) -> PendingConnection:
     """`async with connect("ws://127.0.0.1:8765/ws?session=show") as client`, or `with` and no event loop.
 
     Without a session's name it is one of the client's own.
@@ -24,10 +24,10 @@ def connect(url: str, *, token: str | None = None) -> Connecting:
         ClientError: the service speaks another version of the protocol, wants another token, or refuses what
             the address says; or it is no such service.
     """
-    return Connecting(url, token)
+    return PendingConnection(url, token)
 
 
-class Connecting:
+class PendingConnection:
     """What `connect` gives: a Client inside `async with`, a SyncClient inside `with`."""
 
     def __init__(self, url: str, token: str | None = None) -> None:
@@ -35,7 +35,7 @@ class Connecting:
         self._token = token
         self._dial: Any = None
         self._client: Client | None = None
-        self._plain: SyncClient | None = None
+        self._sync_client: SyncClient | None = None
 
     async def __aenter__(self) -> Client:
         from websockets.asyncio.client import connect as dial
@@ -48,7 +48,7 @@ class Connecting:
             raise _refusal(refused.response.status_code, bytes(refused.response.body)) from None
         except WebSocketException as error:
             raise ClientError(f"{self._url}: {error}") from None
-        self._client = Client(socket, self._url, lambda url: Connecting(url, self._token))
+        self._client = Client(socket, self._url, lambda url: PendingConnection(url, self._token))
         said = {"version": PROTOCOL} if self._token is None else {"version": PROTOCOL, "token": self._token}
         try:
             self._client.welcome = await self._client.ask("hello", **said)
@@ -64,14 +64,14 @@ class Connecting:
         await self._client.close()
 
     def __enter__(self) -> SyncClient:
-        self._plain = SyncClient(Connecting(self._url, self._token))
-        return self._plain
+        self._sync_client = SyncClient(PendingConnection(self._url, self._token))
+        return self._sync_client
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._plain is not None
-        self._plain.close()
+        assert self._sync_client is not None
+        self._sync_client.close()
 
 
 def _refusal(status: int, body: bytes) -> ClientError:

@@ -15,8 +15,8 @@ from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.wire import WireFrame, unpack
 
 # Frames and feedback kept for an iterator that is slower than the service; older ones are dropped.
-KEPT = 1_000
-KEPT_FEEDBACK = 10_000
+MAX_FRAMES = 1_000
+MAX_FEEDBACK = 10_000
 _COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 
@@ -40,29 +40,29 @@ class ClientError(RealizerError):
         return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
 
 
-def blank(bml: str) -> bool:
+def is_blank(bml: str) -> bool:
     """Whether there is nothing in a text that the service would answer."""
     return not _COMMENT.sub("", bml).strip()
 
 
-class Follower(Protocol):
+class Listener(Protocol):
     """Who hears feedback until it is over."""
 
     @property
-    def over(self) -> bool:
+    def is_finished(self) -> bool:
         """Nothing more of what it follows will come."""
         ...
 
-    def tell(self, feedback: Feedback) -> None:
+    def on_feedback(self, feedback: Feedback) -> None:
         """One message of feedback; most are of others."""
         ...
 
-    def blame(self, error: dict[str, Any]) -> None:
+    def on_error(self, error: dict[str, Any]) -> None:
         """An error about a message that has no answer; most are of others."""
         ...
 
 
-class Mail:
+class Router:
     """What has come and nobody has taken yet.
 
     Attributes:
@@ -71,47 +71,47 @@ class Mail:
     """
 
     def __init__(self) -> None:
-        self.feedback: deque[Feedback] = deque(maxlen=KEPT_FEEDBACK)
+        self.feedback: deque[Feedback] = deque(maxlen=MAX_FEEDBACK)
         self.frames: dict[str, deque[Frame]] = {}
-        self.errors: deque[dict[str, Any]] = deque(maxlen=KEPT)
+        self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
         self.last_block: str | None = None
         self._asked: str | None = None
         self._answer: dict[str, Any] | None = None
-        self._followers: list[Follower] = []
+        self._listeners: list[Listener] = []
         self._told: dict[tuple[str, int], dict[str, Any]] = {}  # stream, index -> what its frames mean
 
-    def put(self, message: str | bytes) -> None:
+    def receive(self, message: str | bytes) -> None:
         if isinstance(message, bytes):
             frame = unpack(message)
             told = self._told.get((frame.stream, frame.character))
-            self.of(frame.stream).append(replace(frame, told=told))
+            self.queue_of(frame.stream).append(replace(frame, told=told))
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] == "schedule" or "values" in reply:
-                self.of(reply["type"]).append(reply)
+                self.queue_of(reply["type"]).append(reply)
             else:
                 self._reply(reply)
         else:
             feedback = parse_feedback(message)
             self.feedback.append(feedback)
-            for one in self._followers:
-                one.tell(feedback)
-            self._followers = [one for one in self._followers if not one.over]
+            for one in self._listeners:
+                one.on_feedback(feedback)
+            self._listeners = [one for one in self._listeners if not one.is_finished]
 
-    def sent(self, bml: str) -> None:
+    def on_sent(self, bml: str) -> None:
         found = _BLOCK_ID.findall(_COMMENT.sub("", bml))
         self.last_block = unescape(found[-1]) if found else None
 
-    def of(self, stream: str) -> deque[Frame]:
+    def queue_of(self, stream: str) -> deque[Frame]:
         """The newest messages of a stream; of `schedule` all, as each says what has changed since another."""
-        return self.frames.setdefault(stream, deque(maxlen=None if stream == "schedule" else KEPT))
+        return self.frames.setdefault(stream, deque(maxlen=None if stream == "schedule" else MAX_FRAMES))
 
-    def ask(self, type: str) -> None:
+    def expect_answer(self, type: str) -> None:
         """From now on the next answer to a message of that type is for `answer`."""
         self._asked, self._answer = type, None
 
     @property
-    def answered(self) -> bool:
+    def has_answer(self) -> bool:
         return self._answer is not None
 
     def answer(self) -> dict[str, Any]:
@@ -120,9 +120,9 @@ class Mail:
             raise ClientError.of(self._answer)
         return self._answer
 
-    def follow(self, follower: Follower) -> None:
+    def add_listener(self, follower: Listener) -> None:
         """Let somebody hear all feedback from now on; whoever iterates gets it all the same."""
-        self._followers.append(follower)
+        self._listeners.append(follower)
 
     def _reply(self, reply: dict[str, Any]) -> None:
         asked = self._asked
@@ -138,11 +138,11 @@ class Mail:
             self._asked, self._answer = None, reply
         elif reply["type"] in ("error", "gap"):
             self.errors.append(reply)
-            for one in self._followers:
-                one.blame(reply)
+            for one in self._listeners:
+                one.on_error(reply)
 
 
-class Until:
+class BlockWaiter:
     """Whether a block has ended, from its feedback: its end, or the warning that it was refused.
 
     Attributes:
@@ -157,10 +157,10 @@ class Until:
         self._planned = False
 
     @property
-    def over(self) -> bool:
+    def is_finished(self) -> bool:
         return self.last is not None
 
-    def tell(self, feedback: Feedback) -> None:
+    def on_feedback(self, feedback: Feedback) -> None:
         """One message of feedback; most are of others."""
         match feedback:
             case BlockProgress(id=id) if id == f"{self.block}:start":
@@ -173,7 +173,7 @@ class Until:
             case PredictionFeedback():
                 self._planned |= any(b.id == self.block and b.global_end is not None for b in feedback.blocks)
 
-    def blame(self, error: dict[str, Any]) -> None:
+    def on_error(self, error: dict[str, Any]) -> None:
         """What is wrong with a block is told in feedback."""
 
     def end(self) -> BlockProgress:

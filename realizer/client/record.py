@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bml_schema.feedback import BlockProgress
-from realizer.client.message_router import ClientError, Frame, Until
+from realizer.client.message_router import BlockWaiter, ClientError, Frame
 from realizer.core.array_types import Int16, UInt8
 from realizer.protocol.wire import WireFrame
 
@@ -33,7 +33,7 @@ class Camera(Protocol):
 
     def frames(self, stream: str) -> AsyncIterator[Frame]: ...
 
-    async def follow(self, bml: str) -> Until: ...
+    async def send_and_follow(self, bml: str) -> BlockWaiter: ...
 
     async def wait_for(self, condition: Callable[[], bool]) -> None: ...
 
@@ -59,12 +59,12 @@ async def record(
         pictures: list[WireFrame] = []
         packets: list[WireFrame] = []
         taking = [
-            asyncio.create_task(_take(camera, "video", pictures)),
-            asyncio.create_task(_take(camera, "audio", packets)),
+            asyncio.create_task(_collect(camera, "video", pictures)),
+            asyncio.create_task(_collect(camera, "audio", packets)),
         ]
         await camera.wait_for(lambda: bool(pictures) or bool(camera.errors))
-        until = await camera.follow(bml)
-        await camera.wait_for(lambda: until.over)
+        until = await camera.send_and_follow(bml)
+        await camera.wait_for(lambda: until.is_finished)
         end = until.end()
         assert until.start is not None
         # The picture of the last instant is still being drawn.
@@ -74,7 +74,7 @@ async def record(
         for task in taking:
             task.cancel()
     count = int((end.global_time - until.start) * fps) + 1
-    shown = _each(pictures, until.start, fps, count)
+    shown = _film_frames(pictures, until.start, fps, count)
     sound = _sound(packets, until.start, count / fps)
 
     def write() -> None:
@@ -85,13 +85,13 @@ async def record(
     return end
 
 
-async def _take(camera: Camera, stream: str, kept: list[WireFrame]) -> None:
+async def _collect(camera: Camera, stream: str, kept: list[WireFrame]) -> None:
     async for frame in camera.frames(stream):
         assert isinstance(frame, WireFrame)
         kept.append(frame)
 
 
-def _each(pictures: Sequence[WireFrame], start: float, fps: float, count: int) -> Iterator[UInt8]:
+def _film_frames(pictures: Sequence[WireFrame], start: float, fps: float, count: int) -> Iterator[UInt8]:
     """The newest picture at each frame of the film."""
     from PIL import Image
 

@@ -16,7 +16,7 @@ LONGEST = 20_000  # characters that one message may append
 PAUSE = 0.01  # s
 
 
-class Heard:
+class SpeechProgress:
     """What was told of a speech; knows no sockets.
 
     Attributes:
@@ -33,7 +33,7 @@ class Heard:
         self.refused: str | None = None
         self.fault: dict[str, Any] | None = None
 
-    def blame(self, error: dict[str, Any]) -> None:
+    def on_error(self, error: dict[str, Any]) -> None:
         """An error about a message that has no answer; most are of others."""
         if (error.get("where"), error.get("id")) == ("speech.id", self._id):
             self.fault = error
@@ -46,7 +46,7 @@ class Heard:
         if self.fault is not None:
             raise ClientError.of(self.fault)
 
-    def tell(self, feedback: Feedback) -> None:
+    def on_feedback(self, feedback: Feedback) -> None:
         """One message of feedback; most are of others."""
         match feedback:
             case SyncPointProgress(id=id):
@@ -58,12 +58,12 @@ class Heard:
             case WarningFeedback(id=id) if id == self._id:
                 self.refused = feedback.text
 
-    def knows(self, sync: str) -> bool:
+    def has_passed(self, sync: str) -> bool:
         """Whether that sync has been said, or never will be."""
-        return sync in self.points or self.over
+        return sync in self.points or self.is_finished
 
     @property
-    def over(self) -> bool:
+    def is_finished(self) -> bool:
         return any(known is not None for known in (self.end, self.refused, self.fault))
 
     def point(self, sync: str) -> float:
@@ -77,7 +77,7 @@ class Heard:
             raise ClientError(self.refused or f"the speech {self._id} has ended without a sync {sync!r}")
         return self.points[sync]
 
-    def ended(self) -> BlockProgress:
+    def result(self) -> BlockProgress:
         """Its end.
 
         Raises:
@@ -108,7 +108,7 @@ class Speech:
         opening: dict[str, Any],
     ) -> None:
         self.id = id
-        self.heard = Heard(id)
+        self.progress = SpeechProgress(id)
         self._control = control
         self._wait = wait
         self._check = check
@@ -127,7 +127,7 @@ class Speech:
             ClientError: it was closed, here or by the service, because the connection that it came by had
                 ended before it was whole. Or this connection has ended.
         """
-        self.heard.check()
+        self.progress.check()
         self._check()  # what waits for its turn would be lost in silence
         if self._closed:
             raise ClientError(f"the speech {self.id} was closed: nothing can follow", "refused")
@@ -145,7 +145,7 @@ class Speech:
         if self._closed:
             return
         self._closed = True
-        if self.heard.fault is None:
+        if self.progress.fault is None:
             await self._flush(close=True)
 
     async def stop(self) -> None:
@@ -159,8 +159,8 @@ class Speech:
         Raises:
             ClientError: the speech has ended without it, was refused, or the connection has ended.
         """
-        await self._wait(lambda: self.heard.knows(sync))
-        return self.heard.point(sync)
+        await self._wait(lambda: self.progress.has_passed(sync))
+        return self.progress.point(sync)
 
     async def ended(self) -> BlockProgress:
         """Wait until all is said, or it was cut off: then `said` are the words that were heard.
@@ -168,8 +168,8 @@ class Speech:
         Raises:
             ClientError: it was refused, or the connection has ended.
         """
-        await self._wait(lambda: self.heard.over)
-        return self.heard.ended()
+        await self._wait(lambda: self.progress.is_finished)
+        return self.progress.result()
 
     async def _flush(self, *, close: bool = False) -> None:
         async with self._sending:  # in order: a text may take several messages

@@ -65,7 +65,7 @@ def strength_at(activation: float | None) -> float:
     return activation / most
 
 
-def shares(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str, float]:
+def blend_weights(angle: float, profiles: str = "own", ring: str = "paul") -> dict[str, float]:
     """Archetype -> how much of it shows at that angle; the one or two shares add up to 1."""
     pairs = neighbours(angle, profiles, ring)
     return {_plain(anchor.profile.name): share for anchor, share in pairs if share}

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.intermediate import between
 from realizer.emotions.profile import Profile
-from realizer.emotions.wheel import NEUTRAL, neighbours, shares, wheel
+from realizer.emotions.wheel import NEUTRAL, blend_weights, neighbours, wheel
 from realizer.tables.wheel_words import own_words, ring, whissell_words
 
 
@@ -79,7 +79,7 @@ def strength_of(place: WordPlace) -> float:
     """
     if place.activation is None:
         return 1.0
-    parts = shares(place.angle, "own", place.ring)
+    parts = blend_weights(place.angle, "own", place.ring)
     return place.activation / sum(
         share * (ring(place.ring)[name].activation or 0.0) for name, share in parts.items()
     )

@@ -59,7 +59,7 @@ class Expression:
         return self.onset + self.apex + self.offset
 
     @property
-    def evident(self) -> float:
+    def visible_duration(self) -> float:
         """Seconds for which it can be seen: the apex, and half of rising and going."""
         return self.onset / 2 + self.apex + self.offset / 2
 

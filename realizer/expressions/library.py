@@ -66,7 +66,7 @@ class Library(Mapping[str, Expression]):
 
 
 @cache
-def shipped() -> Library:
+def builtin() -> Library:
     """The twelve templates of Wojdel, as "template:...", and every face lexeme.
 
     Raises:
@@ -81,13 +81,13 @@ def library_of(folder: Path | None = None) -> Library:
     Raises:
         TableError: files that are no expressions; every fault, with file and key.
     """
-    return shipped() if folder is None else _with_own(folder.resolve())
+    return builtin() if folder is None else _with_own(folder.resolve())
 
 
 @lru_cache(maxsize=16)
 def _with_own(folder: Path) -> Library:
     own = read_folder(folder)
-    library = Library([*shipped().values(), *own])
+    library = Library([*builtin().values(), *own])
     for note in library.notes:
         log.warning(note)
     if not own:

@@ -63,12 +63,12 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
     return found
 
 
-def lasts(timeline: Timeline, library: Mapping[str, Expression]) -> float:
+def duration_of(timeline: Timeline, library: Mapping[str, Expression]) -> float:
     """Seconds to the end of the longest track."""
     return max(spans(track, library)[-1].end for track in timeline.tracks)
 
 
-def evident(
+def visible_spans(
     timeline: Timeline, library: Mapping[str, Expression]
 ) -> Iterator[tuple[str, Expression, float, float]]:
     """(place, expression, begin, end) of each entry but breaks: the seconds from when to when it can be seen.

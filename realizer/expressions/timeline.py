@@ -81,19 +81,19 @@ def faults_of(timeline: Timeline, library: Library) -> list[str]:
     ]
 
 
-def remarks(timeline: Timeline, takes: Collection[str] | None = None) -> list[str]:
+def remarks(timeline: Timeline, inputs: Collection[str] | None = None) -> list[str]:
     """Yield mixer requests of a timeline that have no effect, a sentence each.
 
     Args:
-        takes: what moves the face (`Face.takes`); None: it is not known.
+        inputs: what moves the face (`Face.takes`); None: it is not known.
     """
     if timeline.mixer == "additive":
         told = 'order: no effect, a sum has no order; wanted mixer = "successive"'
         return [told] if timeline.order else []
-    if takes is None:
+    if inputs is None:
         return []
-    if "successive" not in takes:
+    if "successive" not in inputs:
         return ["mixer: no effect, FAPs move this face; wanted a face that action units move (deformer au)"]
-    aside = [str(au) for au in timeline.order if f"rank {au}" not in takes]
+    aside = [str(au) for au in timeline.order if f"rank {au}" not in inputs]
     told = f"order: no effect on {', '.join(aside)}, which this face does not mix with other action units"
     return [told] if aside else []

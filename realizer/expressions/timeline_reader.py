@@ -46,7 +46,7 @@ def read_timeline(content: bytes) -> Timeline:
         raise TableError(f"wanted a timeline in TOML or JSON, got: {error}") from None
     if not isinstance(told, dict):
         raise TableError(f'timeline: wanted {{"channel": [...]}}, got a {type(told).__name__}')
-    reading = _Reading()
+    reading = _TimelineReader()
     timeline = reading.timeline(told)
     if reading.faults:
         raise TableError("\n".join(reading.faults))
@@ -58,7 +58,7 @@ def _is_json(text: str) -> bool:
     return re.match(r"\s*(\{|\[\s*[{\]])", text) is not None
 
 
-class _Reading:
+class _TimelineReader:
     """The faults of a file while it is read."""
 
     def __init__(self) -> None:

@@ -48,7 +48,7 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             faults.append(f"{path}: wanted TOML, got: {error}")
             continue
-        reading = _Reading(path, row)
+        reading = _FileReader(path, row)
         one = reading.expression()
         faults += reading.faults
         if one is None:
@@ -62,7 +62,7 @@ def read_folder(folder: Path) -> tuple[Expression, ...]:
     return tuple(found.values())
 
 
-class _Reading:
+class _FileReader:
     """One file and its faults."""
 
     def __init__(self, path: Path, row: dict[str, Any]) -> None:
@@ -80,15 +80,19 @@ class _Reading:
         possible, probable = self._range("possible"), self._range("probable")
         features, source = self._text("features"), self._text("source")
         if possible and probable and not possible[0] <= probable[0] < probable[1] <= possible[1]:
-            self._fault("probable", f"a range within the possible one, {_said(possible)}", _said(probable))
+            self._fault(
+                "probable", f"a range within the possible one, {_range_text(possible)}", _range_text(probable)
+            )
         if self.faults:
             return None
         found = Expression(
             name, features, means, aus, (onset, apex, offset), possible, probable, source, self.path
         )
-        if possible and not possible[0] - 1e-6 <= found.evident <= possible[1] + 1e-6:
-            wanted = f"a time with which it is seen for the possible {_said(possible)}"
-            self._fault("apex", wanted, f"{found.evident:.3g} s (half of onset and offset, and the apex)")
+        if possible and not possible[0] - 1e-6 <= found.visible_duration <= possible[1] + 1e-6:
+            wanted = f"a time with which it is seen for the possible {_range_text(possible)}"
+            self._fault(
+                "apex", wanted, f"{found.visible_duration:.3g} s (half of onset and offset, and the apex)"
+            )
             return None
         return found
 
@@ -166,5 +170,5 @@ def _number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _said(ends: tuple[float, float]) -> str:
+def _range_text(ends: tuple[float, float]) -> str:
     return f"{ends[0]:g} to {ends[1]:g} s" if ends[1] < math.inf else f"{ends[0]:g} s or more"

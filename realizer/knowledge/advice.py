@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from bml_schema import Block, Speech
-from realizer.knowledge.placement_rules import place
+from realizer.knowledge.placement_rules import place_expressions
 from realizer.knowledge.sentences import Sentence, sentences
 from realizer.knowledge.word_languages import ENGLISH, Words, language_of
 from realizer.tables.emotional_words import WordList
-from realizer.tables.knowledge import Company, Mood, Placing, Role, knowledge
+from realizer.tables.knowledge import CompanionRule, Mood, PlacementRule, Role, knowledge
 from realizer.tables.templates import templates
 
 NEAR = 1.0  # s; nearer expressions are "in the neighbourhood" (6.3.3)
@@ -21,7 +21,7 @@ RATIO = 2.0  # a pace that differs from the mood's by more than that is another 
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class VisibleExpression:
     """A template that a block shows: the behaviour's id, and from when to when it is evident, in seconds."""
 
     id: str
@@ -36,18 +36,18 @@ class Advice:
 
     Attributes:
         id: of the behaviour that it is about; "" for the whole block.
-        said: what is unusual, and the rule.
+        text: what is unusual, and the rule.
         hint: what would be usual.
     """
 
     id: str
-    said: str
+    text: str
     hint: str
 
 
 def advise(
     block: Block,
-    seen: Sequence[Seen],
+    seen: Sequence[VisibleExpression],
     words: Mapping[str, Sequence[tuple[int, float]]],
     role: Role = "speaker",
     mood: Mood | None = None,
@@ -73,13 +73,15 @@ def advise(
             if isinstance(node, Speech) and node.text is not None:
                 language = language_of(node, block, lists.language)
                 text = sentences(str(node.text), language)
-                yield from _kept(node.id, text, seen, dict(words.get(node.id, ())), lists.of(language))
+                yield from _missing_expressions(
+                    node.id, text, seen, dict(words.get(node.id, ())), lists.of(language)
+                )
     else:
         yield from _listening(seen)
     yield from _pace(seen, role, mood)
 
 
-def _length(one: Seen, mood: Mood | None) -> Iterator[Advice]:
+def _length(one: VisibleExpression, mood: Mood | None) -> Iterator[Advice]:
     """Yield durations that nobody was seen to show, and those that are unusual, also for the mood.
 
     Of some templates the mean is beyond what table 6.15 calls probable; the mean is not unusual.
@@ -92,10 +94,10 @@ def _length(one: Seen, mood: Mood | None) -> Iterator[Advice]:
         most = max(probable[1], template.evident + FRAME) * max(usual, 1.0)
         if probable[0] * min(usual, 1.0) <= lasts <= most:
             probable = None
-    yield from lasting(one.id, one.template, lasts, template.possible, probable, source)
+    yield from duration_advice(one.id, one.template, lasts, template.possible, probable, source)
 
 
-def lasting(
+def duration_advice(
     id: str,
     name: str,
     lasts: float,
@@ -129,7 +131,7 @@ def _range(seconds: tuple[float, float]) -> str:
     return f"{low:g} to {high:g} s" if high < float("inf") else f"{low:g} s or longer"
 
 
-def _apart(one: Seen, seen: Sequence[Seen]) -> Iterator[Advice]:
+def _apart(one: VisibleExpression, seen: Sequence[VisibleExpression]) -> Iterator[Advice]:
     room = knowledge().apart.get(one.template)
     if room is None:
         return
@@ -142,7 +144,9 @@ def _apart(one: Seen, seen: Sequence[Seen]) -> Iterator[Advice]:
             return
 
 
-def _company(one: Seen, company: Company, seen: Sequence[Seen]) -> Iterator[Advice]:
+def _company(
+    one: VisibleExpression, company: CompanionRule, seen: Sequence[VisibleExpression]
+) -> Iterator[Advice]:
     others = seen if company.offered else [other for other in seen if other.template == company.other]
     if any(o is not one and o.start - NEAR < one.end and one.start < o.end + NEAR for o in others):
         return
@@ -150,26 +154,30 @@ def _company(one: Seen, company: Company, seen: Sequence[Seen]) -> Iterator[Advi
     yield Advice(one.id, f"{one.template} stands alone", company.says + adds)
 
 
-def _kept(
-    id: str, text: Sequence[Sentence], seen: Sequence[Seen], times: dict[int, float], words: WordList | None
+def _missing_expressions(
+    id: str,
+    text: Sequence[Sentence],
+    seen: Sequence[VisibleExpression],
+    times: dict[int, float],
+    words: WordList | None,
 ) -> Iterator[Advice]:
     """Yield words that usually have an expression which is missing."""
-    for placement in place(text, knowledge(), "speaker", None, words):
+    for placement in place_expressions(text, knowledge(), "speaker", None, words):
         at = times.get(placement.word.place)
         if not placement.rule.keep or at is None:
             continue
-        missing = [name for name in placement.rule.show if not _shown(name, at, seen)]
+        missing = [name for name in placement.rule.show if not _is_visible(name, at, seen)]
         if missing:
             word = placement.word.text
             yield Advice(id, f'"{word}" is said without {", ".join(missing)}', placement.rule.says)
 
 
-def _shown(name: str, at: float, seen: Sequence[Seen]) -> bool:
+def _is_visible(name: str, at: float, seen: Sequence[VisibleExpression]) -> bool:
     return any(one.template == name and one.start - NEAR < at < one.end + NEAR for one in seen)
 
 
-def _listening(seen: Sequence[Seen]) -> Iterator[Advice]:
-    rules: tuple[Placing, ...] = knowledge().placings["listener"]
+def _listening(seen: Sequence[VisibleExpression]) -> Iterator[Advice]:
+    rules: tuple[PlacementRule, ...] = knowledge().placings["listener"]
     offered = list(dict.fromkeys(name for rule in rules for name in rule.show))
     companions = {c.other for c in knowledge().companies if c.of in offered}
     for one in seen:
@@ -178,7 +186,7 @@ def _listening(seen: Sequence[Seen]) -> Iterator[Advice]:
             yield Advice(one.id, f"a listener shows {one.template}", hint)
 
 
-def _pace(seen: Sequence[Seen], role: Role, mood: Mood | None) -> Iterator[Advice]:
+def _pace(seen: Sequence[VisibleExpression], role: Role, mood: Mood | None) -> Iterator[Advice]:
     """Expressions that come too often for a listener, or at another pace than the mood's."""
     groups = _groups(seen)
     if len(groups) < FEW:
@@ -198,7 +206,7 @@ def _pace(seen: Sequence[Seen], role: Role, mood: Mood | None) -> Iterator[Advic
             yield Advice("", f"{says}: {'often' if often else 'rarely'} for the mood {mood.name!r}", hint)
 
 
-def _groups(seen: Sequence[Seen]) -> list[tuple[float, float]]:
+def _groups(seen: Sequence[VisibleExpression]) -> list[tuple[float, float]]:
     """Spans of expressions that overlap count as one."""
     groups: list[tuple[float, float]] = []
     for one in seen:

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from bml_schema import Block, Expression, Speech, Sync, SyncRef
 from bml_schema.behaviours import SpeechText
-from realizer.knowledge.placement_rules import Placement, place
+from realizer.knowledge.placement_rules import Placement, place_expressions
 from realizer.knowledge.sentences import sentences
 from realizer.knowledge.word_languages import ENGLISH, Words, language_of
-from realizer.tables.knowledge import Company, Knowledge, Mood, Role, knowledge
+from realizer.tables.knowledge import CompanionRule, Knowledge, Mood, Role, knowledge
 from realizer.tables.templates import Template, apex, templates
 
 PREFIX = "template:"
@@ -34,7 +34,7 @@ def template_of(node: object) -> str:
     return " ".join(name.removeprefix(PREFIX).replace("-", " ").replace("_", " ").split())
 
 
-class Heard(NamedTuple):
+class SpokenText(NamedTuple):
     """A text, the second at which it begins, and its language (BCP-47)."""
 
     text: str
@@ -59,7 +59,7 @@ class Enricher:
     def text(self, text: str, block: str = "bml1") -> Block:
         """Return a block that says `text` with a speaker's face, or that shows a listener."""
         if self.role == "listener":
-            return self.listener((Heard(text, 0.0, self.words.language),), block)
+            return self.listener((SpokenText(text, 0.0, self.words.language),), block)
         named = "" if self.words.everywhere else self.words.language
         speech = Speech(id="speech1", text=SpeechText(parts=(text,), language=named))
         return self.block(Block(id=block, children=(speech,)))
@@ -87,7 +87,7 @@ class Enricher:
 
         Expressions of the block stay; enriching twice adds nothing.
         """
-        names = _Names(block)
+        names = _IdFactory(block)
         speeches: dict[str, Speech] = {}
         placed: list[Expression] = []
         for node in block.behaviours:
@@ -100,9 +100,9 @@ class Enricher:
         children = _replaced(block.children, speeches)
         return replace(block, children=(*children, *placed), places={})
 
-    def listener(self, said: Iterable[Heard], block: str) -> Block:
+    def listener(self, said: Iterable[SpokenText], block: str) -> Block:
         """Return a block of expressions for a listener to these texts."""
-        names = _Names(Block(id=block))
+        names = _IdFactory(Block(id=block))
         placed: list[Expression] = []
         for text, begin, language in said:
             for placement in self._placements(text, language):
@@ -115,13 +115,13 @@ class Enricher:
 
     def _placements(self, text: str, language: str) -> tuple[Placement, ...]:
         words = self.words.of(language)
-        return place(sentences(text, language), self.knowledge, self.role, self.mood, words)
+        return place_expressions(sentences(text, language), self.knowledge, self.role, self.mood, words)
 
     @property
     def knowledge(self) -> Knowledge:
         return knowledge()
 
-    def _speech(self, node: Speech, block: Block, names: _Names) -> tuple[Speech, list[Expression]]:
+    def _speech(self, node: Speech, block: Block, names: _IdFactory) -> tuple[Speech, list[Expression]]:
         """The speech with a mark before each word that something begins at, and what begins there."""
         assert node.text is not None
         marks = _marks(node.text.parts)
@@ -140,18 +140,20 @@ class Enricher:
         return replace(node, text=replace(node.text, parts=_marked(node.text.parts, new))), placed
 
     def _expression(
-        self, name: str, start: SyncRef, because: str, names: _Names, end: SyncRef | None = None
+        self, name: str, start: SyncRef, because: str, names: _IdFactory, end: SyncRef | None = None
     ) -> Expression:
         id = names.behaviour(name)
         syncs: dict[str, SyncRef] = {"start": start}
         if end is not None:
             syncs["end"] = end
         elif self.mood is not None:
-            held = _held(templates()[name.upper()], self.mood.length)
+            held = _hold_seconds(templates()[name.upper()], self.mood.length)
             syncs["relax"] = SyncRef(behaviour=id, sync="attackPeak", offset=round(held, 3))
         return Expression(id=id, name=PREFIX + name, intensity=INTENSITY, because=because, syncs=syncs)
 
-    def _company(self, node: Expression, beside: Sequence[Expression], names: _Names) -> Iterator[Expression]:
+    def _company(
+        self, node: Expression, beside: Sequence[Expression], names: _IdFactory
+    ) -> Iterator[Expression]:
         """Return the accompanying expressions that are missing."""
         for company in self.knowledge.companies:
             if company.offered or company.of != template_of(node):
@@ -196,30 +198,30 @@ def _last(rising: Sequence[int], most: int) -> int:
     return rising[found - 1] if found else 0
 
 
-class _Names:
+class _IdFactory:
     """Ids that nothing in a block has yet."""
 
     def __init__(self, block: Block) -> None:
-        self.taken = {node.id for node in block.behaviours}
+        self.used = {node.id for node in block.behaviours}
         self.numbers: dict[str, int] = {}
 
     def behaviour(self, stem: str) -> str:
         return self._new(stem.replace(" ", "-"))
 
     def mark(self, speech: Speech) -> str:
-        self.taken.update((*speech.marked, *speech.sync_points))
+        self.used.update((*speech.marked, *speech.sync_points))
         return self._new("w")
 
     def _new(self, stem: str) -> str:
         number = self.numbers.get(stem, 1)
-        while f"{stem}{number}" in self.taken:
+        while f"{stem}{number}" in self.used:
             number += 1
         self.numbers[stem] = number + 1
-        self.taken.add(f"{stem}{number}")
+        self.used.add(f"{stem}{number}")
         return f"{stem}{number}"
 
 
-def _around(node: Expression, company: Company) -> tuple[SyncRef | None, SyncRef | None]:
+def _around(node: Expression, company: CompanionRule) -> tuple[SyncRef | None, SyncRef | None]:
     """Return start and end of the other expression; no start if there is no room."""
 
     def point(sync: str, offset: float = 0.0) -> SyncRef:
@@ -241,7 +243,7 @@ def _refers(node: Expression, id: str) -> bool:
     return any(ref.behaviour == id for ref in node.syncs.values())
 
 
-def _held(template: Template, length: float) -> float:
+def _hold_seconds(template: Template, length: float) -> float:
     """Return the seconds from attackPeak to relax that show it `length` times as long as usual."""
     seen = template.evident * length
     if template.possible is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from realizer.knowledge.sentences import Sentence, SpokenWord
 from realizer.tables.emotional_words import WordList
-from realizer.tables.knowledge import Knowledge, Mood, Placing, Role
+from realizer.tables.knowledge import Knowledge, Mood, PlacementRule, Role
 
 # A negation applies to a word at most so many words after it: "not so very bad".
 REACH = 3
@@ -24,11 +24,11 @@ class Placement:
         word: the index of its first word.
     """
 
-    rule: Placing
+    rule: PlacementRule
     word: SpokenWord
 
 
-def place(
+def place_expressions(
     text: Sequence[Sentence],
     knowledge: Knowledge,
     role: Role = "speaker",
@@ -57,7 +57,7 @@ def place(
     return tuple(sorted(kept, key=lambda one: one.word.place))
 
 
-def _asked(sentence: Sentence, rules: Sequence[Placing], words: WordList | None) -> Iterator[Placement]:
+def _asked(sentence: Sentence, rules: Sequence[PlacementRule], words: WordList | None) -> Iterator[Placement]:
     """Yield the placements of one sentence; the first rule for a place wins."""
     categories = _categories(sentence, words)
     taken: set[int] = set()
@@ -70,7 +70,7 @@ def _asked(sentence: Sentence, rules: Sequence[Placing], words: WordList | None)
                 yield Placement(rule, sentence.words[index])
 
 
-def _places(rule: Placing, sentence: Sentence, categories: Sequence[str]) -> list[int]:
+def _places(rule: PlacementRule, sentence: Sentence, categories: Sequence[str]) -> list[int]:
     """Indices of the words at which a rule asks for something."""
     if rule.when in ("question", "exclamation"):
         return [len(sentence.words) - 1] if getattr(sentence, rule.when) else []

@@ -31,7 +31,7 @@ from realizer.playback.block_store import BlockStore
 from realizer.playback.character import RELAX, Character
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
-from realizer.tables.cooccurrence import chosen
+from realizer.tables.cooccurrence import load_rules
 
 # Frames up to this long before `now` can still be asked for.
 HISTORY = 1.0  # s
@@ -77,7 +77,7 @@ class Player:
         self.idle = options.idle
         self.prosody = options.prosody
         self.history = history
-        self.rules = chosen(options.cooccurrence)
+        self.rules = load_rules(options.cooccurrence)
         self._characters: list[Character] = [Character(None)]
         self._manager = BlockManager(kinds, self._characters, veto)
 

@@ -81,7 +81,7 @@ def nearest(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_known()[one] for one in found))
 
 
-def gathered(names: Iterable[str]) -> tuple[dict[str, list[str]], tuple[str, ...]]:
+def group_names(names: Iterable[str]) -> tuple[dict[str, list[str]], tuple[str, ...]]:
     """ARKit name -> the file's names for it; and the names that are none of ARKit's."""
     found: dict[str, list[str]] = {}
     foreign = []

@@ -60,7 +60,7 @@ class Rules:
     rules: tuple[Rule, ...]
 
 
-def chosen(setting: str) -> Rules | None:
+def load_rules(setting: str) -> Rules | None:
     """The rules of "on" (those that ship), "off" (none), or a file.
 
     Raises:

@@ -20,7 +20,7 @@ SENTENCES = ("question", "exclamation")
 
 
 @dataclass(frozen=True, slots=True)
-class Placing:
+class PlacementRule:
     """The expressions shown for a kind of sentence, or for a word of a category.
 
     Attributes:
@@ -39,7 +39,7 @@ class Placing:
 
 
 @dataclass(frozen=True, slots=True)
-class Company:
+class CompanionRule:
     """An expression that comes with another one.
 
     Attributes:
@@ -88,8 +88,8 @@ class Knowledge:
         moods: word -> mood.
     """
 
-    placings: Mapping[Role, tuple[Placing, ...]]
-    companies: tuple[Company, ...]
+    placings: Mapping[Role, tuple[PlacementRule, ...]]
+    companies: tuple[CompanionRule, ...]
     apart: Mapping[str, float]
     usual_distance: float
     listener_distance: float
@@ -129,27 +129,27 @@ def knowledge() -> Knowledge:
     )
 
 
-def _placing(row: Mapping[str, Any], role: str) -> Placing:
+def _placing(row: Mapping[str, Any], role: str) -> PlacementRule:
     place = f"{FILE}, {role}"
-    _check_keys(row, Placing, place)
+    _check_keys(row, PlacementRule, place)
     for category in (row["when"], *row.get("unless", ())):
         if category not in (*SENTENCES, *CATEGORIES):
             known = ", ".join((*SENTENCES, *CATEGORIES))
             raise TableError(f"{place}: wanted one of {known}, got {category!r}")
     show = tuple(_template(name, place) for name in row["show"])
-    return Placing(row["when"], show, row["says"], tuple(row.get("unless", ())), row.get("keep", False))
+    return PlacementRule(row["when"], show, row["says"], tuple(row.get("unless", ())), row.get("keep", False))
 
 
-def _company(row: Mapping[str, Any]) -> Company:
+def _company(row: Mapping[str, Any]) -> CompanionRule:
     values = dict(row)
     values["other"] = _template(values.pop("is"), f"{FILE}, company")
     values["of"] = _template(values["of"], f"{FILE}, company")
-    _check_keys(values, Company, f"{FILE}, company of {values['of']}")
+    _check_keys(values, CompanionRule, f"{FILE}, company of {values['of']}")
     if values["by"] not in ("before", "after", "around", "with"):
         raise TableError(
             f"{FILE}, company of {values['of']}, by: wanted before, after, around or with; got {values['by']}"
         )
-    return Company(**values)
+    return CompanionRule(**values)
 
 
 def _check_keys(row: Mapping[str, Any], kind: type, place: str) -> None:

@@ -36,10 +36,10 @@ class Template:
     probable: tuple[float, float] | None = None
 
 
-def apex(seen: float) -> float:
-    """Seconds from attackPeak to relax of what can be seen for `seen`: half of rising and going counts."""
+def apex(visible: float) -> float:
+    """Seconds from attackPeak to relax of what can be seen for `visible`: half of rising and going counts."""
     onset, _, offset = gaps("face").gaps
-    return max(seen - onset.preferred / 2 - offset.preferred / 2, 0.0)
+    return max(visible - onset.preferred / 2 - offset.preferred / 2, 0.0)
 
 
 @cache

@@ -35,7 +35,7 @@ os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
 
 from stopwatch import Noise
 
-from realizer.batch.process_pool import Processes
+from realizer.batch.process_pool import ProcessPool
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Worker
 from realizer.speech.espeak.voice import WORDS_A_MINUTE
@@ -210,7 +210,7 @@ def peer(seconds: int, ours: float) -> None:
 
 def film(count: int) -> None:
     """From the start of the two workers and of what draws for them, and from when both have one film done."""
-    crew = Processes(Options(formats=(".mp4",), voice="silent", size=(512, 512)), 2)
+    crew = ProcessPool(Options(formats=(".mp4",), voice="silent", size=(512, 512)), 2)
     used, began = spent(), time.perf_counter()
     came: list[tuple[float, float]] = []
     noise = Noise()

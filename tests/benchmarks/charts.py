@@ -19,7 +19,7 @@ import json
 
 from stopwatch import helped, median, noise
 
-from realizer.charts.chart_data import lines_of
+from realizer.charts.chart_data import charts_of
 from realizer.charts.picture import timeline
 from realizer.charts.raster import png
 from realizer.charts.svg import svg
@@ -50,10 +50,10 @@ def stream(count: int) -> None:
 def picture(count: int) -> None:
     player = Player(PlayOptions(idle=False))
     schedules, _ = plan([faces(count)], player)
-    blocks = lines_of(player.blocks, schedules)
+    blocks = charts_of(player.blocks, schedules)
     drawn = timeline(blocks)
     few = 20 if count < 100 else 3
-    data = median(lambda: json.dumps(lines_of(player.blocks, schedules)[0].to_json()), few)
+    data = median(lambda: json.dumps(charts_of(player.blocks, schedules)[0].to_json()), few)
     layout = median(lambda: timeline(blocks), few)
     text = median(lambda: svg(drawn), few)
     pixels = median(lambda: png(drawn), 1)

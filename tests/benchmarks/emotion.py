@@ -20,7 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from realizer.analysis.faps_from_mesh import faps_from_mesh, points_of
-from realizer.analysis.faps_from_points import as_features_see, faps_from_features, features_from_points
+from realizer.analysis.faps_from_points import faps_from_features, features_from_points, measurable_profile
 from realizer.analysis.recognise import Recogniser, recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
@@ -60,7 +60,7 @@ def through_mesh(
 def through_features(face: Face, known: Recogniser, profiles: Sequence[Profile], draws: int) -> Counts:
     """The same by the 15 features alone, without noise."""
     chance = np.random.default_rng(0)
-    known = Recogniser([as_features_see(profile) for profile in known.profiles])
+    known = Recogniser([measurable_profile(profile) for profile in known.profiles])
     rest = {name: face.vertices[index] for name, index in face.feature_points.items()}
     found: Counts = {}
     for profile in profiles:

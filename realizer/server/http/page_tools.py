@@ -34,7 +34,7 @@ def lint(text: str, settings: Settings) -> str:
     """
     from bml_schema.source import Source
     from realizer.checking.advice import advice
-    from realizer.checking.document import checked
+    from realizer.checking.document import check_document
     from realizer.playback.player import Player
 
     if len(text) > MAX_TEXT:
@@ -43,7 +43,7 @@ def lint(text: str, settings: Settings) -> str:
     source = Source(text)
     found: list[Finding] = []
     player = Player(PlayOptions(idle=False, media=settings.media, expressions=settings.expressions))
-    for part in checked("document", source, text, player):
+    for part in check_document("document", source, text, player):
         found += part.findings
         if part.block is not None and part.schedule is not None:
             found += islice(advice("document", source, part.block, part.schedule, player), MAX_FINDINGS)
@@ -80,7 +80,7 @@ def preview_emotion(asked: str) -> str:
     from bml_schema import Emotion
     from realizer.behaviours import emotion
     from realizer.behaviours.kind import PlanningContext
-    from realizer.emotions.wheel import shares
+    from realizer.emotions.wheel import blend_weights
 
     fields = {k: v for k, v in _object(asked).items() if k in ("name", "angle", "activation", "profile")}
     node = Emotion(id="asked", **fields)
@@ -89,7 +89,7 @@ def preview_emotion(asked: str) -> str:
         if wrong:
             raise ToolError(wrong)
         values = emotion.values_of(node)
-        mixed = shares(node.angle, node.profile or "own") if node.angle is not None else {}
+        mixed = blend_weights(node.angle, node.profile or "own") if node.angle is not None else {}
     except (TypeError, ValueError) as error:
         raise ToolError(f"feeling: {error}") from None
     return json.dumps(

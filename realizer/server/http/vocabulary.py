@@ -111,7 +111,7 @@ def _attribute(
 
 def _values() -> dict[str, list[str]]:
     from realizer.emotions.words import known_words
-    from realizer.expressions.library import shipped
+    from realizer.expressions.library import builtin
     from realizer.tables.lexemes import face_lexemes, head_lexemes
 
     words = sorted(known_words())
@@ -123,7 +123,7 @@ def _values() -> dict[str, list[str]]:
         "mood name": words,
         "emotion profile": ["own", "published", "raw"],
         "mood profile": ["own", "published", "raw"],
-        "expression name": list(shipped()),
+        "expression name": list(builtin()),
         "fap number": [str(fap["fap"]) for fap in _faps()],
     }
 

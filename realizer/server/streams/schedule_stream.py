@@ -6,8 +6,8 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from realizer.charts.chart_data import line_of
-from realizer.charts.timeline import BlockLine
+from realizer.charts.chart_data import chart_of
+from realizer.charts.timeline import BlockChart
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_states import State
 from realizer.playback.block_store import BlockStore
@@ -98,8 +98,8 @@ class ScheduleStream:
             seen.text = _json(self._chart(seen).to_json())
         return seen.text
 
-    def _chart(self, seen: Snapshot) -> BlockLine:
-        return line_of(seen.playing, self._cast.schedule_of)
+    def _chart(self, seen: Snapshot) -> BlockChart:
+        return chart_of(seen.playing, self._cast.schedule_of)
 
 
 def schedule_message(time: float, blocks: str, character: str | None, *, whole: bool) -> str:

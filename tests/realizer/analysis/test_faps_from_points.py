@@ -7,11 +7,11 @@ import pytest
 
 from realizer.analysis.faps_from_mesh import points_of
 from realizer.analysis.faps_from_points import (
-    as_features_see,
     faps_from_features,
     faps_from_points,
     features_from_faps,
     features_from_points,
+    measurable_profile,
 )
 from realizer.emotions.profile import Profile
 from realizer.face.deform import deform
@@ -109,7 +109,7 @@ def test_a_feature_of_several_faps_gives_each_an_equal_part() -> None:
 
 
 def test_a_profile_as_features_see_it_has_lids_together_and_the_outer_lips_for_the_inner() -> None:
-    told = as_features_see(
+    told = measurable_profile(
         Profile.parse("F19 [100, 120], F21 [10, 20], F5 [0, 5], F52 [-200, -100], F51 [20, 30]")
     )
     assert told.ranges[19] == told.ranges[21] == (55, 70)
@@ -117,14 +117,14 @@ def test_a_profile_as_features_see_it_has_lids_together_and_the_outer_lips_for_t
     assert told.ranges[5] == (-200, -100)
     assert told.ranges[3] == (70, 180)  # -(F51 + F52): how far the lips part
     assert 52 not in told.ranges
-    shut = as_features_see(Profile.parse("F3 [100, 200]"))
+    shut = measurable_profile(Profile.parse("F3 [100, 200]"))
     assert dict(shut.ranges) == {3: (100, 200)}
 
 
 def test_what_features_tell_of_a_frame_is_in_the_profile_as_they_see_it() -> None:
     profile = Profile.parse("F19 [90, 110], F21 [40, 60], F53 [70, 90], F54 [70, 90], F31 [100, 120]")
     frames, seen = faps_from_features(features_from_faps(profile.frame()[None]))
-    for fap, (low, high) in as_features_see(profile).ranges.items():
+    for fap, (low, high) in measurable_profile(profile).ranges.items():
         assert seen[fap - 1]
         assert low <= frames[0, fap - 1] <= high
 

@@ -9,12 +9,12 @@ from realizer.analysis.picture_search import UnknownPictureError, by_picture, re
 from realizer.animation.axis import au, axis
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
-from realizer.expressions.library import shipped
+from realizer.expressions.library import builtin
 from realizer.face.load import input_names
 from realizer.render import Renderer
 
 NAMES = ("SMILE", "RAISE_LEFT_BROW", "RAISE_RIGHT_BROW", "template:anger", "template:sadness", "OPEN_MOUTH")
-KNOWN = [shipped()[name] for name in NAMES]
+KNOWN = [builtin()[name] for name in NAMES]
 
 
 def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> list[np.ndarray]:
@@ -32,7 +32,7 @@ def test_expression_is_found_in_a_picture_of_a_face_that_is_known() -> None:
     _, picture, *_ = drawn("ada", "evening", (150, 200), 0.7)
     seen = by_picture(picture, KNOWN, ["ada"])
     assert (seen.face, seen.light, seen.neutral) == ("ada", "evening", False)
-    assert seen.found[0][0] is KNOWN[0]
+    assert seen.matches[0][0] is KNOWN[0]
 
 
 @pytest.mark.slow
@@ -41,13 +41,13 @@ def test_face_light_and_expression_are_found_in_a_picture_of_any_size() -> None:
     for one, picture in list(zip(KNOWN, pictures, strict=True))[:2]:
         seen = by_picture(picture, KNOWN)
         assert (seen.face, seen.light, seen.neutral) == ("ben", "evening", False)
-        assert seen.found[0][0] is one
-        scores = [score for _, score in seen.found]
+        assert seen.matches[0][0] is one
+        scores = [score for _, score in seen.matches]
         assert scores == sorted(scores, reverse=True)
         assert scores[0] > 0.8
     rest = by_picture(neutral, KNOWN)
     assert rest.neutral
-    assert rest.found == ()
+    assert rest.matches == ()
 
 
 @pytest.mark.parametrize("shape", [(200, 200, 3), (900, 20, 3), (20, 900, 3)])

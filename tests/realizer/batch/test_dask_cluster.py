@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.batch.dask_cluster import Cluster
+from realizer.batch.dask_cluster import DaskCluster
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker
 from realizer.core.errors import RealizerError
@@ -70,7 +70,7 @@ def test_a_cluster_gives_what_one_worker_gives_here_though_one_of_its_workers_is
 ) -> None:
     here = Worker(options)
     expected = by_name([here.perform(task) for task in tasks])
-    crew = Cluster(options, scheduler)
+    crew = DaskCluster(options, scheduler)
     try:
         outcomes = crew.perform(tasks)
         got = [next(outcomes)]
@@ -91,7 +91,7 @@ def test_a_scheduler_that_is_killed_is_told_in_words(tasks: list[Task], options:
         scheduler.communicate()
         yield from tasks[1:]
 
-    crew = Cluster(options, said(scheduler, "Scheduler at:").split()[-1])
+    crew = DaskCluster(options, said(scheduler, "Scheduler at:").split()[-1])
     try:
         with pytest.raises(RealizerError, match="the scheduler went away"):
             list(crew.perform(given()))
@@ -102,13 +102,13 @@ def test_a_scheduler_that_is_killed_is_told_in_words(tasks: list[Task], options:
 def test_an_address_without_a_scheduler_is_told(options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("realizer.batch.dask_cluster.PATIENCE", 0.2)
     with pytest.raises(RealizerError, match="wanted a Dask scheduler there"):
-        Cluster(options, "tcp://127.0.0.1:9")
+        DaskCluster(options, "tcp://127.0.0.1:9")
 
 
 def test_who_waits_for_the_first_worker_is_told(
     scheduler: str, options: Options, caplog: pytest.LogCaptureFixture
 ) -> None:
-    cluster = Cluster(options, scheduler)
+    cluster = DaskCluster(options, scheduler)
     assert list(cluster.perform([])) == []
     cluster.close()
     assert f"--dask {scheduler}: it has no worker yet" in caplog.text

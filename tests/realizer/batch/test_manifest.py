@@ -30,11 +30,11 @@ def test_a_line_that_a_crash_cut_short_costs_that_row_alone(tmp_path: Path) -> N
     lines = [json.dumps(row(name)) for name in "abc"]
     (tmp_path / NAME).write_text("\n".join(lines)[:-20])
     with Manifest(tmp_path).open() as manifest:
-        assert [manifest.has(name, f"key of {name}") is not None for name in "abc"] == [True, True, False]
+        assert [manifest.is_done(name, f"key of {name}") is not None for name in "abc"] == [True, True, False]
         manifest.add(row("d"))
         manifest.path.read_text()
     with Manifest(tmp_path).open() as manifest:
-        assert [manifest.has(name, f"key of {name}") is not None for name in "abcd"] == [
+        assert [manifest.is_done(name, f"key of {name}") is not None for name in "abcd"] == [
             True,
             True,
             False,
@@ -46,20 +46,20 @@ def test_only_what_is_still_as_it_was_written_is_there(tmp_path: Path) -> None:
     with Manifest(tmp_path).open() as manifest:
         (tmp_path / "a.fap").write_bytes(b"face")
         manifest.add(row("a", content=b"face"))
-        assert manifest.has("a", "key of a")
-        assert not manifest.has("a", "another key")
+        assert manifest.is_done("a", "key of a")
+        assert not manifest.is_done("a", "another key")
         (tmp_path / "a.fap").write_bytes(b"farce")
-        assert not manifest.has("a", "key of a")
+        assert not manifest.is_done("a", "key of a")
         (tmp_path / "a.fap").unlink()
-        assert not manifest.has("a", "key of a")
+        assert not manifest.is_done("a", "key of a")
 
 
 def test_what_failed_is_tried_again_and_what_was_refused_is_not(tmp_path: Path) -> None:
     with Manifest(tmp_path).open() as manifest:
         manifest.add(row("a", "failed"))
         manifest.add(row("b", "refused"))
-        assert not manifest.has("a", "key of a")
-        assert manifest.has("b", "key of b")
+        assert not manifest.is_done("a", "key of a")
+        assert manifest.is_done("b", "key of b")
 
 
 def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from realizer.batch.process_pool import TRIES, Processes
+from realizer.batch.process_pool import TRIES, ProcessPool
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker
 
@@ -29,7 +29,7 @@ def expected(tasks: list[Task], options: Options) -> dict[str, Outcome]:
 def test_two_workers_give_what_one_gives_here(
     tasks: list[Task], options: Options, expected: dict[str, Outcome]
 ) -> None:
-    crew = Processes(options, 2)
+    crew = ProcessPool(options, 2)
     assert by_name(list(crew.perform(tasks))) == expected
     assert crew.pids == ()
 
@@ -37,7 +37,7 @@ def test_two_workers_give_what_one_gives_here(
 def test_a_worker_that_is_killed_loses_nothing(
     tasks: list[Task], options: Options, expected: dict[str, Outcome]
 ) -> None:
-    crew = Processes(options, 1)
+    crew = ProcessPool(options, 1)
     outcomes = crew.perform(tasks)
     got = [next(outcomes)]
     (at_work,) = crew.pids  # it was given its second document before the first outcome came out
@@ -57,14 +57,14 @@ class Deadly(Options):
 @pytest.mark.slow
 def test_a_document_whose_worker_always_dies_is_given_up(tasks: list[Task], options: Options) -> None:
     deadly = Deadly(formats=options.formats, voice=options.voice)
-    outcomes = list(Processes(deadly, 1).perform(tasks[:1]))
+    outcomes = list(ProcessPool(deadly, 1).perform(tasks[:1]))
     for outcome in outcomes:
         assert outcome.row["status"] == "failed"
         assert outcome.row["error"] == f"its process ended {TRIES} times (exit status 3)"
 
 
 def test_workers_end_with_whoever_asked_for_them(tasks: list[Task], options: Options) -> None:
-    crew = Processes(options, 2)
+    crew = ProcessPool(options, 2)
     outcomes = crew.perform(tasks)
     next(outcomes)
     pids = crew.pids

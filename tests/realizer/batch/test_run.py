@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from realizer.batch.documents import find
-from realizer.batch.process_pool import Processes
+from realizer.batch.process_pool import ProcessPool
 from realizer.batch.run import batch
 from realizer.batch.task import Options, Task
 from realizer.batch.worker import Outcome, Worker
@@ -46,7 +46,7 @@ def test_the_same_bytes_whatever_ran_it_and_in_whatever_order(
     talks: Path, options: Options, tmp_path: Path
 ) -> None:
     play(talks, tmp_path / "here", options)
-    crew = Processes(options, 2)
+    crew = ProcessPool(options, 2)
     assert len(list(batch(find([str(talks)]), tmp_path / "there", options, crew))) == 6
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
     assert {"more/said.fap", "more/said.vtt", "manifest.jsonl"} <= contents(tmp_path / "here").keys()
@@ -59,7 +59,7 @@ def test_what_is_heard_is_the_same_whatever_ran_it_and_in_whatever_order(talks: 
     for k, words in enumerate(["Oh, hello!", "Who was that?", "Nobody at all."]):
         (talks / f"said{k}.bml").write_text(f'<bml id="b"><speech id="s"><text>{words}</text></speech></bml>')
     play(talks, tmp_path / "here", aloud)
-    crew = Processes(aloud, 2)
+    crew = ProcessPool(aloud, 2)
     assert len(list(batch(find([str(talks)]), tmp_path / "there", aloud, crew))) == 9
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
     assert len({contents(tmp_path / "here")[f"said{k}.wav"] for k in range(3)}) == 3

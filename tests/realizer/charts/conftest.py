@@ -6,18 +6,18 @@ from collections.abc import Callable
 
 import pytest
 
-from realizer.charts.chart_data import lines_of
-from realizer.charts.timeline import BlockLine
+from realizer.charts.chart_data import charts_of
+from realizer.charts.timeline import BlockChart
 from realizer.core.options import PlayOptions
 from realizer.pipeline import plan
 from realizer.playback.player import Player
 
 
 @pytest.fixture
-def lines() -> Callable[..., list[BlockLine]]:
-    def of(*documents: str) -> list[BlockLine]:
+def lines() -> Callable[..., list[BlockChart]]:
+    def of(*documents: str) -> list[BlockChart]:
         player = Player(PlayOptions(idle=False))
         schedules, _ = plan(documents, player, "silent")
-        return lines_of(player.blocks, schedules)
+        return charts_of(player.blocks, schedules)
 
     return of

@@ -14,7 +14,7 @@ TIED = """<bml id="b"><wait id="w" start="1" duration="1"/><head id="n" lexeme="
 
 def drawn(lines, document: str):
     blocks = lines(document)
-    return timeline(blocks), scale_of(blocks), {line.id: line for line in blocks[0].lines}
+    return timeline(blocks), scale_of(blocks), {line.id: line for line in blocks[0].rows}
 
 
 def paths(picture, colour: str) -> list[Path]:

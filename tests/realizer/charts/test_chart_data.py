@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema import parse
 from realizer.behaviours.registry import VOCABULARY
-from realizer.charts.chart_data import lines_of
+from realizer.charts.chart_data import charts_of
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 
@@ -27,12 +27,12 @@ def test_points_have_their_time_on_both_clocks(lines) -> None:
     )
     assert (first.start, first.end) == (0.0, 2.0)
     assert second.start == 2.0
-    assert second.lines[0].points[0] == ("start", 0.5, 2.5)
+    assert second.rows[0].points[0] == ("start", 0.5, 2.5)
 
 
 def test_gaps_say_how_far_they_are_from_what_they_would_like(lines) -> None:
     (block,) = lines(TALK)
-    nod = block.lines[1]
+    nod = block.rows[1]
     assert [(g.begin, g.end) for g in nod.gaps] == [
         (a.name, b.name) for a, b in zip(nod.points[:-1], nod.points[1:], strict=True)
     ]
@@ -40,7 +40,7 @@ def test_gaps_say_how_far_they_are_from_what_they_would_like(lines) -> None:
     moved = [g for g in nod.gaps if g.preferred]
     assert all(g.stretch == pytest.approx(g.actual / g.preferred) and g.stretch > 1 for g in moved)
     assert all(g.cost == pytest.approx(g.stiffness * (g.actual - g.preferred) ** 2) for g in moved)
-    free = block.lines[2]
+    free = block.rows[2]
     assert [g.stretch for g in free.gaps] == pytest.approx([1.0] * 3)
     assert (free.required, nod.required) == (True, False)
 
@@ -50,11 +50,11 @@ def test_the_costs_of_gaps_add_up_to_what_the_scheduler_paid() -> None:
     block = parse('<bml id="b"><head id="n" lexeme="NOD" start="0" end="4"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
     assert schedule.cost > 0
-    assert lines_of(player.blocks, [schedule])[0].cost == pytest.approx(schedule.cost)
+    assert charts_of(player.blocks, [schedule])[0].cost == pytest.approx(schedule.cost)
 
 
 def test_speech_is_rigid_and_has_its_words(lines) -> None:
-    speech = lines(TALK.replace("<text>", "<text>Well, "))[0].lines[0]
+    speech = lines(TALK.replace("<text>", "<text>Well, "))[0].rows[0]
     assert [w.text for w in speech.words] == ["Well", "Hello", "there"]
     assert all(g.rigid and g.actual == pytest.approx(g.preferred) and g.cost == 0 for g in speech.gaps)
     assert speech.points[1].time == pytest.approx(speech.words[2].start)
@@ -69,7 +69,7 @@ def test_what_was_dropped_is_told_with_its_element_its_line_and_its_warning(line
         <head id="ok" lexeme="NOD"/>
         </bml>"""
     )
-    assert [line.id for line in block.lines] == ["ok"]
+    assert [line.id for line in block.rows] == ["ok"]
     found = {d.id: d for d in block.dropped}
     assert {id: (d.element, d.line) for id, d in found.items()} == {
         "f": ("faceLexeme", 2),
@@ -87,12 +87,12 @@ def test_a_constraint_that_is_not_kept_is_told_too(lines) -> None:
         <constraint id="c"><before ref="w:start"><sync ref="v:start"/></before></constraint></bml>"""
     )
     assert [d.id for d in block.dropped] == ["c"]
-    assert [line.id for line in block.lines] == ["w", "v"]
+    assert [line.id for line in block.rows] == ["w", "v"]
 
 
 def test_a_refused_block_has_only_its_reason(lines) -> None:
     (block,) = lines('<bml id="b"><required><head id="n" lexeme="NOD" end="0.01"/></required></bml>')
-    assert (block.state, block.lines) == ("FAILED", ())
+    assert (block.state, block.rows) == ("FAILED", ())
     assert [d.type for d in block.dropped] == ["IMPOSSIBLE_TO_SCHEDULE"]
 
 
@@ -102,7 +102,7 @@ def test_a_preplanned_block_has_no_start_and_its_json_no_infinity(lines) -> None
         '<head id="n" lexeme="NOD"/></bml>'
     )
     assert (block.state, block.start, block.end) == ("PENDING", None, None)
-    assert block.lines[0].points[0] == ("start", 0.0, None)
+    assert block.rows[0].points[0] == ("start", 0.0, None)
     json.dumps(block.to_json(), allow_nan=False)
     json.dumps(block.detail(), allow_nan=False)
 
@@ -112,7 +112,7 @@ def test_what_was_ended_before_it_began_is_told_as_cut_off(lines) -> None:
         '<bml id="a"><head id="n" lexeme="NOD" start="1"/></bml>',
         '<bml id="b" composition="REPLACE"><wait id="w" duration="1"/></bml>',
     )
-    assert ended.lines == ()
+    assert ended.rows == ()
     assert [(d.id, d.element, d.type) for d in ended.dropped] == [("n", "head", "INTERRUPTED")]
     assert new.state == "LURKING"
 
@@ -123,7 +123,7 @@ def test_what_a_preplanned_block_would_have_played_is_told_as_cut_off_when_it_is
     block = parse(f'<bml id="a" {preplan}><head id="n" lexeme="NOD"/></bml>', VOCABULARY)
     schedule = player.submit(block, 0.0)
     player.stop(0.5)
-    (line,) = lines_of(player.blocks, [schedule])
+    (line,) = charts_of(player.blocks, [schedule])
     assert line.state == "REVOKED"
     assert [(d.id, d.element, d.type) for d in line.dropped] == [("n", "head", "REVOKED")]
 
@@ -134,8 +134,8 @@ def test_a_behaviour_that_is_cut_off_keeps_what_has_passed() -> None:
     schedule = player.submit(block, 0.0)
     player.due(2.0)
     player.stop(2.0)
-    (line,) = lines_of(player.blocks, [schedule])
+    (line,) = charts_of(player.blocks, [schedule])
     assert (line.state, line.end) == ("INTERRUPTED", 2.0)
-    gaze = line.lines[0]
+    gaze = line.rows[0]
     assert (gaze.points[-1].name, gaze.points[-1].time) == ("end", 2.0)
     assert all(g.preferred is None and g.cost == 0 for g in gaze.gaps)

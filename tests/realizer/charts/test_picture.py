@@ -62,7 +62,7 @@ def test_the_examples_can_be_read(lines, path: Path) -> None:
     blocks = lines(path.read_text())
     picture = timeline(blocks)
     check(picture)
-    assert {line.id for block in blocks for line in block.lines} <= set(texts(picture))
+    assert {line.id for block in blocks for line in block.rows} <= set(texts(picture))
 
 
 def test_behaviours_of_a_kind_stand_together_speech_first(lines) -> None:
@@ -86,7 +86,7 @@ def test_gaps_have_the_colour_of_their_stretch_and_stand_at_their_time(lines) ->
     )
     picture, scale = timeline(blocks), scale_of(blocks)
     boxes = {(round(s.x, 3), s.fill): s.width for s in picture.shapes if isinstance(s, Box)}
-    speech, nod = sorted(blocks[0].lines, key=lambda line: line.element == "head")
+    speech, nod = sorted(blocks[0].rows, key=lambda line: line.element == "head")
     for line in (speech, nod):
         for gap, point in zip(line.gaps, line.points, strict=False):
             if not gap.rigid and not gap.preferred:
@@ -98,7 +98,7 @@ def test_gaps_have_the_colour_of_their_stretch_and_stand_at_their_time(lines) ->
 def test_words_are_shown_at_their_time_where_they_fit(lines) -> None:
     blocks = lines(CLASHES)
     picture, scale = timeline(blocks), scale_of(blocks)
-    for word in blocks[0].lines[0].words:
+    for word in blocks[0].rows[0].words:
         shown = next(s for s in picture.shapes if isinstance(s, Text) and s.text == word.text)
         assert shown.x == pytest.approx(scale.x((word.start + word.end) / 2))
 

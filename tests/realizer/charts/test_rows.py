@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from realizer.charts.rows import draw_dropped, draw_line, height_of
+from realizer.charts.rows import draw_dropped, draw_row, height_of
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Picture, Text
-from realizer.charts.timeline import Dropped, Gap, Line, Point
+from realizer.charts.timeline import BehaviourRow, Dropped, Gap, Point
 
 SCALE = Scale(0.0, 4.0, 1200.0)
 
@@ -20,7 +20,7 @@ def row(*gaps: Gap, tied: frozenset[str] = frozenset()) -> list[str]:
         time = points[-1].time + gap.actual
         points.append(Point(gap.end, time, time))
     picture = Picture(1200)
-    draw_line(picture, SCALE, Line("n", "head", 3, True, tuple(points), gaps), 0.0, 0.0, tied)
+    draw_row(picture, SCALE, BehaviourRow("n", "head", 3, True, tuple(points), gaps), 0.0, 0.0, tied)
     return texts(picture)
 
 

@@ -7,11 +7,11 @@ import json
 import pytest
 
 from realizer.charts.links import Link
-from realizer.charts.timeline import BlockLine, Dropped, Gap, Line, Point, Spoken
+from realizer.charts.timeline import BehaviourRow, BlockChart, Dropped, Gap, Point, WordSpan
 from realizer.scheduling.timing import Warning
 
 GAP = Gap("start", "end", 1.5, 1.0, 0.25, 4.0)
-LINE = Line(
+LINE = BehaviourRow(
     "n",
     "head",
     3,
@@ -19,9 +19,9 @@ LINE = Line(
     (Point("start", 0.5, 2.5), Point("end", 2.0, 4.0)),
     (GAP,),
     (Link("start", "attribute", None, None, None, 0.5, line=3),),
-    (Spoken(0.5, 1.0, "yes"),),
+    (WordSpan(0.5, 1.0, "yes"),),
 )
-BLOCK = BlockLine(
+BLOCK = BlockChart(
     "b",
     None,
     "IN_EXEC",

@@ -6,14 +6,14 @@ import pytest
 
 from bml_schema.source import Source
 from realizer.checking.advice import advice
-from realizer.checking.document import checked
+from realizer.checking.document import check_document
 from realizer.checking.finding import Finding
 from realizer.playback.player import Player, PlayOptions
 
 
 def advised(text: str) -> list[Finding]:
     player = Player(PlayOptions(idle=False))
-    (part,) = checked("typed", Source(text), text, player)
+    (part,) = check_document("typed", Source(text), text, player)
     assert part.block is not None
     assert part.schedule is not None
     assert part.findings == ()

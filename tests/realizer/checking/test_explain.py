@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bml_schema.source import Source
-from realizer.checking.document import checked
+from realizer.checking.document import check_document
 from realizer.checking.explain import attributes_of, near
 from realizer.checking.finding import Finding
 from realizer.playback.player import Player, PlayOptions
@@ -13,7 +13,7 @@ from realizer.playback.player import Player, PlayOptions
 
 def finding(behaviours: str) -> Finding:
     text = f'<bml id="a">{behaviours}</bml>'
-    (part,) = checked("typed", Source(text), text, Player(PlayOptions(idle=False)))
+    (part,) = check_document("typed", Source(text), text, Player(PlayOptions(idle=False)))
     (found,) = part.findings
     return found
 

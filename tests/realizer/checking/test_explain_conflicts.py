@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from bml_schema.source import Source
-from realizer.checking.document import checked
+from realizer.checking.document import check_document
 from realizer.checking.finding import Finding
 from realizer.playback.player import Player, PlayOptions
 
 
 def findings(text: str) -> list[Finding]:
     player = Player(PlayOptions(idle=False))
-    return [found for part in checked("typed", Source(text), text, player) for found in part.findings]
+    return [found for part in check_document("typed", Source(text), text, player) for found in part.findings]
 
 
 def test_conflict_is_labelled_on_every_line_that_takes_part() -> None:

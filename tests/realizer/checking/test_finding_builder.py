@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from bml_schema.source import Source
-from realizer.checking.finding_builder import Draft
+from realizer.checking.finding_builder import FindingBuilder
 
 SOURCE = Source('<bml id="a">\n<head id="n"/>\n</bml>\n<bml id="b">\n<head id="n"/>\n</bml>')
 
 
 def test_a_draft_finds_its_element_by_the_id_of_its_block() -> None:
     for block, line in (("a", 2), ("b", 5)):
-        draft = Draft(SOURCE, f"{block}:n", None, "")
+        draft = FindingBuilder(SOURCE, f"{block}:n", None, "")
         assert draft.block == block
         assert draft.element is not None
         assert SOURCE.name_spot(draft.element).line == line
 
 
 def test_a_draft_finds_its_element_by_its_path_and_line() -> None:
-    draft = Draft(SOURCE, "b:?", 5, "/bml/head")
+    draft = FindingBuilder(SOURCE, "b:?", 5, "/bml/head")
     assert draft.element is not None
     assert SOURCE.name_spot(draft.element).line == 5
 
 
 def test_a_draft_of_an_unknown_behaviour_has_no_element() -> None:
-    assert Draft(SOURCE, "a:m", None, "").element is None
+    assert FindingBuilder(SOURCE, "a:m", None, "").element is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bml_schema.source import Source
-from realizer.checking.document import checked
+from realizer.checking.document import check_document
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 
@@ -14,7 +14,7 @@ def faults(text: str) -> list[tuple[str, str, str]]:
     """(type, id, what stands there) of every mark of every fault of a text, in order."""
     source = Source(text)
     found = []
-    for part in checked("x", source, text, Player(PlayOptions(idle=False))):
+    for part in check_document("x", source, text, Player(PlayOptions(idle=False))):
         for finding in part.findings:
             for spot in sorted(label.spot for label in finding.labels if label.primary):
                 what = source.line(spot.line)[spot.column - 1 :][: spot.length]

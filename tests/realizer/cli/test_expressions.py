@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
-from realizer.expressions.library import shipped
+from realizer.expressions.library import builtin
 
 
 def run(*words: str) -> Result:
@@ -20,7 +20,7 @@ def test_all_are_listed_with_their_units_and_times() -> None:
     done = run("list")
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
-    assert len(lines) == len(shipped())
+    assert len(lines) == len(builtin())
     assert any(line.split()[:2] == ["SMILE", "6+12"] for line in lines)
 
 

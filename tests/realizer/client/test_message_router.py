@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
-from realizer.client.message_router import KEPT, ClientError, Mail, Until
+from realizer.client.message_router import MAX_FRAMES, BlockWaiter, ClientError, Router
 from realizer.protocol.streams import KINDS
 from realizer.protocol.wire import WireError, pack
 
 
 @pytest.fixture
-def mail() -> Mail:
-    return Mail()
+def mail() -> Router:
+    return Router()
 
 
 def error(where: str | None, code: str = "invalid") -> str:
@@ -24,20 +24,20 @@ def error(where: str | None, code: str = "invalid") -> str:
 
 
 def test_an_answer_is_the_one_of_its_question(mail) -> None:
-    mail.ask("ping")
-    mail.put('{"type":"state"}')
-    mail.put(error("set.aus"))
-    mail.put(error("video", "render"))
-    assert not mail.answered
-    mail.put('{"type":"pong","time":1}')
+    mail.expect_answer("ping")
+    mail.receive('{"type":"state"}')
+    mail.receive(error("set.aus"))
+    mail.receive(error("video", "render"))
+    assert not mail.has_answer
+    mail.receive('{"type":"pong","time":1}')
     assert mail.answer() == {"type": "pong", "time": 1}
     assert [one["where"] for one in mail.errors] == ["set.aus", "video"]
 
 
 @pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", "type", None])
 def test_an_error_about_what_was_asked_is_raised(mail, where) -> None:
-    mail.ask("subscribe")
-    mail.put(error(where))
+    mail.expect_answer("subscribe")
+    mail.receive(error(where))
     with pytest.raises(ClientError, match="wanted another") as caught:
         mail.answer()
     assert caught.value.code == "invalid"
@@ -46,22 +46,22 @@ def test_an_error_about_what_was_asked_is_raised(mail, where) -> None:
 
 @pytest.mark.parametrize("stream", [row.name for row in KINDS.values()])
 def test_frames_are_kept_by_stream_the_newest_ones(mail, stream) -> None:
-    for k in range(KEPT + 5):
-        mail.put(pack(stream, k, k / 25, np.zeros(2, "<f4").tobytes()))
+    for k in range(MAX_FRAMES + 5):
+        mail.receive(pack(stream, k, k / 25, np.zeros(2, "<f4").tobytes()))
     ((_, frames),) = mail.frames.items()
-    assert [frame.frame for frame in frames] == list(range(5, KEPT + 5))
+    assert [frame.frame for frame in frames] == list(range(5, MAX_FRAMES + 5))
 
 
 def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
     mesh = {"stream": "mesh", "index": 1, "scale": 2.0, "offset": [0.0, 0.0, 1.0]}
     frame = pack("mesh", 0, 0.0, np.array([1, 2, 3], "<i2").tobytes(), character=1)
-    mail.ask("subscribe")
-    mail.put(json.dumps({"type": "subscribed", "fps": 25.0, **mesh}))
-    mail.put(frame)
-    mail.put(json.dumps({"type": "changed", **mesh, "scale": 1.0}))
-    mail.put(frame)
-    mail.put(frame[:2] + b"\0" + frame[3:])  # of another character
-    first, second, other = mail.of("mesh")
+    mail.expect_answer("subscribe")
+    mail.receive(json.dumps({"type": "subscribed", "fps": 25.0, **mesh}))
+    mail.receive(frame)
+    mail.receive(json.dumps({"type": "changed", **mesh, "scale": 1.0}))
+    mail.receive(frame)
+    mail.receive(frame[:2] + b"\0" + frame[3:])  # of another character
+    first, second, other = mail.queue_of("mesh")
     assert first.vertices.tolist() == [[2.0, 4.0, 7.0]]
     assert second.vertices.tolist() == [[1.0, 2.0, 4.0]]
     assert second.told["fps"] == 25.0
@@ -73,8 +73,8 @@ def test_a_frame_brings_what_was_told_of_its_stream_when_it_came(mail) -> None:
 
 
 def test_json_frames_and_schedules_are_frames(mail) -> None:
-    mail.put('{"type":"arkit","frame":1,"time":0.04,"values":[0.5]}')
-    mail.put('{"type":"schedule","time":0,"whole":true,"blocks":[]}')
+    mail.receive('{"type":"arkit","frame":1,"time":0.04,"values":[0.5]}')
+    mail.receive('{"type":"schedule","time":0,"whole":true,"blocks":[]}')
     assert {stream: len(kept) for stream, kept in mail.frames.items()} == {"arkit": 1, "schedule": 1}
 
 
@@ -101,11 +101,11 @@ def warning(id: str) -> WarningFeedback:
     ],
 )
 def test_a_block_is_over_with_its_end_or_its_refusal(told, last) -> None:
-    until = Until("b")
+    until = BlockWaiter("b")
     for feedback in told:
-        until.tell(feedback)
+        until.on_feedback(feedback)
     assert (until.last.id if until.last else None) == last
-    assert until.over == (last is not None)
+    assert until.is_finished == (last is not None)
     if last == "b":
         with pytest.raises(ClientError):
             until.end()
@@ -121,5 +121,5 @@ def test_a_block_is_over_with_its_end_or_its_refusal(told, last) -> None:
     ],
 )
 def test_the_last_block_is_the_last_that_is_no_comment(mail, bml, block) -> None:
-    mail.sent(bml)
+    mail.on_sent(bml)
     assert mail.last_block == block

@@ -12,7 +12,7 @@ from PIL import Image
 
 from realizer.client import ClientError, connect
 from realizer.client.record import RATE
-from realizer.client.record import _each as each
+from realizer.client.record import _film_frames as each
 from realizer.client.record import _sound as sound_of
 from realizer.core.settings import Settings
 from realizer.protocol.wire import WireFrame, pack, unpack
@@ -77,7 +77,7 @@ def test_a_folder_that_is_not_there_is_said_before_anything_is_played(tmp_path: 
         async with connect(url) as client:
             with pytest.raises(FileNotFoundError, match="nowhere"):
                 await client.film(tmp_path / "nowhere" / "x.mp4", '<bml id="b"/>')
-            assert not client._mail.feedback
+            assert not client._router.feedback
 
     serving(test)
 

@@ -9,7 +9,7 @@ import pytest
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from realizer.client import ClientError, connect
-from realizer.client.speech import Heard, Speech
+from realizer.client.speech import Speech, SpeechProgress
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from tests.realizer.client.test_async_client import LIMIT, serving
@@ -233,10 +233,10 @@ def test_a_text_of_any_length_is_appended() -> None:
 
 
 def test_only_what_is_said_of_the_speech_itself_is_heard() -> None:
-    heard = Heard("s")
+    heard = SpeechProgress("s")
     for id in ("t.1:t:m", "s.1:n:m", "s:s:m", "s.1:s:stroke:2"):
-        heard.tell(SyncPointProgress(id=id, time=0.0, global_time=1.0))
-    heard.tell(BlockProgress(id="s.1:end", global_time=1.0))
-    heard.tell(WarningFeedback(id="s.1", type="X", text="no"))
+        heard.on_feedback(SyncPointProgress(id=id, time=0.0, global_time=1.0))
+    heard.on_feedback(BlockProgress(id="s.1:end", global_time=1.0))
+    heard.on_feedback(WarningFeedback(id="s.1", type="X", text="no"))
     assert heard.points == {"stroke:2": 1.0}
-    assert not heard.over
+    assert not heard.is_finished

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.emotions.archetypes import archetypes
-from realizer.emotions.wheel import affect, shares, wheel
+from realizer.emotions.wheel import affect, blend_weights, wheel
 from realizer.tables.wheel_words import ring as places
 
 SETS = st.sampled_from(["own", "published", "raw"])
@@ -66,9 +66,12 @@ def test_turns_do_not_count() -> None:
 
 
 def test_in_the_middle_of_two_both_show_by_half() -> None:
-    assert shares(67.5) == {"fear": 0.5, "surprise": 0.5}
-    assert shares(270) == {"anticipation": 1}
-    assert shares(270, "published") == {"anger": 0.5, "joy": 0.5}  # nobody published a face of anticipation
+    assert blend_weights(67.5) == {"fear": 0.5, "surprise": 0.5}
+    assert blend_weights(270) == {"anticipation": 1}
+    assert blend_weights(270, "published") == {
+        "anger": 0.5,
+        "joy": 0.5,
+    }  # nobody published a face of anticipation
     awe, fear, surprise = wheel(67.5, 7), archetypes("own")["fear"][0], archetypes("own")["surprise"][0]
     assert np.allclose(awe.frame(), (fear.frame() + surprise.frame()) / 2, atol=1e-3)
 
@@ -108,4 +111,4 @@ def test_what_is_off_the_plane_is_refused_in_words(valence: float, arousal: floa
 
 def test_a_huge_angle_is_a_place_like_any_other() -> None:
     assert wheel(1e308).ranges == wheel(1e308 % 360).ranges
-    assert sum(shares(-1e300).values()) == pytest.approx(1)
+    assert sum(blend_weights(-1e300).values()) == pytest.approx(1)

@@ -6,7 +6,7 @@ import pytest
 
 from realizer.core.errors import TableError
 from realizer.expressions.expression import key
-from realizer.expressions.library import library_of, shipped
+from realizer.expressions.library import builtin, library_of
 from realizer.tables.emotions import archetypes
 from realizer.tables.expression_words import expression_words
 from realizer.tables.templates import templates
@@ -14,7 +14,7 @@ from realizer.tables.templates import templates
 SMIRK = 'means = ["irony"]\naus = { 12L = 0.6, 2R = 0.3 }\nonset = 0.2\napex = 0.5\noffset = 0.4\n'
 
 
-@pytest.mark.parametrize("one", shipped().values(), ids=lambda one: one.name)
+@pytest.mark.parametrize("one", builtin().values(), ids=lambda one: one.name)
 def test_every_expression_that_ships_says_what_it_means_shows_and_how_long(one) -> None:
     for said in (one.means, one.features, one.aus, one.source):
         assert said
@@ -23,49 +23,49 @@ def test_every_expression_that_ships_says_what_it_means_shows_and_how_long(one) 
 
 
 def test_the_words_are_of_expressions_that_there_are() -> None:
-    assert set(expression_words()) == set(shipped())
+    assert set(expression_words()) == set(builtin())
 
 
 def test_templates_and_the_six_emotions_are_in_it() -> None:
-    assert {f"template:{name.lower()}" for name in templates()} <= set(shipped())
-    assert {emotion.name for emotion in archetypes()} <= set(shipped())
+    assert {f"template:{name.lower()}" for name in templates()} <= set(builtin())
+    assert {emotion.name for emotion in archetypes()} <= set(builtin())
 
 
 @pytest.mark.parametrize("template", templates().values(), ids=lambda one: one.name)
 def test_a_template_is_seen_for_a_time_that_her_table_has(template) -> None:
-    one = shipped()[f"template:{template.name}"]
+    one = builtin()[f"template:{template.name}"]
     for ends in (template.possible, template.probable):
-        assert ends is None or ends[0] <= one.evident <= ends[1] + 1e-9
+        assert ends is None or ends[0] <= one.visible_duration <= ends[1] + 1e-9
     assert "Wojdel" in one.gaps[1].source
     assert all(gap.source.startswith("ours") for gap in one.gaps[::2])
 
 
 def test_a_name_may_be_spelt_in_several_ways() -> None:
     assert key("Template: Ironic-smile") == key("template:ironic  smile")
-    assert shipped()["raise brows"] is shipped()["RAISE_BROWS"]
-    assert "template" not in shipped()
+    assert builtin()["raise brows"] is builtin()["RAISE_BROWS"]
+    assert "template" not in builtin()
 
 
 def test_near_names_are_found_with_and_without_their_prefix() -> None:
-    assert shipped().near("template:astonishmant")[0] == "template:astonishment"
-    assert shipped().near("smiel") == ["SMILE"]
-    assert shipped().near("grieff") == ["template:grief"]
-    assert shipped().near("zzz") == []
+    assert builtin().near("template:astonishmant")[0] == "template:astonishment"
+    assert builtin().near("smiel") == ["SMILE"]
+    assert builtin().near("grieff") == ["template:grief"]
+    assert builtin().near("zzz") == []
 
 
 def test_ones_own_go_before_what_ships_and_that_is_said(folder, caplog) -> None:
     library = library_of(folder(smirk=SMIRK, other=SMIRK.replace("means", 'name = "Smile"\nmeans')))
     assert library["smirk"].units == "12L+2R"
     assert library["SMILE"].units == "12L+2R"
-    assert len(library) == len(shipped()) + 1
+    assert len(library) == len(builtin()) + 1
     (note,) = library.notes
     assert "other.toml: Smile takes the place of the shipped SMILE" in note
     assert note in caplog.text
-    assert shipped()["SMILE"].units == "6+12"
+    assert builtin()["SMILE"].units == "6+12"
 
 
 def test_an_empty_folder_is_no_fault_but_is_told(folder, caplog) -> None:
-    assert len(library_of(folder())) == len(shipped())
+    assert len(library_of(folder())) == len(builtin())
     assert "found none" in caplog.text
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.expressions.library import shipped
+from realizer.expressions.library import builtin
 from realizer.expressions.search import by_action_units, by_meaning, stem
 
 
@@ -31,13 +31,13 @@ def names(found) -> list[str]:
     ],
 )
 def test_an_expression_is_found_by_what_it_means(text: str, meant: str) -> None:
-    found = by_meaning(text, shipped().values())
+    found = by_meaning(text, builtin().values())
     best = [one.name for one, score in found if score == found[0][1]]
     assert meant in best
 
 
 def test_more_of_the_words_and_better_places_come_first() -> None:
-    found = by_meaning("raised left brow", shipped().values())
+    found = by_meaning("raised left brow", builtin().values())
     assert names(found)[0] == "RAISE_LEFT_BROW"
     scores = [score for _, score in found]
     assert scores == sorted(scores, reverse=True)
@@ -45,24 +45,24 @@ def test_more_of_the_words_and_better_places_come_first() -> None:
 
 
 def test_words_that_nobody_knows_find_nothing() -> None:
-    assert by_meaning("qqqq", shipped().values()) == []
-    assert by_meaning("...", shipped().values()) == []
+    assert by_meaning("qqqq", builtin().values()) == []
+    assert by_meaning("...", builtin().values()) == []
 
 
-@pytest.mark.parametrize("one", shipped().values(), ids=lambda one: one.name)
+@pytest.mark.parametrize("one", builtin().values(), ids=lambda one: one.name)
 def test_what_is_asked_for_as_it_is_shown_is_found_first(one) -> None:
-    (_, best), *_ = found = by_action_units(one.aus, shipped().values())
+    (_, best), *_ = found = by_action_units(one.aus, builtin().values())
     assert best == pytest.approx(1)
     assert one.name in {other.name for other, score in found if score == pytest.approx(1)}
 
 
 def test_sides_count_and_so_does_how_much() -> None:
     left = {(1, "LEFT"): 1.0, (2, "LEFT"): 1.0}
-    found = names(by_action_units(left, shipped().values()))
+    found = names(by_action_units(left, builtin().values()))
     assert found[0] == "RAISE_LEFT_BROW"
     assert "RAISE_RIGHT_BROW" not in found
-    assert names(by_action_units({(9, "BOTH"): 1.0}, shipped().values())) == ["template:disgust", "DISGUST"]
-    assert by_action_units({(28, "BOTH"): 1.0}, shipped().values()) == []
+    assert names(by_action_units({(9, "BOTH"): 1.0}, builtin().values())) == ["template:disgust", "DISGUST"]
+    assert by_action_units({(28, "BOTH"): 1.0}, builtin().values()) == []
 
 
 def test_endings_do_not_count() -> None:

@@ -8,22 +8,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.expressions.library import shipped
-from realizer.expressions.spans import evident, lasts, spans
+from realizer.expressions.library import builtin
+from realizer.expressions.spans import duration_of, spans, visible_spans
 from realizer.expressions.timeline import Entry, Timeline, Track
 
 
 def test_an_entry_without_a_duration_lasts_as_its_expression_does() -> None:
-    (span,) = spans(Track("a", (Entry("smile"),)), shipped())
-    smile = shipped()["SMILE"]
+    (span,) = spans(Track("a", (Entry("smile"),)), builtin())
+    smile = builtin()["SMILE"]
     assert span.reached == pytest.approx(smile.onset)
     assert span.end - span.left == pytest.approx(smile.offset)
-    assert lasts(Timeline((Track("a", (Entry("smile"),), start=1.0),)), shipped()) == pytest.approx(
+    assert duration_of(Timeline((Track("a", (Entry("smile"),), start=1.0),)), builtin()) == pytest.approx(
         1 + smile.duration
     )
 
 
-NAMES = [*shipped(), "neutral"]
+NAMES = [*builtin(), "neutral"]
 
 
 @given(
@@ -37,7 +37,7 @@ def test_whatever_the_entries_time_goes_forward(entries, joins, start: float) ->
     track = Track(
         "a", tuple(Entry(name, 1.0, duration) for name, duration in entries), joins, "linear", start
     )
-    shown = spans(track, shipped())
+    shown = spans(track, builtin())
     times = [start]
     for span in shown:
         assert span.start == pytest.approx(times[-1]) or span.start <= span.reached
@@ -50,6 +50,6 @@ def test_whatever_the_entries_time_goes_forward(entries, joins, start: float) ->
 
 def test_an_expression_is_evident_from_half_of_its_coming_to_half_of_its_going() -> None:
     track = Track("a", (Entry("template:surprise", 1.0, 1.0), Entry("neutral"), Entry("smile")))
-    (place, one, begin, end), (_, other, _, _) = evident(Timeline((track,)), shipped())
+    (place, one, begin, end), (_, other, _, _) = visible_spans(Timeline((track,)), builtin())
     assert (place, one.name, other.name) == ("channel a, entry 1", "template:surprise", "SMILE")
     assert (begin, end) == pytest.approx((0.15, 0.75))

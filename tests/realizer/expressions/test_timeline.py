@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from realizer.expressions.library import shipped
+from realizer.expressions.library import builtin
 from realizer.expressions.timeline import Entry, Timeline, Track, faults_of, remarks
 from realizer.face.load import input_names
 
 
 def test_names_that_nobody_knows_are_faults_and_breaks_are_not() -> None:
     track = Track("a", (Entry("nobody"), Entry("NEUTRAL"), Entry("smiel")))
-    first, second = faults_of(Timeline((track,)), shipped())
+    first, second = faults_of(Timeline((track,)), builtin())
     assert first.startswith("channel a, entry 1, expression: wanted a name")
     assert second.endswith("got 'smiel', did you mean SMILE?")
 

@@ -7,20 +7,20 @@ import pytest
 import realizer
 from bml_schema import Block, Speech, write
 from bml_schema.behaviours import SpeechText
-from realizer.knowledge.advice import Seen, advise
+from realizer.knowledge.advice import VisibleExpression, advise
 from realizer.knowledge.enrich import Enricher, template_of
 from realizer.tables.knowledge import Role, knowledge
 
 EMPTY = Block(id="b")
 
 
-def said(*seen: Seen, role: Role = "speaker", mood: str = "", block: Block = EMPTY) -> list[str]:
+def said(*seen: VisibleExpression, role: Role = "speaker", mood: str = "", block: Block = EMPTY) -> list[str]:
     words = {"s": [(0, 1.0)]}
-    return [one.said for one in advise(block, seen, words, role, knowledge().mood(mood) if mood else None)]
+    return [one.text for one in advise(block, seen, words, role, knowledge().mood(mood) if mood else None)]
 
 
-def series(count: int, every: float, template: str = "surprise") -> list[Seen]:
-    return [Seen(f"e{i}", template, i * every, i * every + 0.5) for i in range(count)]
+def series(count: int, every: float, template: str = "surprise") -> list[VisibleExpression]:
+    return [VisibleExpression(f"e{i}", template, i * every, i * every + 0.5) for i in range(count)]
 
 
 @pytest.mark.parametrize(
@@ -34,13 +34,13 @@ def series(count: int, every: float, template: str = "surprise") -> list[Seen]:
     ],
 )
 def test_how_long_an_expression_lasts(lasts: float, says: list[str]) -> None:
-    assert said(Seen("a", "anger", 1.0, 1.0 + lasts)) == says
+    assert said(VisibleExpression("a", "anger", 1.0, 1.0 + lasts)) == says
 
 
 def test_what_a_sad_speaker_shows_longer_is_not_unusual_for_that_mood() -> None:
-    assert said(Seen("a", "anger", 1.0, 3.5), mood="sad") == []
-    assert said(Seen("a", "anger", 1.0, 3.5), mood="confused") != []
-    assert said(Seen("a", "anger", 1.0, 6.0), mood="sad") != []
+    assert said(VisibleExpression("a", "anger", 1.0, 3.5), mood="sad") == []
+    assert said(VisibleExpression("a", "anger", 1.0, 3.5), mood="confused") != []
+    assert said(VisibleExpression("a", "anger", 1.0, 6.0), mood="sad") != []
 
 
 @pytest.mark.parametrize("mood", ["sad", "happy", "confused", "irritated", ""])
@@ -49,7 +49,7 @@ def test_what_enrich_places_for_a_mood_is_usual_for_it(mood: str) -> None:
     block = Enricher(mood=asked).text("Nonsense, he said. What a horror! Are you sure? Yes.")
     times = realizer.schedule(write(block)).times
     seen = [
-        Seen(node.id, template, (start + peak) / 2, (relax + end) / 2)
+        VisibleExpression(node.id, template, (start + peak) / 2, (relax + end) / 2)
         for node in block.behaviours
         if (template := template_of(node))
         for start, peak, relax, end in [times[node.id].tolist()]
@@ -59,28 +59,30 @@ def test_what_enrich_places_for_a_mood_is_usual_for_it(mood: str) -> None:
 
 
 def test_sadness_keeps_away_from_what_ends_before_it() -> None:
-    surprise = Seen("a", "surprise", 0.0, 0.5)
-    assert said(surprise, Seen("b", "sadness", 1.0, 2.0)) == ["sadness begins 0.5 s after surprise (a)"]
-    assert said(surprise, Seen("b", "sadness", 1.6, 2.6)) == []
+    surprise = VisibleExpression("a", "surprise", 0.0, 0.5)
+    assert said(surprise, VisibleExpression("b", "sadness", 1.0, 2.0)) == [
+        "sadness begins 0.5 s after surprise (a)"
+    ]
+    assert said(surprise, VisibleExpression("b", "sadness", 1.6, 2.6)) == []
 
 
 def test_disgust_wants_anger_near_it() -> None:
-    disgust = Seen("a", "disgust", 1.0, 1.8)
+    disgust = VisibleExpression("a", "disgust", 1.0, 1.8)
     assert said(disgust) == ["disgust stands alone"]
-    assert said(disgust, Seen("b", "surprise", 1.0, 1.8)) == ["disgust stands alone"]
-    assert said(disgust, Seen("b", "anger", 0.9, 1.9)) == []
+    assert said(disgust, VisibleExpression("b", "surprise", 1.0, 1.8)) == ["disgust stands alone"]
+    assert said(disgust, VisibleExpression("b", "anger", 0.9, 1.9)) == []
 
 
 def test_grief_wants_any_company() -> None:
-    grief = Seen("a", "grief", 1.0, 1.5)
+    grief = VisibleExpression("a", "grief", 1.0, 1.5)
     assert said(grief) == ["grief stands alone"]
-    assert said(grief, Seen("b", "anger", 0.9, 1.9)) == []
+    assert said(grief, VisibleExpression("b", "anger", 0.9, 1.9)) == []
 
 
 def test_a_word_of_disapproval_without_anger_is_told() -> None:
     block = Block(id="b", children=(Speech(id="s", text=SpeechText(parts=("Nonsense.",))),))
     assert said(block=block) == ['"Nonsense" is said without anger']
-    assert said(Seen("a", "anger", 1.0, 1.8), block=block) == []
+    assert said(VisibleExpression("a", "anger", 1.0, 1.8), block=block) == []
     assert said(block=block, role="listener") == []
 
 
@@ -88,8 +90,10 @@ def test_a_listener_is_calm_and_shows_other_things() -> None:
     assert said(*series(3, 2.0), role="listener") == [
         "a listener with 3 expressions, 1.5 s between two of them on average"
     ]
-    assert said(Seen("a", "anger", 0.0, 1.0), role="listener") == []
-    assert said(Seen("a", "happiness", 0.0, 1.0), role="listener") == ["a listener shows happiness"]
+    assert said(VisibleExpression("a", "anger", 0.0, 1.0), role="listener") == []
+    assert said(VisibleExpression("a", "happiness", 0.0, 1.0), role="listener") == [
+        "a listener shows happiness"
+    ]
 
 
 def test_a_pace_that_is_not_the_moods_is_told() -> None:

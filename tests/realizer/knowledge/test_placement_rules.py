@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realizer.knowledge.placement_rules import place
+from realizer.knowledge.placement_rules import place_expressions
 from realizer.knowledge.sentences import sentences
 from realizer.tables.emotional_words import word_list
 from realizer.tables.knowledge import Role, knowledge
@@ -12,7 +12,9 @@ from realizer.tables.knowledge import Role, knowledge
 
 def placed(text: str, role: Role = "speaker", mood: str = "") -> list[tuple[str, tuple[str, ...]]]:
     known = knowledge()
-    found = place(sentences(text), known, role, known.mood(mood) if mood else None, word_list("en"))
+    found = place_expressions(
+        sentences(text), known, role, known.mood(mood) if mood else None, word_list("en")
+    )
     return [(one.word.text, one.rule.show) for one in found]
 
 
@@ -77,5 +79,5 @@ def test_a_rule_that_stays_is_kept_in_any_mood() -> None:
 
 
 def test_without_words_only_punctuation_counts() -> None:
-    found = place(sentences("Nonsense. Czy to ty?"), knowledge(), words=None)
+    found = place_expressions(sentences("Nonsense. Czy to ty?"), knowledge(), words=None)
     assert [(one.word.text, one.rule.when) for one in found] == [("ty", "question")]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from realizer.tables.arkit_names import canonical, gathered, nearest, shapes
+from realizer.tables.arkit_names import canonical, group_names, nearest, shapes
 
 
 def test_shapes_are_the_52_of_arkit() -> None:
@@ -39,6 +39,6 @@ def test_a_misspelt_name_has_near_ones() -> None:
 
 
 def test_names_are_gathered_by_what_they_mean() -> None:
-    known, foreign = gathered(["mouthSmile_L", "MouthSmileLeft", "hat", "jawOpen"])
+    known, foreign = group_names(["mouthSmile_L", "MouthSmileLeft", "hat", "jawOpen"])
     assert known == {"mouthSmileLeft": ["mouthSmile_L", "MouthSmileLeft"], "jawOpen": ["jawOpen"]}
     assert foreign == ("hat",)
