@@ -44,9 +44,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Allow slow tests 300 s; `timeout` in pyproject.toml is for the others."""
+    """Allow slow tests and those in a browser 300 s; `timeout` in pyproject.toml is for the others.
+
+    Chromium may draw without a graphics card beside other tests; Playwright's timeouts of 30 s come first. A
+    timeout that fires while a failure is reported ends the whole run.
+    """
     for item in items:
-        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+        marked = item.get_closest_marker("slow") or item.get_closest_marker("browser")
+        if marked and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(300))
 
 

@@ -13,7 +13,7 @@ CODE = '''
 from pathlib import Path
 from bml_schema.node_schema import node
 from bml_schema.nodes import Behaviour
-from realizer.behaviours.kind import Kind
+from realizer.behaviours.kind import BehaviourKind
 from realizer.behaviours.table_timing import preferred
 from realizer.outputs.output import Output
 from realizer.speech.base_voice import BaseVoice
@@ -23,7 +23,7 @@ class Shrug(Behaviour):
     """Do nothing for a while."""
     tag = "{urn:test}shrug"
 
-KINDS = (Kind(Shrug, lambda node, world: preferred("idle"), lambda node, times, world: ()),)
+KINDS = (BehaviourKind(Shrug, lambda node, context: preferred("idle"), lambda node, times, context: ()),)
 COUNT = Output(".count", "text/plain", "the number of frames", lambda played, drawing: b"%d" % played.frames)
 FACES = Path(__file__).parent / "faces"
 

@@ -29,7 +29,7 @@ def expand(node: Idle, times: Float64, context: PlanningContext) -> tuple[Channe
             times,
             np.array([0.0, 1.0 - part]),
             layer=Layer.BASE,
-            holds=True,
+            keeps_last=True,
             source=node.id,
         )
         for channel, name, part in ((BlinkReduction, "blinks", node.blinks), (Channel, "motion", node.motion))

@@ -71,7 +71,7 @@ def test_bytes_are_read_as_the_parser_reads_them(encoding: str) -> None:
     assert under(source, source.locate("/bml", "id")) == "é"
 
 
-@given(blocks(unknown_attributes=False))
+@given(blocks(foreign=False))
 def test_every_behaviour_the_parser_placed_is_found(block: Block) -> None:
     text = "<!-- one -->\n" + write(block)
     source = Source(text)

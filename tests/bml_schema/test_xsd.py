@@ -227,7 +227,7 @@ def test_the_schema_declares_no_element_the_vocabulary_does_not_know() -> None:
     assert declared == known | others
 
 
-@given(blocks(unknown_attributes=False))
+@given(blocks(foreign=False))
 def test_what_is_written_is_valid(block: Block) -> None:
     text = write(block)
     assert SCHEMA.validate(etree.fromstring(text.encode())), (SCHEMA.error_log, text)

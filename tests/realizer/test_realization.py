@@ -42,7 +42,7 @@ def test_sound_is_mixed_where_it_belongs() -> None:
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False)
     tone = Utterance(0.5, (), (), {}, 8000, np.full(4000, 1000, np.int16))
     object.__setattr__(
-        played, "speaking", (ScheduledSpeech(1.0, float("inf"), tone, 0), ScheduledSpeech(1.2, 1.3, tone, 0))
+        played, "speeches", (ScheduledSpeech(1.0, float("inf"), tone, 0), ScheduledSpeech(1.2, 1.3, tone, 0))
     )
     sound = played.sound(16000)
     assert len(sound) == 32000
@@ -57,7 +57,7 @@ def test_visemes_are_those_of_their_character_and_end_where_the_speech_is_cut_of
     vowel = Utterance(1.0, (), (Phoneme(0.0, 1.0, "ɑ"),), {})
     object.__setattr__(
         played,
-        "speaking",
+        "speeches",
         (ScheduledSpeech(0.5, float("inf"), vowel, 1), ScheduledSpeech(1.0, 1.4, vowel, 0)),
     )
     said = played.visemes()

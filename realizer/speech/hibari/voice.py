@@ -101,7 +101,7 @@ class HibariVoice(EngineVoice):
         track = SpeechBuffer()
         for k, (run, reading) in enumerate(zip(parts, head["texts"], strict=True)):
             goes_on = k + 1 < len(parts) and not parts[k + 1].pause
-            self._speak(
+            self._speak_run(
                 track, run, reading, request.rate, rate, joined=k > 0 and not run.pause, goes_on=goes_on
             )
         warnings = [*script.warnings, *_warnings(request, track, hello)]
@@ -116,7 +116,7 @@ class HibariVoice(EngineVoice):
             warnings=tuple(warnings),
         )
 
-    def _speak(
+    def _speak_run(
         self,
         track: SpeechBuffer,
         run: ProsodyRun,

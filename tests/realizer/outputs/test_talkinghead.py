@@ -54,6 +54,7 @@ def head() -> Iterator[object]:
 
 
 @pytest.mark.browser
+@pytest.mark.xdist_group("browser")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")  # Playwright's own event loop closes its pipes late
 def test_talking_head_queues_every_word_viseme_and_frame(realization, tmp_path, head):
     said = written(realization, tmp_path)

@@ -77,7 +77,7 @@ ASKED = (
     ("direct", {"12L": 0.2}),
     ("direct", {"raise_l_cornerlip": 150.0, "open_jaw": 90.0}),
     ("direct", {"4L": 1.0, "raise_l_i_eyebrow": -40.0}),
-    ("feeling", {"12L": 0.9, "12R": 0.9, "1L": 0.5, "open_jaw": 30.0}),
+    ("emotion", {"12L": 0.9, "12R": 0.9, "1L": 0.5, "open_jaw": 30.0}),
 )
 
 
