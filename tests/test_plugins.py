@@ -14,7 +14,7 @@ from pathlib import Path
 from bml_schema.node_schema import node
 from bml_schema.nodes import Behaviour
 from realizer.behaviours.kind import BehaviourKind
-from realizer.behaviours.table_timing import preferred
+from realizer.behaviours.table_timing import timing_from_table
 from realizer.outputs.output import Output
 from realizer.speech.base_voice import BaseVoice
 
@@ -23,7 +23,7 @@ class Shrug(Behaviour):
     """Do nothing for a while."""
     tag = "{urn:test}shrug"
 
-KINDS = (BehaviourKind(Shrug, lambda node, context: preferred("idle"), lambda node, times, context: ()),)
+KINDS = (BehaviourKind(Shrug, lambda node, context: timing_from_table("idle"), lambda node, times, context: ()),)
 COUNT = Output(".count", "text/plain", "the number of frames", lambda played, drawing: b"%d" % played.frames)
 FACES = Path(__file__).parent / "faces"
 
@@ -32,8 +32,10 @@ class Quiet(BaseVoice):
     description = "a voice that is never heard"
     def say(self, request): raise NotImplementedError
 '''
+ADDING = (Path(__file__).parents[1] / "docs" / "adding.md").read_text("utf-8")
 POINTS = """
 [realizer.behaviours]
+yawn = yawn:KINDS
 shrug = plug:KINDS
 broken = plug:NOTHING
 [realizer.outputs]
@@ -49,6 +51,7 @@ mine = plug:FACES
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     site = tmp_path_factory.mktemp("site")
     (site / "plug.py").write_text(CODE)
+    (site / "yawn.py").write_text(ADDING.partition("```python\n")[2].partition("```")[0])
     info = site / "plug-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: plug\nVersion: 1.0\n")
@@ -71,6 +74,11 @@ def run(site: Path, *arguments: str, document: str = "") -> subprocess.Completed
         env={**os.environ, "PYTHONPATH": path},
         check=True,
     )
+
+
+def test_plugins_include_the_example_of_the_documentation(site: Path) -> None:
+    document = '<bml id="b" xmlns:r="urn:bml-realizer:1"><r:yawn id="y"/></bml>'
+    assert "<syncPointProgress" in run(site, "realize", "-", document=document).stdout
 
 
 def test_plugins_bring_a_behaviour_and_an_output(site: Path, tmp_path: Path) -> None:
