@@ -1,9 +1,10 @@
-"""Who may import whom, and which heavy library has which door."""
+"""Which package may import which, and the one package that imports each heavy library."""
 
 from __future__ import annotations
 
 import ast
 import functools
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -48,8 +49,8 @@ CLIENT = {
     "realizer.protocol",
 }
 
-# The one package (or module) that may import a heavy library.
-DOORS = {
+# The packages or modules that may import a heavy library.
+IMPORTERS = {
     "lxml": ("bml_schema",),
     "trimesh": ("realizer.face", "realizer.facebuild"),
     "numba": ("realizer.render.raster",),
@@ -119,10 +120,26 @@ def test_imports_point_to_the_left(name: str, path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "path"), modules(), ids=[name for name, _ in modules()])
-def test_heavy_libraries_have_one_door(name: str, path: Path) -> None:
-    for library, doors in DOORS.items():
+def test_imports_of_heavy_libraries_are_in_one_place(name: str, path: Path) -> None:
+    for library, importers in IMPORTERS.items():
         if any(within(i, library) for i in imports(path)):
-            assert any(within(name, door) for door in doors), f"{library} belongs to {doors}"
+            assert any(within(name, importer) for importer in importers), (
+                f"only {importers} may import {library}"
+            )
+
+
+def test_imports_have_no_circle() -> None:
+    """No two files import each other, also not inside functions, for types or by way of others."""
+    known = dict(modules())
+    graph = {
+        name: {i if i in known else i.rpartition(".")[0] for i in imports(path)} & known.keys() - {name}
+        for name, path in known.items()
+    }
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        # The sorter lists what comes first in front: each imports the one before it.
+        pytest.fail("circle of imports: " + " -> ".join(reversed(error.args[1])))
 
 
 def test_the_command_line_starts_without_the_heavy_libraries() -> None:
