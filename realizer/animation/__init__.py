@@ -1,1 +1,1 @@
-"""Curves to frames: channels of AUs and FAPs are sampled, blended and mapped."""
+"""Sampling, blending and mapping of the channels of AUs and FAPs."""

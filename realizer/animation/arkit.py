@@ -1,4 +1,4 @@
-"""The weights of ARKit's 52 blend shapes, and the turns of head and eyes, that show given AU frames."""
+"""Conversion of AU frames to ARKit: weights of its 52 blend shapes, rotations of head and eyes."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from realizer.core.units import ANGLE_UNIT
 from realizer.tables import faps, read_csv, text_of
 from realizer.tables.arkit_names import shapes
 
-# About how many millimetres a unit is on a grown-up's face; of an angle, on an eyeball of 12 mm.
+# Approximate millimetres a unit on an adult face; for angles, on an eyeball with a radius of 12 mm.
 MILLIMETRES = {
     "none": 0.0, "MNS": 0.022, "MW": 0.05, "ENS": 0.044, "ES": 0.06, "IRISD": 0.011, "angle_unit": 1.2e-4,
 }  # fmt: skip
-# Of the head and the tongue inside the mouth no shape tells; what is dilated or stretched there neither.
+# FAPs that no shape shows: the head, the tongue inside the mouth, pupils and nostrils.
 UNTOLD = (29, 30, 43, 44, 46, 47, 48, 49, 50)
-RIDGE = 0.15  # mm^2: of two ways to the same face, the one nearer to what the action units say
+RIDGE = 0.15  # mm^2: prefers solutions close to the weights of the action units
 STEPS, NEAR = 400, 1e-4
-RELAXED = 1.6  # over 1: faster
+RELAXED = 1.6  # over-relaxation; values above 1 converge faster
 JAW = (3, 14, 15)
 CLOSE, OPEN = "mouthClose", "jawOpen"
 CHUNK = 4096  # frames at once
@@ -40,7 +40,7 @@ class _Slide:
 
 @dataclass(frozen=True, eq=False)
 class ArkitFrames:
-    """What an ARKit head is moved by.
+    """The animation of an ARKit head.
 
     Attributes:
         times: (n,) float64 seconds.
@@ -57,22 +57,22 @@ class ArkitFrames:
 
 @cache
 def ARKIT_NAMES() -> tuple[str, ...]:
-    """ARKit's names of its 52 shapes, such as "jawOpen", alphabetically."""
+    """Return the names of ARKit's 52 shapes, such as "jawOpen", in alphabetical order."""
     return tuple(sorted(shapes()))
 
 
 def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
-    """The weights that show what the frames show, each frame by itself.
+    """Return the ARKit weights that reproduce AU frames, independently for each frame.
 
-    Shapes that are action units get these (`arkit.csv`), as far as speech leaves them the lips. What they do
-    not tell (speech, FAPs of clients, action units without a shape) is what remains of the FAPs: the weights
-    within 0..1 are sought that come nearest to it in millimetres at the feature points, by least squares with
-    a ridge towards the weights of the action units. There is one minimum; the alternating direction method of
-    multipliers (Boyd et al. 2011, 5.2) finds it for all frames at once.
+    Shapes that correspond to action units copy their intensity (`arkit.csv`), reduced where speech owns the
+    lips. The rest (speech, FAPs of clients, action units without a shape) is fitted from the remaining FAPs:
+    bounded least squares in millimetres at the feature points, with a ridge towards the copied weights. The
+    minimum is unique; the alternating direction method of multipliers (Boyd et al. 2011, 5.2) finds it for
+    all frames at once.
 
     Args:
         frames: n frames.
-        mapping: what AUs ask of FAPs; None is the one that ships.
+        mapping: from AUs to FAPs; None for the built-in one.
     """
     whole = to_fap(frames, mapping).values
     columns, share, owned = _from_aus(mapping)
@@ -97,23 +97,23 @@ def arkit(frames: AUFrames, mapping: FapMapping | None = None) -> ArkitFrames:
 
 
 def warm_up(mapping: FapMapping | None = None) -> None:
-    """Read the tables and invert the matrices, which would otherwise delay the first frames."""
+    """Read the tables and invert the matrices in advance, so that they do not delay the first frames."""
     _from_aus(mapping)
     _system(mapping)
 
 
 def arkit_faps(weights: Float32, mapping: FapMapping | None = None) -> Float32:
-    """The way back: (n, 68) FAPs, in FAPU, that weights (n, 52) amount to; the head's are 0."""
+    """Return the (n, 68) FAPs, in FAPU, that weights (n, 52) produce; the head's are 0."""
     return np.asarray(weights @ _effects(mapping), np.float32)
 
 
 def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float64:
-    """(n, 52) within 0..1, nearest to what `first` shows and `rest` besides."""
+    """Return weights (n, 52), 0..1, that best show `first` plus the FAPs `rest` (n, 68)."""
     moves, scale, inverse, rho = _system(mapping)
     first = np.clip(first, 0, 1)
     aim = rest * scale @ moves.T
     out = first.copy()
-    # Where nothing is left to tell, not a bit changes.
+    # Frames without a remainder keep their weights exactly.
     busy = np.flatnonzero(np.abs(aim).max(axis=1, initial=0) > 1e-9)
     low, high, aim = -first[busy], 1 - first[busy], aim[busy]
     change, dual = np.zeros_like(aim), np.zeros_like(aim)
@@ -130,7 +130,7 @@ def _nearest(first: Float64, rest: Float32, mapping: FapMapping | None) -> Float
 
 @cache
 def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, float]:
-    """Moves (52, 68) in millimetres of each shape; scale (68,); what `_nearest` divides by, and its rho."""
+    """Return the shapes' movements (52, 68) in mm, scale (68,), inverse matrix and rho for `_nearest`."""
     scale = np.array([0.0 if row.fap in UNTOLD else MILLIMETRES[row.unit] for row in faps()])
     moves = _effects(mapping) * scale
     square = moves @ moves.T + RIDGE * np.eye(len(moves))
@@ -141,11 +141,11 @@ def _system(mapping: FapMapping | None) -> tuple[Float64, Float64, Float64, floa
 
 @cache
 def _from_aus(mapping: FapMapping | None) -> tuple[list[int], Float32, Float32]:
-    """The AUs that shapes show, what each adds to each shape (n_au, 52), and what speech owns of a shape."""
+    """Return the AUs that have shapes, their share of each shape (n_au, 52), and speech's share (52,)."""
     share = np.zeros((len(AU_NAMES()), len(ARKIT_NAMES())), np.float32)
     for k, name in enumerate(ARKIT_NAMES()):
         for column in _columns(shapes()[name].au, shapes()[name].side):
-            # A shape of both sides shows the mean of them.
+            # A shape that spans both sides shows their mean.
             share[column, k] = 1 / len(_columns(shapes()[name].au, shapes()[name].side))
     effects = np.abs(_effects(mapping)) * [MILLIMETRES[row.unit] for row in faps()]
     own = np.array([row.speech_owns for row in faps()])
@@ -158,21 +158,21 @@ def _from_aus(mapping: FapMapping | None) -> tuple[list[int], Float32, Float32]:
 
 
 def _columns(au: int, side: str) -> list[int]:
-    """The columns of an action unit that a shape of that side shows; none of AU 0."""
+    """Return the columns of an action unit on a shape's side; none for AU 0."""
     names = [f"{au}", f"{au}{side}"] if side else [f"{au}", f"{au}L", f"{au}R"]
     return [axis()[name].column for name in names if name in AU_NAMES()]
 
 
 @cache
 def _beside(side: str) -> Float32:
-    """(68,) how much of a FAP a shape of that side moves: all of its own, half of the middle's."""
+    """Return the part (68,) of each FAP that a one-sided shape moves: 1 on its side, 0.5 in the middle."""
     sides = [re.search(r"_([lr])m?(_|$)", row.name) for row in faps()]
     return np.array([0.5 if found is None else found[1] == side.lower() for found in sides], np.float32)
 
 
 @cache
 def _effects(mapping: FapMapping | None) -> Float32:
-    """(52, 68) FAPU: what each shape at weight 1 does, as the mapping has it of its action unit."""
+    """Return the FAPs (52, 68), in FAPU, of each shape at weight 1, derived from its action unit."""
     names = ARKIT_NAMES()
     values = np.zeros((len(names), len(axis())), np.float32)
     for row, name in zip(values, names, strict=True):

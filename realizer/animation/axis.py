@@ -1,4 +1,4 @@
-"""The fixed axis of animation: AUs by side, 68 FAPs, mask channels, and the AUs' mixing order."""
+"""The columns of animation frames: AUs by side, 68 FAPs, mask channels, mixing order of the AUs."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import NamedTuple
 
 from realizer import tables
 
-# How far (0..1) something is taken from what shows it otherwise: speech takes the lips, a temporary gaze
-# takes eyes and head from the base gaze, a document takes blinks and small movements from the idle face, and
-# the successive mixer takes the action units from the additive one.
+# Each has a mask channel (0..1), which suppresses other sources of the region: speech masks the lips, a
+# temporary gaze masks eyes and head for the base gaze, a document masks blinks and small idle movements, and
+# the successive mixer masks the action units for the additive one.
 MASKED_REGIONS = ("lips", "eyes", "head", "blinks", "motion", "successive")
 
 
 class Target(NamedTuple):
     """One column of the axis.
 
-    `name` is "12L" for an AU, "open_jaw" for a FAP, "lips" for a presence, "rank 12" for an AU's place among
-    those that follow one another.
+    `name` is "12L" for an AU, "open_jaw" for a FAP, "lips" for a mask channel, "rank 12" for the position of
+    an AU in the successive mixer.
     """
 
     name: str
@@ -26,8 +26,8 @@ class Target(NamedTuple):
 
 @cache
 def axis() -> dict[str, Target]:
-    """Name -> Target of every column: AUs (one a side where they have sides), 68 FAPs, presences, ranks."""
-    # What turns is not mixed: turns follow one another as they must.
+    """Return the target of every column by name: AUs (by side), 68 FAPs, mask channels, ranks."""
+    # Rotations have no rank, because they add up in any order.
     ranks = (f"rank {row.au}" for row in tables.action_units() if not row.degrees)
     names = [*_au_names(), *(row.name for row in tables.faps()), *MASKED_REGIONS, *ranks]
     return {name: Target(name, column) for column, name in enumerate(names)}
@@ -35,7 +35,7 @@ def axis() -> dict[str, Target]:
 
 @cache
 def _au_names() -> tuple[str, ...]:
-    """ "1L", "1R", ... "17", ...: ascending AU number, left before right."""
+    """Return "1L", "1R", ... "17", ...: by AU number, left before right."""
     names: list[str] = []
     for row in tables.action_units():
         names += [f"{row.au}L", f"{row.au}R"] if row.sides else [str(row.au)]
@@ -43,16 +43,16 @@ def _au_names() -> tuple[str, ...]:
 
 
 def AU_NAMES() -> tuple[str, ...]:
-    """Names of the AU columns, in order: the `au.names` of the JSON."""
+    """Return the names of the AU columns in order; the `au.names` of the JSON."""
     return _au_names()
 
 
-@lru_cache(maxsize=512)  # more than there are
+@lru_cache(maxsize=512)  # more than all AUs and sides
 def au(number: int, side: str = "BOTH") -> tuple[Target, ...]:
-    """The columns of one AU; side is LEFT, RIGHT or BOTH (the character's). A midline AU has one column.
+    """Return the columns of one AU; side is LEFT, RIGHT or BOTH (the character's). Midline AUs have one.
 
     Raises:
-        KeyError: no such AU.
+        KeyError: if there is no such AU.
     """
     columns = axis()
     if str(number) in columns:
@@ -62,29 +62,26 @@ def au(number: int, side: str = "BOTH") -> tuple[Target, ...]:
 
 
 def fap(number: int) -> Target:
-    """The column of one FAP, 1..68."""
+    """Return the column of one FAP, 1..68."""
     return axis()[tables.faps()[number - 1].name]
 
 
 def mask_channel(region: str) -> Target:
-    """The column that says how far one of `MASKED_REGIONS` is taken."""
+    """Return the mask channel of one of `MASKED_REGIONS`."""
     return axis()[region]
 
 
 def mixing_order(number: int) -> Target:
-    """The column that says how early (0..1) an AU comes where AUs follow one another.
+    """Return the column that holds an AU's position (0..1) in the successive mixer.
 
     Raises:
-        KeyError: no such AU, or one that turns something.
+        KeyError: if there is no such AU, or it is a rotation.
     """
     return axis()[f"rank {number}"]
 
 
 def region(target: Target) -> str:
-    """What a column moves, as base states are replaced: "eyes" (gaze), "head", "face" or "idle".
-
-    A presence stands in the region it takes; all FAPs but those of eyeballs and head are of the face.
-    """
+    """Return the region of a column by which base states are replaced: "eyes", "head", "face" or "idle"."""
     name = target.name
     if name == "successive" or name.startswith("rank "):
         return "face"

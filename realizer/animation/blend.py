@@ -1,4 +1,4 @@
-"""Step 5, blending: channels sampled and laid over each other in layers, in any order."""
+"""Step 5 of the pipeline: sampling channels and blending their layers."""
 
 from __future__ import annotations
 
@@ -17,43 +17,42 @@ from realizer.animation.idle.motion import Idle
 from realizer.core.array_types import Float32, Float64, Index
 from realizer.tables.cooccurrence import Rules
 
-# What replaces what lies below, the upper one last.
+# Layers that replace those below them, bottom up.
 OVER = (Layer.FAPS, Layer.DIRECT)
-# What is worked out apart from the others, where it adds up.
+# Layers that are summed separately before they join the others.
 APART = (Layer.BASE, Layer.GAZE)
 
 
 def blend(
     channels: Iterable[Channel], times: Float64, rules: Rules | None = None, idle: Idle | None = None
 ) -> AUFrames:
-    """What all channels show together.
+    """Sample channels and blend them into frames.
 
-    Column by column of the axis:
+    In each column of the axis:
 
     - AUs: the strongest channel wins; rotations (combine = "sum" in the table) of all layers add up.
-    - BASE states add up, so that one which is faded out while another rises passes smoothly into it; the
-      part of a region that the GAZE layer has taken (its presence) is taken from them.
-    - GAZE: where several gazes claim a region together more than once, each gets its share of it.
-    - IDLE: the part of its motion and of its blinks that the presences "motion" and "blinks" have taken does
-      not show. A blink comes whole or not at all, as it is when it begins.
-    - FAPs add up; presences add up to at most 1.
-    - FAPS, and above it DIRECT: as far as such a channel is there, it replaces all that lies below; of a FAP
-      that is also what AUs ask of it (`AUFrames.overridden`). Several in one layer that are there more than
-      once together each get their share.
+    - BASE states add up, so that one that fades out crossfades with one that rises. They are reduced where
+      the GAZE layer masks their region.
+    - GAZE: where the masks of several gazes exceed 1 in a region, they share it in proportion.
+    - IDLE: the masks "motion" and "blinks" reduce it. A blink is shown whole or not at all, decided at its
+      onset.
+    - FAPs add up; mask channels add up to at most 1.
+    - FAPS, and above it DIRECT: such a channel replaces all layers below it by its weight, and for FAPs also
+      what AUs contribute (`AUFrames.overridden`). Channels of one layer whose weights exceed 1 share it.
 
     AUs are limited to 0..1 at the end.
 
     Args:
-        channels: any number, any order; times on the same clock as `times`.
+        channels: in any order; on the clock of `times`.
         times: (n,) seconds, any order.
-        rules: which AUs a face can show together; None: all of them.
-        idle: what the face does by itself between the first and the last of the times.
+        rules: co-occurrence rules; None for none.
+        idle: the idle motion of the face between the first and the last of the times.
     """
     asked = np.asarray(times, np.float64)
     order = in_order(asked)
     times = asked if order is None else asked[order]
     alive = _visible(channels, times)
-    # Only the columns that something moves are worked on; `place` says where each of them stands.
+    # Only columns that move are computed; `place` holds the row of each of them.
     moved = {channel.target.column for channel in alive}
     if idle is not None:
         moved |= {*idle.motion.columns, *_lids()}
@@ -64,11 +63,11 @@ def blend(
         _share_regions(gaze, base, place)
         values += gaze
     if base is not None:
-        # Base states and expressions: the stronger one shows; rotations add up.
+        # Of base states and expressions the stronger is shown; rotations add up.
         adds = np.array([_sums()[column] for column in columns])[:, None]
         values = np.where(adds, base + values, np.maximum(base, values))
     held = _override(values, alive, place, times)
-    # The FAPs between AUs and presences have limits of their own.
+    # FAPs, between AUs and mask channels, have limits of their own.
     first, last = (bisect_left(columns, len(AU_NAMES()) + count) for count in (0, 68))
     for limited in (values[:first], values[last:]) if first < last else (values,):
         np.clip(limited, 0.0, 1.0, out=limited)
@@ -90,9 +89,9 @@ def _visible(channels: Iterable[Channel], times: Float64) -> list[Channel]:
 def _layers(
     channels: list[Channel], idle: Idle | None, place: dict[int, int], times: Float64
 ) -> tuple[Float64, Float64 | None, Float64 | None]:
-    """(c, n) each of the columns in `place`: expressions, base states and gazes (None: there are none).
+    """Return the columns in `place`, (c, n) each, of expressions, base states and gazes, or None for these.
 
-    Expressions are all that neither is one of the others nor replaces what lies below.
+    Expressions include all other layers, except those that replace the ones below.
     """
     own = [channel for channel in channels if channel.layer not in OVER]
     layers = {Layer.EXPRESSION: 0}
@@ -122,10 +121,7 @@ def _layers(
 
 
 def _by_column(rows: Float64, columns: list[int], count: int, order: Index | None) -> Float32:
-    """(n, count) float32 that has rows (m, n) as its columns, and n in the order they were asked for.
-
-    In memory it lies column by column, as it is worked on.
-    """
+    """Return frames (n, count) float32 with `rows` (m, n) as their columns, stored column by column."""
     whole = np.zeros((count, rows.shape[1]), np.float32)
     if order is None:
         whole[columns] = rows
@@ -135,7 +131,7 @@ def _by_column(rows: Float64, columns: list[int], count: int, order: Index | Non
 
 
 def _share_regions(gaze: Float64, base: Float64 | None, place: dict[int, int]) -> None:
-    """Give each gaze its part of a region that several take, and take it from the base states, in place."""
+    """Share each region among its gazes, and mask the base states there, in place."""
     for name, aus in _regions().items():
         if (taken := place.get(axis()[name].column)) is None:
             continue
@@ -150,7 +146,7 @@ def _share_regions(gaze: Float64, base: Float64 | None, place: dict[int, int]) -
 def _begin_idle(
     values: Float64, idle: Idle, channels: list[Channel], place: dict[int, int], times: Float64
 ) -> None:
-    """Write what the face does by itself, as far as `channels` let it, into rows that are still 0."""
+    """Write blinks and idle motion, as far as no channel masks them, into rows that are still 0."""
     blinks = idle.blinks
     if fewer := [channel for channel in channels if channel.target.column == mask_channel("blinks").column]:
         blinks = blinks.reduced(1.0 - sample(fewer, blinks.onsets).sum(axis=0))
@@ -162,7 +158,7 @@ def _begin_idle(
 
 
 def _idle_share(found: Samples, own: list[Channel], channels: list[Channel], times: Float64) -> Float64:
-    """(e,) the values that were found, of the idle layer what its presence leaves."""
+    """Return the sampled values (e,), with the mask "motion" applied to the idle layer."""
     idle = [channel.layer is Layer.IDLE for channel in own]
     if any(idle) and (still := _idle_weight(channels, times)) is not None:
         return found.values * np.where(found.spread(np.array(idle)), still[found.frames], 1.0)
@@ -170,7 +166,7 @@ def _idle_share(found: Samples, own: list[Channel], channels: list[Channel], tim
 
 
 def _idle_weight(channels: list[Channel], times: Float64) -> Float64 | None:
-    """(n,) how much of idle motion the presence "motion" leaves; None: all of it."""
+    """Return the weight (n,) of idle motion that the mask "motion" leaves, or None for all of it."""
     column = mask_channel("motion").column
     taking = [channel for channel in channels if channel.target.column == column]
     return 1.0 - np.minimum(sample(taking, times).sum(axis=0), 1.0) if taking else None
@@ -179,10 +175,10 @@ def _idle_weight(channels: list[Channel], times: Float64) -> Float64 | None:
 def _override(
     values: Float64, channels: list[Channel], place: dict[int, int], times: Float64
 ) -> Float64 | None:
-    """Lay the channels that replace what lies below over `values` (c, n), in place.
+    """Blend the channels of the layers FAPS and DIRECT over `values` (c, n), in place.
 
     Returns:
-        (c, n) 0..1 how far it was replaced; None: nowhere.
+        (c, n) 0..1 how far each value was replaced, or None if nowhere.
     """
     held: Float64 | None = None
     for layer in OVER:
@@ -201,13 +197,13 @@ def _override(
 
 @cache
 def _lids() -> tuple[int, ...]:
-    """The columns that a blink closes."""
+    """Return the columns of blinks."""
     return tuple(lid.column for lid in au(45))
 
 
 @cache
 def _sums() -> tuple[bool, ...]:
-    """Of each column whether channels add up there."""
+    """Return for each column whether channels add up in it."""
     known = tables.by_number()
     aus = [known[int(name.rstrip("LR"))].combine == "sum" for name in AU_NAMES()]
     return (*aus, *(True for _ in range(len(aus), len(axis()))))
@@ -215,7 +211,7 @@ def _sums() -> tuple[bool, ...]:
 
 @cache
 def _regions() -> dict[str, list[int]]:
-    """The presences that a gaze takes -> AU columns of that region."""
+    """Return the AU columns of "eyes" and "head", the regions that a gaze masks."""
     regions: dict[str, list[int]] = {"eyes": [], "head": []}
     for name in AU_NAMES():
         if region(axis()[name]) in regions:

@@ -1,4 +1,4 @@
-"""The value of step 4: key times and values of one target."""
+"""Channels, the result of step 4: key times and values of one target."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from realizer.core.array_types import Float64
 
 
 class Layer(IntEnum):
-    """Bottom up: where a channel is blended; `animation.blend` says what each layer does to those below."""
+    """The layers in which channels are blended, bottom up; see `animation.blend`."""
 
     BASE = 0  # mood, *Shift
     IDLE = 1  # blinks, small head motion
@@ -28,7 +28,7 @@ class Layer(IntEnum):
 
 
 class Gain(NamedTuple):
-    """From `begin` to `end` what a channel or a sound is multiplied with goes to `to`, and stays there."""
+    """A change of the factor of a channel or a sound: it reaches `to` between `begin` and `end` and stays."""
 
     begin: float
     end: float
@@ -36,15 +36,15 @@ class Gain(NamedTuple):
     curve: str = "smooth"
 
     def shifted(self, seconds: float) -> Gain:
-        """The same change, later by `seconds`."""
+        """Return the same change, later by `seconds`."""
         return self._replace(begin=self.begin + seconds, end=self.end + seconds)
 
 
 class Crossfade(NamedTuple):
-    """How a channel goes on from the one before it: by what it differs at `at`, which `length` seconds heal.
+    """How a channel continues its predecessor: their difference at `at`, which decays over `length` seconds.
 
-    `value` and `slope` are what was shown at that time less what this channel would show, and a second of it;
-    `share` is how far the one before was there less how far this one would be.
+    `value`, `slope` (per second) and `share` are the predecessor's value, slope and weight at that time,
+    minus those of this channel.
     """
 
     at: float
@@ -65,18 +65,18 @@ class Channel:
         target: the column it drives.
         times: (k,) float64 seconds, rising; from block start when expanded, on the session clock in the
             player.
-        values: (k,) float64; AU and presence 0..1, FAP in its FAPU.
+        values: (k,) float64; AUs and mask channels 0..1, FAPs in their FAPU.
         curve: name in `animation.curves`: "smooth" (velocity zero at each key) or "linear".
         layer: where it is blended.
-        keeps_last: the last value stays for ever (base states); otherwise the channel is 0 outside its keys.
-        gains: what it is multiplied with, 1 before the first: where a behaviour is cut off, a base state is
-            replaced or an amount changes. Each goes on from what those before it have reached, so that
-            nothing jumps.
-        until: it shows nothing from then on: another channel goes on in its place.
-        crossfade: it is such a channel, and shows nothing before `joint.at`.
-        weight: (k,) 0..1 or None: how far it takes the place of what lies below, at each key; whole where it
-            is None. Only of the layers FAPS and DIRECT, whose values are what is shown, so 0 where this is 0.
-        source: "block:behaviour" that made it, for messages.
+        keeps_last: whether the last value stays for ever (base states); otherwise the channel is 0 outside
+            its keys.
+        gains: changes of its factor, which is 1 at first: for behaviours that are interrupted, base states
+            that are replaced, and amounts that change. Each starts from the factor reached before it.
+        until: seconds; the channel is 0 from then on, because another one replaces it.
+        crossfade: set for such a replacement, which is 0 before `crossfade.at`.
+        weight: (k,) 0..1: how far it replaces the layers below, at each key; None for 1. Only for the layers
+            FAPS and DIRECT. The values are weighted already: 0 where the weight is 0.
+        source: "block:behaviour" that it comes from, for messages.
     """
 
     target: Target
@@ -99,25 +99,25 @@ class Channel:
             self.__dict__.update(times=times, values=values)
 
     def shifted(self, seconds: float) -> Channel:
-        """The same channel, later by `seconds`."""
+        """Return the same channel, later by `seconds`."""
         return later((self,), seconds, self.source)[0]
 
     def named(self, source: str) -> Channel:
-        """The same channel, made by `source`."""
+        """Return the same channel with another source."""
         return self.changed({"source": source})
 
     def faded(self, begin: float, end: float) -> Channel:
-        """The same channel faded out from `begin` to `end`; an earlier fade stays as it is."""
+        """Return the channel faded out from `begin` to `end`, unless it fades out earlier."""
         if self.faded_at <= end:
             return self
         return self.scaled(Gain(begin, end, 0.0))
 
     def scaled(self, gain: Gain) -> Channel:
-        """The same channel with one more gain."""
+        """Return the channel with one more gain."""
         return self.changed({"gains": (*self.gains, gain)})
 
     def changed(self, changes: Mapping[str, object]) -> Channel:
-        """As `replace`, in a tenth of its time: what changes is as sound as what was there."""
+        """Return a copy with changed fields; unlike `replace`, without checks, in a tenth of the time."""
         other = object.__new__(type(self))
         fields = other.__dict__
         fields.update(self.__dict__)
@@ -127,7 +127,7 @@ class Channel:
 
     @property
     def weight_channel(self) -> Channel:
-        """How far it takes the place of what lies below, as a channel itself."""
+        """The weight over time, as a channel itself."""
         there = np.ones(len(self.times)) if self.weight is None else self.weight
         joint = (
             None if self.crossfade is None else self.crossfade._replace(value=self.crossfade.share, slope=0.0)
@@ -136,13 +136,13 @@ class Channel:
 
     @property
     def faded_at(self) -> float:
-        """When it has been faded out for good; infinite where it is not."""
+        """Seconds at which the channel has faded out for good; infinite if it has not."""
         last = self.gains[-1] if self.gains else None
         return last.end if last is not None and last.to == 0.0 else float("inf")
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """(first, last) seconds at which it may be other than 0; last is infinite where it holds."""
+        """(first, last) seconds between which it may differ from 0; last may be infinite."""
         last = float("inf") if self.keeps_last else float(self.times[-1])
         first = float(self.times[0])
         if self.crossfade is not None:
@@ -151,7 +151,7 @@ class Channel:
 
 
 def later(channels: Sequence[Channel], seconds: float, source: str) -> tuple[Channel, ...]:
-    """The same channels later by `seconds`, made by `source`; those that share their times still do."""
+    """Return the channels later by `seconds`, with another source; those that share key times still do."""
     shifted: dict[int, Float64] = {}
     found = []
     for channel in channels:

@@ -1,4 +1,4 @@
-"""Co-occurrence rules: requested action units to those a face can show together (Wojdel 2005, 5.2)."""
+"""Co-occurrence rules, which reduce action units to what a face can show together (Wojdel 2005, 5.2)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from realizer.tables.cooccurrence import Rule, Rules, Unit
 
 
 class Allowed(NamedTuple):
-    """What is left of the units that were asked for.
+    """The action units that the rules leave.
 
     Attributes:
-        aus: (n_au, n) float32, 0..1: what a coder of the face would score.
-        overridden: (n_au, n) float32: what another unit's own appearance holds (the parting of the lips in a
-            jaw that drops). It is not scored, but it does not leave the face.
+        aus: (n_au, n) float32, 0..1: what a FACS coder would score.
+        overridden: (n_au, n) float32: what is not scored because it is part of another unit's appearance
+            (the lips part when the jaw drops), but still moves the face.
     """
 
     aus: Float32
@@ -28,10 +28,10 @@ class Allowed(NamedTuple):
 
 
 def cooccur(aus: Float32, rules: Rules) -> Allowed:
-    """Apply all rules at once: each reads what came in, and a unit keeps the least that any rule leaves it.
+    """Apply all rules at once: each reads the input, and a unit keeps the least value that any rule allows.
 
-    So the order of rules does not matter, a second pass changes nothing, and a small change of what comes in
-    is a small change of what comes out (at most twice as large).
+    So the order of rules does not matter, a second pass changes nothing, and a small change of the input
+    changes the output by at most twice as much.
 
     Args:
         aus: (n_au, n) float32 intensities 0..1, rows named by `AU_NAMES()`.
@@ -49,12 +49,12 @@ def cooccur(aus: Float32, rules: Rules) -> Allowed:
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Rules that bound a unit by 1 - min(m(a), m(b)), m being membership in a fuzzy set.
+    """Rules that limit a unit to 1 - min(m(a), m(b)), where m is membership in a fuzzy set.
 
     Attributes:
-        weaker: (m,) the row of the unit, rising.
-        stronger: (2, m) of `rows`: a and b, twice the same where there is one.
-        rows: (2, k) the rows of a unit that is stronger somewhere, of two sides; twice the same where one.
+        weaker: (m,) the row of the limited unit, rising.
+        stronger: (2, m) indices into `rows` of a and b, which may be equal.
+        rows: (2, k) the rows of both sides of a stronger unit, which may be equal.
         start, low, high: (k, 1) its membership at 0, and the slopes below and above 0.5.
     """
 
@@ -66,10 +66,10 @@ class Terms:
     high: Float32
 
     def among(self, row: Index) -> Bound | None:
-        """What bounds units that may be up; None: nothing does.
+        """Return the limits among active units, or None if there are none.
 
         Args:
-            row: (n_au,) where the row of each of them stands, -1 for units that are not up.
+            row: (n_au,) the row of each active unit, -1 for other units.
         """
         up = row >= 0
         strong: Bool = up[self.rows[0]] | up[self.rows[1]]
@@ -92,7 +92,7 @@ class Terms:
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """`Terms` of some units, in their rows; terms in the order of `rounds`, `units` as its groups."""
+    """The `Terms` of active units, by their rows; terms are ordered as `rounds`, `units` as its groups."""
 
     units: Index
     rounds: GroupReduction
@@ -103,8 +103,8 @@ class Bound:
     high: Float32
 
     def lower(self, left: Float32, aus: Float32) -> None:
-        """Leave of `left` (u, n), in place, what `aus` (u, n) let it have."""
-        value = np.maximum(*aus.take(self.rows, axis=0))  # (k, n): of two sides the stronger
+        """Reduce `left` (u, n), in place, to what the intensities `aus` (u, n) allow."""
+        value = np.maximum(*aus.take(self.rows, axis=0))  # (k, n): the stronger of two sides
         half = np.minimum(value, np.float32(0.5))
         value -= half
         value *= self.high
@@ -118,15 +118,17 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The rules for some units, each a row of whole arrays: `taking` takes from the face, `holding` from the
-    score alone; `opposed` (2, k) rows face each other."""
+    """The rules among active units, by their rows.
+
+    `taking` reduces movement, `holding` the score alone; `opposed` is (2, k).
+    """
 
     taking: Bound | None
     holding: Bound | None
     opposed: Index
 
     def moving(self, asked: Float32) -> Float32:
-        """(u, n) what moves the face of units that are asked for (u, n), also where it is not scored."""
+        """Return the part (u, n) of requested intensities that moves the face, scored or not."""
         if self.taking is None and not self.opposed.size:
             return asked
         left = asked.copy()
@@ -139,7 +141,7 @@ class Bounds:
         return left
 
     def scored(self, asked: Float32, moving: Float32) -> Float32:
-        """(u, n) what a coder would score of units that are asked for, of which `moving` (u, n) is left."""
+        """Return the part (u, n) of `moving` (u, n) that a FACS coder would score."""
         if self.holding is None:
             return moving
         left = moving.copy()
@@ -148,12 +150,12 @@ class Bounds:
 
 
 def bounds(rules: Rules, live: tuple[int, ...]) -> Bounds:
-    """What the rules say of the units of which these rows, rising, may be other than 0."""
+    """Return the rules among the units in rows `live`, rising, which are the ones that may differ from 0."""
     return _bounds(_Key(rules), live)
 
 
 class _Key:
-    """A file of rules by identity, so that it is compiled once."""
+    """A hash key for rules, by identity, so that they are compiled once."""
 
     def __init__(self, rules: Rules) -> None:
         self.rules = rules
@@ -165,7 +167,7 @@ class _Key:
         return isinstance(other, _Key) and other.rules is self.rules
 
 
-# Sessions move the same few sets of units again and again; 5 kB each.
+# Sessions repeat a few sets of units; each entry takes 5 kB.
 @lru_cache(maxsize=512)
 def _bounds(key: _Key, live: tuple[int, ...]) -> Bounds:
     taking, holding, opposed = _compile(key)
@@ -214,7 +216,7 @@ def _pair(rule: Rule) -> tuple[Unit, Unit]:
 
 
 def _membership(unit: Unit, rule: Rule, rules: Rules) -> tuple[float, float, float]:
-    """Of the stronger unit at 0, 0.5 and 1; an excluding one counts as far as it is not small."""
+    """Return the membership of the stronger unit at 0, 0.5 and 1; an excluding unit counts if not small."""
     if rule.kind in ("exclusion", "inclusion"):
         small = rules.sets["X"]
         return 1 - small[0], 1 - small[1], 1 - small[2]
@@ -222,7 +224,7 @@ def _membership(unit: Unit, rule: Rule, rules: Rules) -> tuple[float, float, flo
 
 
 def _sides(number: int) -> list[tuple[int, str]]:
-    """(row, side) of each side of an AU; side "" where it has one row."""
+    """Return (row, side) for each side of an AU; side is "" if it has a single row."""
     names = AU_NAMES()
     if str(number) in names:
         return [(names.index(str(number)), "")]
@@ -230,7 +232,7 @@ def _sides(number: int) -> list[tuple[int, str]]:
 
 
 def _rows(number: int, side: str) -> tuple[int, int]:
-    """The rows of a stronger unit that count for a weaker one on `side`: its own side, or both."""
+    """Return the rows of a stronger unit that act on a weaker one on `side`: of the same side, or both."""
     rows = _sides(number)
     own = [row for row, other in rows if not side or not other or other == side]
     return own[0], own[-1]

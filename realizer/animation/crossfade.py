@@ -10,24 +10,24 @@ import numpy as np
 from realizer.animation.channel import Channel, Crossfade
 from realizer.animation.curves import sample, weights
 
-# s; a face is back on its new course after that: about the attack of an expression.
+# s until a crossfade has ended: about the attack of an expression.
 HEALS = 0.3
-# s; keys that differ by less are the same, solved again.
+# s; keys that differ by less are equal but for rounding in the scheduler.
 SAME = 1e-9
-# s; over which a slope is measured.
+# s over which a slope is measured.
 STEP = 1e-4
 
 
 def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[Channel, ...]:
-    """What is shown passes from old channels to new ones at `now`, without a jump in value or velocity.
+    """Replace channels at `now` without a jump in value or velocity, and return all channels.
 
     Args:
-        old: of one behaviour; those that others took the place of before stay as they are.
-        new: of the same behaviour at other times; they take over the gains of the old ones.
+        old: the channels of one behaviour; those that were replaced before stay as they are.
+        new: the channels of the same behaviour at other times; they inherit the gains of the old ones.
     """
     kept = [c for c in old if c.until < float("inf")]
     playing = [c for c in old if c.until == float("inf")]
-    # Of a speech that grows most is as it was.
+    # When a speech grows, most of its channels stay equal.
     there = {(id(c.values), c.target): c for c in playing if c.crossfade is None and not c.gains}
     stays: set[int] = set()
     news: list[Channel] = []
@@ -58,7 +58,7 @@ def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tup
 
 
 def _twin(channel: Channel, n: int, old: Sequence[Channel], new: Sequence[Channel]) -> Channel | None:
-    """The new channel of the same target: the first for the first of its kind, and so on."""
+    """Return the new channel with the same target and the same rank among those of this target."""
     place = sum(c.target == channel.target for c in old[:n])
     same = [c for c in new if c.target == channel.target]
     return same[place] if place < len(same) else None

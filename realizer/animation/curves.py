@@ -1,4 +1,4 @@
-"""Sampling of channels: smooth or linear between keys, zero outside."""
+"""Sampling of channels: smooth or linear interpolation between keys, zero outside."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from realizer.core.array_types import Float64, Index
 
 Values = TypeVar("Values", Float64, Index)
 
-# From this many keys on, a linear channel (lips: 100 keys a second) is interpolated on its own.
+# Linear channels with at least this many keys (lips have 100 a second) are interpolated separately.
 MANY_KEYS = 32
 
 
 def smooth(u: Float64) -> Float64:
-    """The minimum-jerk course from 0 to 1: velocity and acceleration are 0 at both ends.
+    """Return the minimum-jerk curve from 0 to 1: velocity and acceleration are 0 at both ends.
 
     Args:
-        u: any shape, 0..1, how much of the time has passed.
+        u: any shape, 0..1, elapsed part of the time.
 
     Source: Flash & Hogan (1985), in one dimension.
     """
@@ -35,7 +35,7 @@ def smooth(u: Float64) -> Float64:
 
 
 def linear(u: Float64) -> Float64:
-    """The straight course from 0 to 1."""
+    """Return the straight line from 0 to 1."""
     return u
 
 
@@ -43,13 +43,13 @@ CURVES: Mapping[str, Callable[[Float64], Float64]] = {"linear": linear, "smooth"
 
 
 class Samples(NamedTuple):
-    """What channels show where they show anything, end to end: frames of one channel, then of another one.
+    """Values of channels in the frames where they are active, concatenated piece by piece.
 
     Attributes:
-        channels: (p,) the channel of each piece; one may have two pieces, of which the later one counts.
-        counts: (p,) how many frames it has.
-        frames: (e,) which frames they are.
-        values: (e,) float64 what is shown there.
+        channels: (p,) the channel of each piece; if one has two pieces, the later one counts.
+        counts: (p,) the number of its frames.
+        frames: (e,) the frame of each value.
+        values: (e,) float64.
     """
 
     channels: Index
@@ -58,23 +58,23 @@ class Samples(NamedTuple):
     values: Float64
 
     def spread(self, of_channel: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """(e,) of each value what (m,) has of its channel."""
+        """Return (e,) for each value the entry of its channel in (m,)."""
         return of_channel[self.channels].repeat(self.counts)
 
 
 def sample(channels: Sequence[Channel], times: Float64) -> Float64:
-    """The value of every channel at every time.
+    """Return the value of every channel at every time.
 
     Args:
         channels: m channels.
         times: (n,) seconds, any order.
 
     Returns:
-        (m, n) float64: exactly the key's value at a key, 0 outside the keys (after the last one its value,
-        where the channel holds); of two keys at one time the later counts.
+        (m, n) float64: exactly the key's value at a key, 0 outside the keys (with `keeps_last`, the last
+        value after them); of two keys at one time the later counts.
 
     Raises:
-        KeyError: a curve that is not in `CURVES`.
+        KeyError: if a curve is not in `CURVES`.
     """
     order = in_order(times)
     found = samples(channels, times if order is None else times[order])
@@ -85,27 +85,23 @@ def sample(channels: Sequence[Channel], times: Float64) -> Float64:
 
 
 def in_order(times: Float64) -> Index | None:
-    """(n,) where each of the times (n,) stands once they are sorted; None where they are."""
+    """Return the indices (n,) that sort the times (n,), or None if they are sorted."""
     return None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")
 
 
 def weights(channels: Sequence[Channel], times: Float64) -> Float64:
-    """How far every channel takes the place of what lies below: as its `weight` says, times its gains.
-
-    Returns:
-        (m, n) float64, 0..1.
-    """
+    """Return the weight of every channel at every time, gains included: (m, n) float64, 0..1."""
     return np.clip(sample([channel.weight_channel for channel in channels], times), 0.0, 1.0)
 
 
 def samples(channels: Sequence[Channel], times: Float64) -> Samples:
-    """As `sample`, where the cost grows with the frames that lie inside keys, not with channels x frames.
+    """Sample channels at a cost that grows with the frames inside their keys, not with channels x frames.
 
     Args:
         channels: m channels.
         times: (n,) seconds, not falling.
     """
-    by_curve: dict[str | None, list[int]] = {}  # those of many keys by themselves
+    by_curve: dict[str | None, list[int]] = {}  # None: linear ones with many keys
     changed: list[int] = []
     for i, channel in enumerate(channels):
         many = channel.curve == "linear" and len(channel.times) >= MANY_KEYS
@@ -130,9 +126,9 @@ def _joined(parts: Sequence[Samples]) -> Samples:
 
 
 def _interpolated(numbers: Index, channels: Sequence[Channel], times: Float64) -> Samples:
-    """Linear channels of many keys: how many there are in all does not matter.
+    """Sample linear channels with many keys at a cost independent of their number.
 
-    Those that share the array of their keys, as the lips of a speech do, are worked out together.
+    Channels that share the array of their key times, as the lips of a speech do, are computed together.
     """
     groups: dict[tuple[int, bool], list[int]] = {}
     for i, channel in enumerate(channels):
@@ -141,7 +137,7 @@ def _interpolated(numbers: Index, channels: Sequence[Channel], times: Float64) -
 
 
 def _together(numbers: Index, channels: Sequence[Channel], times: Float64) -> Samples:
-    """Linear channels of the same keys."""
+    """Sample linear channels with the same key times."""
     keys, end = channels[0].times, len(channels[0].times) - 1
     first = int(times.searchsorted(keys[0]))
     last = len(times) if channels[0].keeps_last else int(times.searchsorted(keys[-1], "right"))
@@ -149,7 +145,7 @@ def _together(numbers: Index, channels: Sequence[Channel], times: Float64) -> Sa
     after = np.minimum(before + 1, end)
     length = keys[after] - keys[before]
     length[before == end] = 1.0
-    # Of a long speech only what is seen of it.
+    # Only the visible part of a long speech.
     seen = slice(before[0], after[-1] + 1) if last > first else slice(0, 0)
     values = np.array([channel.values[seen] for channel in channels])
     at = values.take(before - seen.start, axis=1)
@@ -164,7 +160,7 @@ def _together(numbers: Index, channels: Sequence[Channel], times: Float64) -> Sa
 
 
 def _ranges(first: Index, counts: Index) -> Index:
-    """From each of `first` (k,) on so many whole numbers as `counts` (k,) says, end to end."""
+    """Return `counts` (k,) consecutive integers from each of `first` (k,) on, concatenated."""
     start = counts.cumsum()
     start -= counts
     np.subtract(first, start, out=start)
@@ -176,11 +172,11 @@ def _ranges(first: Index, counts: Index) -> Index:
 def _between(
     numbers: Index, channels: Sequence[Channel], times: Float64, shape: Callable[[Float64], Float64]
 ) -> Samples:
-    """Channels of one curve.
+    """Sample channels with the same curve.
 
-    All segments of all channels are laid end to end. Segment s runs from key s to key s + 1 and holds
-    `frames[s]` frames from first[s] on; after a channel's last key a segment without slope follows, with the
-    one frame that is exactly there, or all the rest where the channel holds.
+    The segments of all channels are concatenated. Segment s runs from key s to key s + 1 and has `frames[s]`
+    frames from first[s] on. A constant segment follows a channel's last key: with a frame exactly at the
+    key, or with all the rest if the channel keeps its last value.
     """
     keys = np.concatenate([channel.times for channel in channels])
     value = np.concatenate([channel.values for channel in channels])
@@ -193,11 +189,11 @@ def _between(
         last[holds] = len(times)
     frames = _steps(first, ends)
     frames[ends] = last - first[ends]
-    if frames.min() < 0:  # keys that fall, by a rounding where they were worked out: at one time
+    if frames.min() < 0:  # key times that fall by a rounding error are made equal
         rising = [replace(channel, times=np.maximum.accumulate(channel.times)) for channel in channels]
         return _between(numbers, rising, times, shape)
     length = _steps(keys, ends)
-    length[length <= 0.0] = 1.0  # after the last key, and between two at one time, where no frame lies
+    length[length <= 0.0] = 1.0  # after the last key, and between keys at one time, which have no frames
 
     frame = _ranges(first, frames)
     passed = times[frame]
@@ -210,7 +206,7 @@ def _between(
 
 
 def _steps(values: Values, ends: Index) -> Values:
-    """(k,) from each of the values (k,) to the next one, 0 at `ends`: the last of each channel."""
+    """Return the differences (k,) from each value to the next one; 0 at `ends`, the last of each channel."""
     found = np.empty_like(values)
     np.subtract(values[1:], values[:-1], out=found[:-1])
     found[ends] = 0
@@ -218,16 +214,16 @@ def _steps(values: Values, ends: Index) -> Values:
 
 
 def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int], times: Float64) -> Samples:
-    """With gains, and what the channels `changed` have to do with those before and after them; in place."""
+    """Apply gains, crossfades and ends to the channels `changed`, in place where possible."""
     stops = dict(zip(found.channels.tolist(), found.counts.cumsum().tolist(), strict=True))
     counts = dict(zip(found.channels.tolist(), found.counts.tolist(), strict=True))
-    gains: dict[tuple[Gain, ...], Float64] = {}  # what is cut off together has the same
+    gains: dict[tuple[Gain, ...], Float64] = {}  # channels of one behaviour usually share theirs
     more = [found]
     for i in changed:
         channel, joint = channels[i], channels[i].crossfade
         part = slice(stops[i] - counts[i], stops[i])
         frames, values = found.frames[part], found.values[part]
-        if joint is not None:  # it heals beyond its keys too
+        if joint is not None:  # a crossfade may last beyond the keys
             row = np.zeros(len(times))
             row[frames] = values
             values[:] = 0.0
@@ -247,17 +243,17 @@ def _changed(found: Samples, channels: Sequence[Channel], changed: Sequence[int]
 
 
 def _healing(joint: Crossfade, times: Float64) -> Float64:
-    """(n,) what is added so that value and slope go on at the joint; 0 when it has healed."""
+    """Return the correction (n,) that makes value and slope continuous at the crossfade; 0 after its end."""
     passed = times - joint.at
     left = 1.0 - smooth(np.clip(passed / joint.length, 0.0, 1.0))
     return (joint.value + joint.slope * passed) * left
 
 
 def gain_at(gains: Sequence[Gain], times: Float64) -> Float64:
-    """(n,) what something with these gains is multiplied with at times (n,), 1 before the first."""
+    """Return the factor (n,) of gains at times (n,); 1 before the first."""
     if not gains:
         return np.ones(len(times))
-    # What has been reached when a gain begins is worked out along with the rest.
+    # The factor reached when each gain begins is computed along with those at `times`.
     at = np.concatenate([times, [gain.begin for gain in gains]])
     total = np.ones(len(at))
     for n, (begin, end, to, curve) in enumerate(gains):

@@ -1,4 +1,4 @@
-"""The values of steps 5 and 6: sampled AUs and MPEG-4 FAP frames."""
+"""Frames, the results of steps 5 and 6: sampled AUs and MPEG-4 FAPs."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ from realizer.tables.cooccurrence import Rules
 
 @dataclass(frozen=True, eq=False)
 class AUFrames:
-    """Every target of the axis, sampled.
+    """Sampled values of every target of the axis.
 
     Attributes:
         times: (n,) float64 seconds on the session clock.
-        values: (n, n_targets) float32; columns as `animation.targets.axis()`: AUs 0..1 as they were asked
-            for, FAPs in FAPU that did not come from AUs, presences 0..1.
-        rules: which AUs a face can show together; None: all of them.
-        overridden: (n, 68) float32, 0..1: how far a FAP is what `values` say, so that no AU has a say in it;
-            None: AUs have theirs everywhere.
-        columns: the columns that may be other than 0, rising; None: it is looked up where that is of use.
+        values: (n, n_targets) float32; columns as `animation.axis.axis()`: AUs 0..1 as requested, FAPs in
+            FAPU that do not come from AUs, mask channels 0..1.
+        rules: co-occurrence rules; None for none.
+        overridden: (n, 68) float32, 0..1: how far AUs do not contribute to a FAP; None for 0 everywhere.
+        columns: the columns that may differ from 0, rising; None to look for them when they are needed.
     """
 
     times: Float64
@@ -37,7 +36,7 @@ class AUFrames:
 
     @classmethod
     def concatenate(cls, windows: Sequence[AUFrames]) -> AUFrames:
-        """One after the other; at least one, all with the same rules."""
+        """Join windows, at least one, which all have the same rules."""
         held = None
         if any(window.overridden is not None for window in windows):
             none = [np.zeros((len(window.times), 68), np.float32) for window in windows]
@@ -56,25 +55,25 @@ class AUFrames:
         )
 
     def part(self, first: int, last: int) -> AUFrames:
-        """Frames `first` .. `last - 1`."""
+        """Return frames `first` .. `last - 1`."""
         held = None if self.overridden is None else self.overridden[first:last]
         return AUFrames(self.times[first:last], self.values[first:last], self.rules, held, self.columns)
 
     @cached_property
     def moving_columns(self) -> tuple[int, ...]:
-        """The columns that may be other than 0, rising."""
+        """The columns that may differ from 0, rising."""
         if self.columns is not None:
             return self.columns
         return tuple(np.flatnonzero(self.values.any(axis=0)).tolist())
 
     @cached_property
     def moving_aus(self) -> tuple[int, ...]:
-        """Those that are AUs."""
+        """The AUs among `moving_columns`."""
         return self.moving_columns[: bisect_left(self.moving_columns, len(AU_NAMES()))]
 
     @property
     def before_rules(self) -> Float32:
-        """(n, n_au) float32, 0..1: the AUs before the rules of co-occurrence."""
+        """(n, n_au) float32, 0..1: the AUs before the co-occurrence rules."""
         return self.values[:, : len(AU_NAMES())]
 
     @property
@@ -88,7 +87,7 @@ class AUFrames:
 
     @property
     def moving(self) -> Float32:
-        """(n_au, n) float32, 0..1: what moves the face, also where another unit's score covers it."""
+        """(n_au, n) float32, 0..1: the AUs that move the face, scored by a FACS coder or not."""
         whole = np.zeros((len(AU_NAMES()), len(self.times)), np.float32)
         whole[list(self.moving_aus)] = self.moving_rows
         return whole
@@ -110,7 +109,7 @@ class AUFrames:
 
     @property
     def faps(self) -> Float32:
-        """(n, 68) float32 in FAPU: what did not come from AUs (speech, clients); column = FAP - 1."""
+        """(n, 68) float32 in FAPU: FAPs that do not come from AUs (speech, clients); column = FAP - 1."""
         first = len(AU_NAMES())
         return self.values[:, first : first + 68]
 
@@ -130,5 +129,5 @@ class FAPFrames:
     mask: Bool
 
     def integers(self) -> Int32:
-        """(n, 68) int32: as written to files and sent over the wire (rounded, half to even)."""
+        """Return the values rounded (half to even), as files and streams hold them: (n, 68) int32."""
         return np.rint(self.values).astype(np.int32)

@@ -11,14 +11,14 @@ from realizer.core.array_types import Float32, Index
 
 @dataclass(frozen=True, eq=False)
 class GroupReduction:
-    """The first row of every group stands first, then the second of those that have one, and so on.
+    """An order of rows by rounds: the first row of every group, then the second of those that have one, ...
 
-    So a group is reduced by operations on whole slices: ten times as fast as `reduceat` down an axis.
+    In this order groups are reduced by operations on whole slices, ten times as fast as `reduceat`.
 
     Attributes:
-        order: (m,) where the rows of this order stood before.
-        groups: (g,) the numbers of the groups, those of most rows first.
-        counts: rows of each round; the first has one of every group.
+        order: (m,) the index of each row before.
+        groups: (g,) the numbers of the groups, largest groups first.
+        counts: the number of rows in each round; the first has one of every group.
     """
 
     order: Index
@@ -27,7 +27,7 @@ class GroupReduction:
 
     @classmethod
     def of(cls, group: Index) -> GroupReduction:
-        """Of the group (m,) of each row, not falling."""
+        """Return the order for rows whose groups are (m,), not falling."""
         first = np.flatnonzero(np.concatenate([[True], group[1:] != group[:-1]])[: len(group)])
         sizes = np.diff(first, append=len(group))
         largest = np.argsort(-sizes, kind="stable")
@@ -37,7 +37,7 @@ class GroupReduction:
         return cls(order, group[first], tuple(len(rows) for rows in rounds))
 
     def reduced(self, rows: Float32, by: np.ufunc) -> Float32:
-        """(g, n) of rows (m, n) in this order: `by` of those of each group, in place, in their old order."""
+        """Reduce rows (m, n) in this order to (g, n) with the ufunc `by`, in place."""
         out = rows[: len(self.groups)]
         at = len(self.groups)
         for count in self.counts[1:]:

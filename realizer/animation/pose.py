@@ -1,4 +1,4 @@
-"""The rows of parameters that a face's deformer takes, from AU frames."""
+"""Conversion of AU frames to the parameters of a face's deformer."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from realizer.core.array_types import Float32
 
 
 def poses(frames: AUFrames, inputs: tuple[str, ...], mapping: FapMapping | None = None) -> Float32:
-    """What a face is drawn by: stills, films, sheets and streams of pictures and meshes alike.
+    """Return the parameters from which a face is drawn, a column for each of `inputs`.
 
-    A column for each name, in its order: action units as they move a face (0..1), presences (0..1), and FAPs
-    in FAPU: those that did not come from action units, and those that the other action units ask for. A face
-    that takes no action units gets `to_fap` whole. From a FAP that is held is taken what the action units of
-    the face move it by, as far as the mapping knows, so that the face shows the FAP as it is set.
+    Action units (0..1) are those that move the face; mask channels are 0..1. FAPs, in FAPU, are those that do
+    not come from action units, plus those of action units that are not among `inputs`; without action units
+    among them this is `to_fap`. An overridden FAP is reduced by what the face's own action units add to it
+    according to the mapping, so that the face shows the FAP as it is set.
 
     Args:
         frames: n frames.
-        inputs: names of `targets.axis()` (`Face.takes`).
-        mapping: what AUs ask of FAPs; None is the one that ships.
+        inputs: names of `axis()` (`Face.inputs`).
+        mapping: from AUs to FAPs; None for the built-in one.
 
     Returns:
-        (n, len(takes)) float32.
+        (n, len(inputs)) float32.
 
     Raises:
-        KeyError: a name that is not of the axis.
+        KeyError: if a name is not in `axis()`.
     """
     columns = [axis()[name].column for name in inputs]
     count = len(AU_NAMES())

@@ -1,4 +1,4 @@
-"""The mapping of AUs to FAPs as a value: the built-in table with a user's rows on top."""
+"""Mappings of AUs to FAPs: the built-in table, and changes by users."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class FapMapping:
     """A mapping of AUs to FAPs (Paul 2010, chapter 5).
 
     Attributes:
-        rows: what each (au, side) of the axis asks of each FAP.
-        sources: the files the rows came from, the strongest last.
+        rows: pieces of the function from each (au, side) of the axis to each FAP.
+        sources: the files that the rows come from; later ones override earlier ones.
     """
 
     rows: tuple[AuToFap, ...]
@@ -25,11 +25,11 @@ class FapMapping:
 
     @cached_property
     def matrix(self) -> PiecewiseMatrix:
-        """The rows, ready for whole arrays."""
+        """The rows, prepared for whole arrays."""
         return PiecewiseMatrix.of(self.rows)
 
     def replaced(self, units: Units, source: str) -> FapMapping:
-        """This mapping, but of the action units that `units` names what it says and nothing else."""
+        """Return this mapping with the rows of the action units in `units` replaced."""
         kept = (row for row in self.rows if (row.au, row.side) not in units)
         rows = (*kept, *(row for unit in units.values() for row in unit))
         return FapMapping(
@@ -39,5 +39,5 @@ class FapMapping:
 
 @cache
 def standard() -> FapMapping:
-    """The mapping that ships: `tables/au_to_fap.csv`."""
+    """Return the built-in mapping, `tables/au_to_fap.csv`."""
     return FapMapping(tables.au_to_fap(), ("au_to_fap.csv",))

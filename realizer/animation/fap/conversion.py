@@ -1,4 +1,4 @@
-"""Step 6, the conversion of AU frames to FAP frames."""
+"""Step 6 of the pipeline: the conversion of AU frames to FAP frames."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from realizer.animation.fap.piecewise_matrix import LOWERS, RAISES, AuFapRows, P
 from realizer.animation.frames import AUFrames, FAPFrames
 from realizer.core.array_types import Float32, Index
 
-# Columns (FAP - 1) of upper and lower lid, by side; 1024 is the whole aperture (IRISD0).
+# Columns (FAP - 1) of upper and lower lid, by side; 1024 is the full aperture (IRISD0).
 LIDS = ((18, 20), (19, 21))
 APERTURE = 1024.0
 
 
 def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
-    """What a face of MPEG-4 shows.
+    """Convert AU frames to FAP frames.
 
-    1. Each AU asks each FAP for a value (polylines of the mapping). A FAP gets the strongest positive plus
-       the strongest negative; rotations add up.
-       Two that are a "different" combination in FACS show something more together.
-    2. A closing eye lets go of what holds it open, and lids do not pass through each other.
-    3. Where speech has the lips (presence "lips"), what AUs ask is taken away by `speech_owns`.
-    4. The FAPs that did not come from AUs are added, or, as far as they are held, stand in place of what AUs
-       ask; each FAP is limited to `least`..`most`.
+    1. The mapping gives a value for each pair of AU and FAP. A FAP gets the strongest positive plus the
+       strongest negative one; rotations add up. Pairs of AUs that FACS calls "different" combinations add a
+       value of their own.
+    2. What opens an eye fades as its upper lid closes, and lids do not pass through each other.
+    3. Where speech masks the lips (mask channel "lips"), the values from AUs are reduced by `speech_owns`.
+    4. FAPs that do not come from AUs are added, or replace those from AUs as far as they are overridden;
+       each FAP is limited to `least`..`most`.
 
     Args:
         frames: n frames.
-        mapping: what AUs ask of FAPs (`realizer.face.fap_mapping.mapping_of`); None is the one that ships.
+        mapping: from AUs to FAPs (`realizer.face.fap_mapping.mapping_of`); None for the built-in one.
 
     Returns:
         n frames; the mask is the same for all frames of one mapping.
@@ -47,7 +47,7 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
     values = np.zeros((len(plan.faps), len(frames.times)), np.float32)
     values[: len(raised)] = raised
     for upper, lids, closed in plan.lids:
-        # What holds an eye open goes as far as its upper lid closes: wide eyes blink shut.
+        # What opens the eye fades as its upper lid closes, so that wide eyes can blink.
         left = 1 - np.minimum(raised[upper] / closed, 1)
         for lid in lids:
             lowered[lid] *= left
@@ -64,7 +64,7 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
         values[plan.given] += frames.faps.T[list(given)]
     np.maximum(values, plan.least, out=values)
     np.minimum(values, plan.most, out=values)
-    # What a client sets directly counts too, wherever the mapping does not reach.
+    # FAPs outside the mapping that a client sets directly belong to the mask too.
     mask = demand.mask.copy()
     if len(plan.beyond):
         mask[plan.faps[plan.beyond]] = values[plan.beyond].any(axis=1)
@@ -75,17 +75,17 @@ def to_fap(frames: AUFrames, mapping: FapMapping | None = None) -> FAPFrames:
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """What there is to do for some action units and FAPs: rows of arrays, and rows of those.
+    """The conversion prepared for a set of AUs and FAPs; other attributes than `faps` hold rows of `faps`.
 
     Attributes:
-        asking: what the units ask.
+        asking: the functions from AUs to FAPs.
         faps: (f,) the columns (FAP - 1) that change, those of `asking` first.
-        lids: of each eye that may close: the upper lid, what holds lids open, and how far that lid closes.
-        combinations: two units, and the FAP that they move more together, by how much.
+        lids: for each eye that may close: the upper lid, the lids that AUs open, and how far it closes.
+        combinations: (unit, other, fap, value) of pairs of AUs that add a value of their own.
         gaps: upper and lower lid of each eye.
-        given: the FAPs that did not come from action units.
-        beyond: the FAPs that are not in the mask of the mapping.
-        own, least, most: (f, 1) how much of a FAP speech owns, its least and its most value.
+        given: the FAPs that do not come from AUs.
+        beyond: the FAPs outside the mask of the mapping.
+        own, least, most: (f, 1) the part that speech owns, least and greatest value.
     """
 
     asking: AuFapRows
@@ -100,7 +100,7 @@ class _Plan:
     most: Float32
 
 
-# Sessions move the same few sets of units again and again; 10 kB each.
+# Sessions repeat a few sets of units; each entry takes 10 kB.
 @lru_cache(maxsize=512)
 def _plan(demand: PiecewiseMatrix, live: tuple[int, ...], given: tuple[int, ...]) -> _Plan:
     asking = demand.among(live)
@@ -134,7 +134,7 @@ def _plan(demand: PiecewiseMatrix, live: tuple[int, ...], given: tuple[int, ...]
 
 @cache
 def _combinations() -> tuple[tuple[int, int, int, float], ...]:
-    """Rows of both units among the AUs, column (FAP - 1), value."""
+    """Return (unit, other, FAP - 1, value) for each combination; units are columns of the axis."""
     column = {name: target.column for name, target in axis().items()}
     return tuple(
         (column[f"{row.au}{row.side}"], column[f"{row.other}{row.side}"], row.fap - 1, row.value)
@@ -144,7 +144,7 @@ def _combinations() -> tuple[tuple[int, int, int, float], ...]:
 
 @cache
 def _limits() -> tuple[Float32, Float32, Float32]:
-    """(68,) each: how much of a FAP speech owns, its least and its most value."""
+    """Return the part of each FAP that speech owns, its least and its greatest value, (68,) each."""
     rows = tables.faps()
     own, least, most = (
         np.array([getattr(row, name) for row in rows], np.float32)

@@ -1,4 +1,4 @@
-"""The value of a FAP file: integer MPEG-4 FAP frames at their own rate."""
+"""FAP clips: integer MPEG-4 FAP frames at a rate of their own, as in a FAP file."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from realizer.core.units import frame_count
 
 @dataclass(frozen=True, eq=False)
 class FAPClip:
-    """A text FAP file as numbers.
+    """The contents of a text FAP file.
 
     Attributes:
-        name: from the header; no blanks when written.
+        name: from the header; without blanks when written.
         fps: frames a second.
-        values: (n, 68) int32 in each FAP's FAPU, column = FAP - 1; 0 where not given. Columns 0 and 1 are 0.
-        mask: (68,) bool, True where any frame gives the FAP.
+        values: (n, 68) int32 in each FAP's FAPU, column = FAP - 1; 0 where a frame does not specify the FAP.
+            Columns 0 and 1 are 0.
+        mask: (68,) bool, True where any frame specifies the FAP.
         visemes: (n, 4) int32: select1, select2, blend, def of FAP 1; zeros unless mask[0].
         expressions: (n, 6) int32: select1, intensity1, select2, intensity2, init_face, def of FAP 2.
-        notes: how the text departed from the format, a sentence each; () for what we wrote ourselves.
+        notes: deviations of the text from the format, a sentence each.
     """
 
     name: str
@@ -36,7 +37,7 @@ class FAPClip:
 
     @staticmethod
     def of(frames: FAPFrames, fps: float, name: str) -> FAPClip:
-        """The frames rounded to integers; FAP 1 and 2 stay out."""
+        """Return a clip of frames, rounded to integers, without FAP 1 and 2."""
         values = frames.integers()
         mask = frames.mask.copy()
         mask[:2] = False
@@ -47,15 +48,15 @@ class FAPClip:
         )
 
     def from_frame(self, frame: int) -> FAPClip:
-        """What is left of it from a frame on."""
+        """Return the clip from a frame on."""
         parts = (self.values[frame:], self.mask, self.visemes[frame:], self.expressions[frame:])
         return FAPClip(self.name, self.fps, *parts, self.notes)
 
     def resampled(self, fps: float) -> FAPClip:
-        """The same course at another rate: FAPs straight between frames, FAP 1 and 2 of the nearest frame.
+        """Return the clip at another rate: FAPs by linear interpolation, FAP 1 and 2 of the nearest frame.
 
         Raises:
-            ValueError: not a positive, finite rate.
+            ValueError: if the rate is not positive and finite.
         """
         if not (math.isfinite(fps) and fps > 0):
             raise ValueError(f"fps: wanted a number above 0, got {fps}")
@@ -77,13 +78,13 @@ class FAPClip:
         )
 
     def frames(self) -> FAPFrames:
-        """The values on a clock that starts at 0; FAP 1 and 2 are left out: frames have no place for them."""
+        """Return the values on a clock that starts at 0, without FAP 1 and 2, which frames do not hold."""
         mask = self.mask.copy()
         mask[:2] = False
         return FAPFrames(np.arange(len(self.values)) / self.fps, self.values.astype(np.float32), mask)
 
     def __eq__(self, other: object) -> bool:
-        """Same name, rate and numbers; notes do not count."""
+        """Compare name, rate and numbers, but not notes."""
         if not isinstance(other, FAPClip):
             return NotImplemented
         arrays = ("values", "mask", "visemes", "expressions")

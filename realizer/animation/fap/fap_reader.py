@@ -16,11 +16,11 @@ from realizer.core.array_types import Bool
 from realizer.core.errors import RealizerError
 from realizer.tables import faps
 
-FPS = 25.0  # where there is no header: the rate of Xface and Greta
+FPS = 25.0  # of files without a header: the rate of Xface and Greta
 MASK = 68
 COLUMNS = (MASK, 69)  # Greta writes a null FAP 0 first
-WIDTHS = {1: (4, 1), 2: (6, 1)}  # numbers a compound FAP takes; Greta and Xface write one
-COMPOUND = {1: 69, 2: 73}  # the columns of their numbers, behind those of FAP 0 to 68
+WIDTHS = {1: (4, 1), 2: (6, 1)}  # numbers in a compound FAP; Greta and Xface write one
+COMPOUND = {1: 69, 2: 73}  # the columns of their numbers, after those of FAP 0 to 68
 INT32 = 2**31 - 1
 # Frame numbers may be absolute on a sender's clock, but a clip this sparse is damaged, not long.
 SPARSEST = 50
@@ -36,7 +36,7 @@ class _Frame:
 
 @dataclass
 class _Notes:
-    """Each kind of deviation once, with its first line and how often it came."""
+    """Deviations from the format: each kind with the lines in which it occurs."""
 
     found: dict[str, list[int]] = field(default_factory=dict)
 
@@ -53,16 +53,16 @@ class _Notes:
 
 
 def read_fap(text: str | bytes) -> FAPClip:
-    """The clip of a text FAP file, however odd; `notes` says what was.
+    """Parse a text FAP file; the clip's `notes` list deviations from the format.
 
-    Survives comments, a byte order mark, CRLF, tabs, a missing header or last newline, names with blanks or
+    Tolerates comments, a byte order mark, CRLF, tabs, a missing header or last newline, names with blanks or
     paths, 69 columns, masks that vary, frame numbers that start anywhere or have gaps, compound FAPs as one
-    number, floats and rubbish (0) for integers, values out of range, a wrong frame count, frames that are
-    broken over lines. Where a frame does not give a FAP it is neutral, as all readers have it. Version 2.0 is
-    read like 2.1.
+    number, floats and garbage (0) for integers, values out of range, a wrong frame count, and frames that
+    span lines. A FAP that a frame does not specify is neutral, as in other readers. Version 2.0 is read like
+    2.1.
 
     Raises:
-        RealizerError: no FAP text: a body animation (version 3.x), or a line that is neither mask nor values.
+        RealizerError: if the text is a body animation (version 3.x), or a line is neither mask nor values.
     """
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
@@ -89,7 +89,7 @@ Line = tuple[int, list[str]]
 
 
 def _header(lines: list[Line], text: str, notes: _Notes) -> tuple[str, float, int | None, list[Line]]:
-    """Name, rate, frame count and the lines after the header; the last two numbers of it count."""
+    """Return name, rate, frame count and the lines after the header; its last two numbers are the latter."""
     if not lines or _is_mask(lines[0][1]):
         notes.add("no header; taken as 25 frames a second")
         return "", FPS, None, lines
@@ -124,7 +124,7 @@ def _header(lines: list[Line], text: str, notes: _Notes) -> tuple[str, float, in
 
 
 def _pairs(lines: list[Line]) -> Iterator[tuple[Line, Line]]:
-    """Mask and values of each frame; a mask without values at the end of a cut-off file is left out."""
+    """Yield mask and values of each frame, ignoring a mask without values at the end of a truncated file."""
     for k in range(0, len(lines) - 1, 2):
         mask, values = lines[k], lines[k + 1]
         if not _is_mask(mask[1]):
@@ -135,7 +135,7 @@ def _pairs(lines: list[Line]) -> Iterator[tuple[Line, Line]]:
 
 
 def _stream(lines: list[Line]) -> list[tuple[Line, Line]] | None:
-    """Mask and values of each frame wherever lines end; None where the numbers do not come out even."""
+    """Return mask and values of each frame, ignoring line ends, or None if the numbers do not fit."""
     words = [(number, word) for number, line in lines for word in line]
     pairs: list[tuple[Line, Line]] = []
     at = 0
@@ -166,12 +166,12 @@ def _frame(mask: Line, values: Line, notes: _Notes) -> _Frame:
 
 @dataclass(frozen=True, eq=False)
 class _Layout:
-    """Where the numbers of a frame go.
+    """The columns of the numbers of a frame.
 
     Attributes:
-        used: the FAPs that the mask gives.
-        columns: of each number: the FAP, behind them the four of FAP 1 and the six of FAP 2.
-        note: what is odd about it.
+        used: the FAPs in the mask.
+        columns: for each number, its FAP, or its column in FAP 1 or 2 (see `COMPOUND`).
+        note: the deviation from the format, or "".
     """
 
     used: npt.NDArray[np.intp]
@@ -181,7 +181,7 @@ class _Layout:
 
 @lru_cache(maxsize=64)
 def _layout(mask: tuple[str, ...], available: int) -> _Layout:
-    """Nearly all frames of a file have one."""
+    """Return the layout of frames; nearly all frames of a file have the same."""
     used = [fap for fap, bit in enumerate(mask, 69 - len(mask)) if int(bit) != 0]
     widths, says = _widths(used, available), ""
     if widths is None:
@@ -196,7 +196,7 @@ def _layout(mask: tuple[str, ...], available: int) -> _Layout:
 
 
 def _widths(used: list[int], available: int) -> dict[int, int] | None:
-    """How many numbers each FAP takes so that all are used up; None where no reading fits."""
+    """Return how many numbers each FAP has so that all are used, or None if there is no solution."""
     simple = sum(1 for fap in used if fap not in WIDTHS)
     for viseme in WIDTHS[1] if 1 in used else (0,):
         for expression in WIDTHS[2] if 2 in used else (0,):
@@ -226,7 +226,7 @@ def _clip(name: str, fps: float, frames: list[_Frame], notes: _Notes) -> FAPClip
 
 
 def _places(frames: list[_Frame], notes: _Notes) -> list[int]:
-    """Where each frame goes, from its number relative to the least one."""
+    """Return the position of each frame: its number relative to the least one."""
     if not frames:
         return []
     least = min(frame.number for frame in frames)
@@ -253,7 +253,7 @@ def _note_ranges(values: np.ndarray[tuple[int, ...], np.dtype[np.int64]], notes:
 
 
 def _is_mask(words: list[str]) -> bool:
-    """Mask entries are 0 or 1 (not 0 counts as 1); a line of values has others."""
+    """Return whether words are a mask: entries are 0 or 1 (one other integer counts as 1)."""
     if len(words) not in COLUMNS:
         return False
     others = [word for word in words if word not in ("0", "1")]

@@ -1,4 +1,4 @@
-"""A piecewise linear product of action unit rows and FAP breakpoints."""
+"""Piecewise linear functions from AUs to FAPs, evaluated as whole arrays."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from realizer.animation.group_reduce import GroupReduction
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables import AuToFap
 
-# What a polyline counts among, of its FAP: those that raise it, those that lower it, those that add up.
+# The group of a polyline at its FAP: those that raise it, those that lower it, rotations, which add up.
 RAISES, LOWERS, TURNS = range(3)
 
 
 @dataclass(frozen=True, eq=False)
 class Breakpoints:
-    """Where polylines bend for the k-th time: `lines` (b,), rows of their units, knots, changes (b, 1)."""
+    """The k-th bend of polylines: `lines` (b,), `rows` (b,) of their units, knots and slopes (b, 1)."""
 
     lines: Index
     rows: Index
@@ -30,15 +30,15 @@ class Breakpoints:
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseMatrix:
-    """The rows, ready for whole arrays: every polyline is slope * au, and a hinge where it bends.
+    """The rows of a mapping, prepared for whole arrays: a polyline is slope * au plus a term for each bend.
 
-    One that both raises and lowers a FAP stands there twice; those that lower it stand upside down.
+    A polyline that both raises and lowers a FAP occurs twice; those that lower a FAP are negated.
 
     Attributes:
-        column, slope: (p + 1,) of each polyline its unit, and its slope at 0; the last one asks nothing.
-        side: (p,) 3 * (FAP - 1) + what it counts among, rising.
-        bends: of each line, bend by bend: line, how many there are before it, knot, change of slope.
-        closed: (68,) float32, the most any AU asks of a FAP; what closes a lid.
+        column, slope: (p + 1,) the unit of each polyline and its slope at 0; the last polyline is 0.
+        side: (p,) 3 * (FAP - 1) + RAISES, LOWERS or TURNS, rising.
+        bends: (polyline, number of bends before, knot, change of slope) of each bend.
+        closed: (68,) float32, the greatest value of each FAP, at which a lid is closed.
         mask: (68,) True where an AU or speech may use the FAP.
     """
 
@@ -51,7 +51,7 @@ class PiecewiseMatrix:
 
     @classmethod
     def of(cls, rows: Iterable[AuToFap]) -> PiecewiseMatrix:
-        """From rows on the axis: the pieces of one (au, side, fap) do not overlap and begin at 0."""
+        """Return the matrix of rows; the pieces of one (au, side, fap) begin at 0 and do not overlap."""
         lines: list[tuple[int, int, list[tuple[float, float]]]] = []
         turns = [row.unit == "angle_unit" for row in tables.faps()]
         closed = np.zeros(68, np.float32)
@@ -84,14 +84,14 @@ class PiecewiseMatrix:
         )
 
     def among(self, live: tuple[int, ...]) -> AuFapRows:
-        """What units ask of which these rows, rising, may be other than 0."""
+        """Return the functions of the units in rows `live`, rising; all others must be 0."""
         row = np.full(len(AU_NAMES()), -1)
         row[list(live)] = np.arange(len(live))
         lines = np.flatnonzero(row[self.column[:-1]] >= 0)
         turning = self.side[lines] % 3 == TURNS
         pulls, turns = lines[~turning], lines[turning]
         strongest, sums = GroupReduction.of(self.side[pulls]), GroupReduction.of(self.side[turns])
-        # Between them stands the one that asks nothing: for FAPs that nothing raises, or nothing lowers.
+        # The polyline that is 0 comes between them, for FAPs that no unit raises, or no unit lowers.
         lines = np.concatenate([pulls[strongest.order], [-1], turns[sums.order]])
         none = len(pulls)
         at = dict(zip(strongest.groups.tolist(), range(none), strict=False))
@@ -130,7 +130,7 @@ class PiecewiseMatrix:
 
 
 def _hinges(pieces: list[AuToFap]) -> tuple[list[tuple[float, float]], list[float]]:
-    """(knot, change of slope) of each hinge of a polyline, and the values at its knots and at 1."""
+    """Return (knot, change of slope) of each bend of a polyline, and its values at the knots and at 1."""
     hinges: list[tuple[float, float]] = []
     slope = end = value = 0.0
     values = [0.0]
@@ -150,15 +150,15 @@ def _hinges(pieces: list[AuToFap]) -> tuple[list[tuple[float, float]], list[floa
 
 @dataclass(frozen=True, eq=False)
 class AuFapRows:
-    """What some units ask, each a row of whole arrays.
+    """The functions from some units to FAPs, evaluated as whole arrays.
 
     Attributes:
-        faps: (f,) the columns (FAP - 1) that they move; those that turn something stand last.
-        rows, slopes: (p,), (p, 1) of each polyline its unit and its slope at 0.
-        bends: the first ones of all lines, the second ones, ..
-        strongest, sums: how lines are taken together: the first of them, and those that turn something.
-        raising, lowering: (f - turning,) the lines that raise and lower each FAP most, once that is done.
-        sides: 3 * (FAP - 1) + RAISES or LOWERS of those that something raises or lowers.
+        faps: (f,) the columns (FAP - 1) that they move, rotations last.
+        rows, slopes: (p,), (p, 1) the unit of each polyline and its slope at 0.
+        bends: the first bends of all polylines, the second ones, ...
+        strongest, sums: the reductions of polylines that raise or lower, and of rotations.
+        raising, lowering: (f - rotations,) the reduced rows that raise and lower each FAP.
+        sides: 3 * (FAP - 1) + RAISES or LOWERS of the FAPs that units raise or lower.
     """
 
     faps: Index
@@ -172,11 +172,11 @@ class AuFapRows:
     sides: frozenset[int]
 
     def evaluate(self, aus: Float32) -> tuple[Float32, Float32]:
-        """What AUs (u, n) ask of `faps`.
+        """Evaluate AUs (u, n).
 
         Returns:
-            (f, n) what raises each FAP most, and (f - turning, n) how far that is lowered; of what turns
-            something, the sum.
+            (f, n): the greatest value that raises each FAP, or the sum for rotations; (f - rotations, n): the
+            greatest value that lowers it.
         """
         if not len(aus):
             none = np.zeros((0, aus.shape[1]), np.float32)
@@ -186,7 +186,7 @@ class AuFapRows:
         for bend in self.bends:
             lines[bend.lines] += bend.slopes * np.maximum(aus[bend.rows] - bend.knots, 0)
         pulls = len(self.strongest.order)
-        if self.bends:  # what raises and lowers a FAP stands there twice
+        if self.bends:  # polylines that both raise and lower a FAP occur twice
             np.maximum(lines[:pulls], 0, out=lines[:pulls])
         self.strongest.reduced(lines[:pulls], np.maximum)
         turned = self.sums.reduced(lines[pulls + 1 :], np.add)

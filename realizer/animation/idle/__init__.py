@@ -1,1 +1,1 @@
-"""Involuntary motion: blinks, small head motion, saccades, motion that accompanies speech."""
+"""Involuntary motion: blinks, small head motion, saccades, and motion that accompanies speech."""

@@ -1,7 +1,7 @@
 """Blinks of a face, aligned with the ends of its phrases.
 
-Each has a number k = 0, 1, 2, .. and draws what is random about it from (seed, kind, k), so any two windows
-of time agree where they overlap.
+Blinks are numbered k = 0, 1, 2, ..., and their random numbers depend on (seed, kind, k) alone, so that any
+two windows of time agree where they overlap.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from realizer.animation.idle.rng import uniform
 from realizer.core.array_types import Float64
 from realizer.speech.accents import prosody_facts
 
-# s between two blinks: log-normal, as measured inter-blink times are; its median and limits are ours.
+# s between two blinks: log-normal, as measured inter-blink times are; median and limits are our choice.
 BLINK_MEDIAN, BLINK_SPREAD, BLINK_LEAST, BLINK_MOST = 3.8, 0.3, 2.5, 6.0
-# s: a lid closes faster than it opens; 0.05 s shut is at least one frame at 25 fps. 0.3 s in all.
+# s: lids close faster than they open; they are shut for 0.05 s, at least one frame at 25 fps.
 BLINK_TIMES = np.array([0.0, 0.08, 0.13, 0.3])
 BLINK_VALUES = np.array([0.0, 1.0, 1.0, 0.0])
 BLINK = float(BLINK_TIMES[-1])
@@ -30,7 +30,7 @@ BLINK = float(BLINK_TIMES[-1])
 
 @dataclass(frozen=True, eq=False)
 class BlinkReduction(Channel):
-    """What is taken from the blinks; it counts for those that began before it had gone, until they end."""
+    """A channel of the mask "blinks"; its span includes the end of the last blink that it suppresses."""
 
     @cached_property
     def span(self) -> tuple[float, float]:
@@ -39,7 +39,7 @@ class BlinkReduction(Channel):
 
 
 class PhraseEnd(NamedTuple):
-    """Where something said from `since` on pauses: blinks belong there. Seconds on the session clock."""
+    """The end `at` of a phrase in a speech that starts at `since`; seconds on the session clock."""
 
     since: float
     at: float
@@ -47,23 +47,23 @@ class PhraseEnd(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Blinks:
-    """Those of a span of time.
+    """The blinks in a span of time.
 
     Attributes:
         onsets: (b,) float64 seconds.
-        draws: (b,) 0..1, drawn from the number of each, so that fewer blinks are some of the usual ones.
+        draws: (b,) 0..1, random; a blink is shown if the wanted part of blinks exceeds its draw.
     """
 
     onsets: Float64
     draws: Float64
 
     def reduced(self, part: Float64) -> Blinks:
-        """Those of which this part (b,) is above their draw: each comes whole or not at all."""
+        """Return a random part (b,), 0..1, of the blinks; each is kept whole or not at all."""
         comes = part > self.draws
         return Blinks(self.onsets[comes], self.draws[comes])
 
     def at(self, times: Float64) -> Float64:
-        """(n,) 0..1: how far the lids are shut at times (n,), not falling."""
+        """Return how far the lids are shut, (n,) 0..1, at times (n,), not falling."""
         shut = np.zeros(len(times))
         firsts, lasts = times.searchsorted(self.onsets), times.searchsorted(self.onsets + BLINK)
         for onset, first, last in zip(self.onsets.tolist(), firsts.tolist(), lasts.tolist(), strict=True):
@@ -73,11 +73,11 @@ class Blinks:
 
 
 def blinks_between(start: float, end: float, seed: int, ends: Sequence[PhraseEnd] = ()) -> Blinks:
-    """Those that can be seen in start..end, seconds on the session clock; the first comes after 0.
+    """Return the blinks visible in start..end, seconds on the session clock; the first is after 0.
 
     Args:
         seed: of the character.
-        ends: where its phrases end, in order of time; a blink that is due near one comes there instead.
+        ends: the ends of its phrases, in order of time; a blink near one is moved there.
     """
     moved = prosody_facts()["blinks"]["reach"] + prosody_facts()["blinks"]["delay"] if ends else 0.0
     count = 64
@@ -95,9 +95,9 @@ def blinks_between(start: float, end: float, seed: int, ends: Sequence[PhraseEnd
 
 
 def _blink_time(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
-    """When a blink comes that is due: at the nearest end of a phrase, if it is due since the speech began.
+    """Return the time of a blink due `at`: the nearest end of a phrase of a speech that has begun by then.
 
-    No blink depends on another one, so that what is forgotten changes nothing that is still to be seen.
+    No blink depends on another one, so that past blinks can be forgotten.
     """
     facts = prosody_facts()["blinks"]
     first = bisect_left(ends, at - facts["reach"], key=lambda end: end.at)
@@ -105,17 +105,17 @@ def _blink_time(at: float, late: float, ends: Sequence[PhraseEnd]) -> float:
     near = [end for end in ends[first:last] if end.since <= at]
     if not near:
         return at
-    # What is said later may not take a blink from where it was shown already.
+    # A later speech must not move a blink that may have been shown.
     best = min(near, key=lambda end: (end.since, abs(end.at - at)))
     return best.at + late * float(facts["delay"])
 
 
 @lru_cache(maxsize=64)
 def _draws(seed: int, count: int) -> Float64:
-    """(3, count) of the first blinks of a face: when they are due, in seconds, rising; two draws of each."""
+    """Return (3, count) for the first blinks: seconds at which they are due, rising, and two random numbers."""
     normal, turn, draw, late = uniform(seed, (301, 302, 304, 305), np.arange(count))
     # Box-Muller: two uniform numbers make a normal one.
     normal = np.sqrt(-2.0 * np.log1p(-normal)) * np.cos(2.0 * np.pi * turn)
     gaps = np.clip(BLINK_MEDIAN * np.exp(BLINK_SPREAD * normal), BLINK_LEAST, BLINK_MOST)
-    gaps[0] *= uniform(seed, 303, np.arange(1))[0]  # nobody begins a session with a blink at the same time
+    gaps[0] *= uniform(seed, 303, np.arange(1))[0]  # so that not all characters blink first at the same time
     return np.stack([np.cumsum(gaps), draw, late])

@@ -1,7 +1,7 @@
 """Idle motion of a face: blinks, small head motion, saccades.
 
-Everything is a function of (seed, time) alone: each movement has a number k = 0, 1, 2, .. and draws what is
-random about it from (seed, kind, k), so any two windows of time agree where they overlap.
+It is a function of (seed, time) alone. Movements are numbered k = 0, 1, 2, ..., and their random numbers
+depend on (seed, kind, k), so that any two windows of time agree where they overlap.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from realizer.animation.idle.blinks import Blinks, PhraseEnd, blinks_between
 from realizer.animation.idle.rng import uniform
 from realizer.core.array_types import Float64, Index
 
-# Small head motion, ours: a new pose every 1.9 s, up to so many degrees each way. AUs: (negative, positive).
+# Small head motion (our values): a new pose every 1.9 s, within the given degrees. AUs: (negative, positive).
 SWAY_PERIOD = 1.9  # s
 SWAY = {(52, 51): 1.6, (53, 54): 1.1, (55, 56): 1.0}
-# Small saccades, ours: a new point of fixation every 1.1 s, up to so many degrees.
+# Small saccades (our values): a new point of fixation every 1.1 s, within the given degrees.
 SACCADE_PERIOD = 1.1  # s
 SACCADE = {(62, 61): 1.4, (63, 64): 0.9}
 SACCADE_LEAST, SACCADE_DEGREE = 0.021, 0.0022  # s, and s for each degree (Carpenter 1988, the main sequence)
-# Eyes stay where they look while the head sways: they turn back by as much as it turns (degrees).
+# Eyes keep their direction while the head sways: they turn back by as many degrees.
 COUNTER = {(52, 51): (61, 62), (53, 54): (64, 63)}
-# Poses are worked out from one multiple of so many to another, and the latest are kept, 5 kB each: sessions
-# of one seed share them, and windows that begin close to each other.
+# Poses are computed in batches; the latest batches are cached, 5 kB each, for neighbouring windows and
+# sessions with the same seed.
 BATCH, KEPT = 8, 512
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Head sway (AU51-56) and what the eyes do (AU61-64) in a span of time.
+    """Head sway (AU51-56) and eye movements (AU61-64) in a span of time.
 
     Attributes:
-        columns: (m,) what moves, each column once.
-        keys: (s, k) seconds: when each way of the head to turn reaches each of its poses.
+        columns: (m,) the columns that move.
+        keys: (s, k) seconds at which each direction of head rotation reaches its poses.
         poses: (m, k) 0..1: the columns in these poses.
-        way: (m,) the way of the head to turn that moves each column.
-        jumps: (j,) seconds: when the eyes leave for a new point.
-        durations: (j,) seconds: how long they are on their way.
-        points: (e, j) 0..1: what is added to the last e columns when they are there.
+        way: (m,) the direction of head rotation that moves each column.
+        jumps: (j,) seconds at which saccades start.
+        durations: (j,) seconds of saccades.
+        points: (e, j) 0..1: the points of fixation, added to the last e columns.
     """
 
     columns: tuple[int, ...]
@@ -57,7 +57,7 @@ class Motion:
     points: Float64
 
     def at(self, times: Float64) -> Float64:
-        """(m, n) 0..1 at times (n,), not falling, within the span."""
+        """Return the columns, (m, n) 0..1, at times (n,), not falling, within the span."""
         keys, ends = self._ends
         frames = _frames(keys, ends, times)
         sways, at_points = frames[: self.keys.size], frames[self.keys.size :]
@@ -70,7 +70,7 @@ class Motion:
         sways = sways.reshape(self.keys.shape).take(self.way, axis=0).ravel()
         moved *= self._steps.repeat(sways).reshape(moved.shape)
         moved += self.poses.repeat(sways).reshape(moved.shape)
-        # A minimum-jerk course is the same both ways: what is left to go is 1 at first and falls to 0.
+        # The minimum-jerk curve is symmetric, so the remaining part of a saccade, from 1 to 0, suffices.
         to_go = self._arrivals.repeat(at_points)
         to_go -= times
         to_go /= self.durations.repeat(at_points)
@@ -82,19 +82,19 @@ class Motion:
 
     @cached_property
     def _ends(self) -> tuple[Float64, Index]:
-        """All keys, those of the jumps last, and which of them are the last of their kind."""
+        """All keys, those of saccades last, and the index of the last key of each kind."""
         keys = np.concatenate([self.keys.ravel(), self.jumps])
         return keys, np.append(np.arange(1, len(self.keys) + 1) * self.keys.shape[1], len(keys)) - 1
 
     @cached_property
     def _arrivals(self) -> Float64:
-        """(j,) seconds: when the eyes are at each point."""
+        """(j,) seconds at which the eyes reach each point."""
         arrivals: Float64 = self.jumps + self.durations
         return arrivals
 
     @cached_property
     def _leaps(self) -> Float64:
-        """(e, j) how far each point is from the one before."""
+        """(e, j) the differences of successive points."""
         return np.diff(self.points, prepend=self.points[:, :1])
 
     @cached_property
@@ -104,12 +104,12 @@ class Motion:
 
     @cached_property
     def _steps(self) -> Float64:
-        """(m, k) what is added from each pose to the next one."""
+        """(m, k) the differences of successive poses."""
         return np.diff(self.poses, append=self.poses[:, -1:])
 
 
 def _frames(keys: Float64, ends: Index, times: Float64) -> Index:
-    """(k,): at how many of the times (n,) each key (k,) is the newest; a first one before it too."""
+    """Return (k,) at how many of the times (n,) each key is the latest; a first key also counts before it."""
     first = times.searchsorted(keys)
     first[ends[:-1] + 1] = first[0] = 0
     frames = np.empty_like(first)
@@ -120,33 +120,33 @@ def _frames(keys: Float64, ends: Index, times: Float64) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class Idle:
-    """All that a face does by itself in a span of time."""
+    """The idle animation of a face in a span of time."""
 
     blinks: Blinks
     motion: Motion
 
 
 def idle_face(start: float, end: float, seed: int, ends: Sequence[PhraseEnd] = ()) -> Idle:
-    """Blinks, head sway and saccades.
+    """Return blinks, head sway and saccades.
 
     Args:
-        start, end: seconds on the session clock: right from start to end, both included.
+        start, end: seconds on the session clock, both included.
         seed: of the character.
-        ends: where its phrases end, in order of time; a blink that is due near one comes there instead.
+        ends: the ends of its phrases, in order of time; a blink near one is moved there.
     """
     sways, jumps = _numbers(start, end, SWAY_PERIOD), _numbers(start, end, SACCADE_PERIOD)
     return Idle(blinks_between(start, end, seed, ends), _motion(seed, sways, jumps))
 
 
 def _numbers(start: float, end: float, period: float) -> tuple[int, int]:
-    """(first, last + 1) of the poses, about `period` apart, that can be seen in start..end, and some more."""
+    """Return (first, last + 1) of the batches of poses, about `period` apart, that include start..end."""
     first, last = math.floor(start / period) - 2, math.ceil(end / period) + 2
     return first // BATCH * BATCH, (last // BATCH + 1) * BATCH
 
 
 @lru_cache(maxsize=KEPT)
 def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion:
-    """With poses sways[0] .. sways[1] - 1 of the head, and points jumps[0] .. jumps[1] - 1 of the eyes."""
+    """Return motion with head poses sways[0] .. sways[1] - 1 and eye points jumps[0] .. jumps[1] - 1."""
     turns = [(kind, kind, most) for kind, most in enumerate(SWAY.values(), 1)]
     keys, degrees = _poses(seed, turns, sways, SWAY_PERIOD)
     poses = {
@@ -155,7 +155,7 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
         for moved in (sides, COUNTER.get(sides, ()))
         for column, values in _turn(moved, degrees[way])
     }
-    # Both directions leave at the same instants: a saccade is one movement.
+    # A saccade moves both directions at the same instant.
     looks = [(10, 11 + kind, most) for kind, most in enumerate(SACCADE.values())]
     times, aims = _poses(seed, looks, jumps, SACCADE_PERIOD)
     leaps = np.hypot(*np.diff(aims, prepend=aims[:, :1]))
@@ -173,7 +173,7 @@ def _motion(seed: int, sways: tuple[int, int], jumps: tuple[int, int]) -> Motion
 
 
 def _turn(sides: Sequence[int], degrees: Float64) -> Iterator[tuple[int, Float64]]:
-    """Signed degrees as two AUs, column and values; between keys they add up to the same smooth course."""
+    """Yield column and values of the two AUs that represent signed degrees."""
     for number, sign in zip(sides, (-1.0, 1.0), strict=False):
         most = tables.by_number()[number].degrees
         yield au(number)[0].column, np.maximum(sign * degrees, 0.0) / most
@@ -182,10 +182,10 @@ def _turn(sides: Sequence[int], degrees: Float64) -> Iterator[tuple[int, Float64
 def _poses(
     seed: int, movements: Sequence[tuple[int, int, float]], numbers: tuple[int, int], period: float
 ) -> tuple[Float64, Float64]:
-    """Seconds and degrees, (m, k) each, of the poses numbers[0] .. numbers[1] - 1, about `period` apart.
+    """Return seconds and degrees, (m, k) each, of poses numbers[0] .. numbers[1] - 1, about `period` apart.
 
     Args:
-        movements: of each, the kind that draws its times, the kind that draws its degrees, the most of these.
+        movements: for each, the random kind of its times, that of its degrees, and the greatest degrees.
     """
     k = np.arange(*numbers)
     kinds = [kind for times, way, _ in movements for kind in (times, 100 + way, 200 + way)]

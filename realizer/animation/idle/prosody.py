@@ -1,7 +1,6 @@
-"""Motion that accompanies speech: nods, brow raises, blinks and glances.
+"""Motion that accompanies speech: nods and brow raises on accents, glances aside, ends of phrases for blinks.
 
-Small nods and raised brows on accents, looks aside, and where phrases end, for blinks. Everything is a
-function of the seed, of what is said and when it starts, and of time, not of the frames that are asked for.
+It is a function of the seed, of utterances and their start times, and of time, not of the requested frames.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from realizer.core.array_types import Float64
 from realizer.speech.accents import Phrase, phrases, prosody_facts
 from realizer.speech.utterance import Utterance
 
-# A block is of interest for so long after it has ended: then it moves no blink that can still be seen. s
+# s after the end of a block until it affects no visible blink.
 AFTERMATH = 2.0
 
-# Signed angles: AUs of (negative, positive). A head that turns down has eyes that turn up by as much.
+# Signed angles: AUs of (negative, positive). When the head turns down, the eyes turn up by as much.
 PITCH, EYES_PITCH, EYES_YAW = (54, 53), (64, 63), (62, 61)
 BROWS = {1, 2, 4}
 BROW_FAPS = range(31, 39)
@@ -33,7 +32,7 @@ SOURCE = "prosody"
 
 
 class SpeechSpan(NamedTuple):
-    """Something said from `start` on, seconds on the session clock, and cut off at `until`."""
+    """An utterance that starts at `start` and is cut off at `until`; seconds on the session clock."""
 
     start: float
     until: float
@@ -41,7 +40,7 @@ class SpeechSpan(NamedTuple):
 
 
 class KnownMotion(NamedTuple):
-    """What a document or a client moves, and since when (session clock) that is known."""
+    """A channel of a document or a client, and the time (session clock) at which it became known."""
 
     known: float
     channel: Channel
@@ -49,7 +48,7 @@ class KnownMotion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Gesture:
-    """One movement: what it moves ("head", "eyes" or "brows"), and how."""
+    """A movement of "head", "eyes" or "brows"."""
 
     region: str
     channels: tuple[Channel, ...]
@@ -64,7 +63,7 @@ class Gesture:
 
 
 def phrase_ends(talks: Iterable[SpeechSpan]) -> tuple[PhraseEnd, ...]:
-    """Where blinks belong, in order of time; beyond a cut as far as a blink might have been moved."""
+    """Return the ends of phrases in order of time; those shortly after a cut may have moved blinks."""
     reach = prosody_facts()["blinks"]["reach"]
     ends = [
         PhraseEnd(talk.start, talk.start + phrase.end)
@@ -82,17 +81,17 @@ def prosody_channels(
     seed: int,
     known_motions: Iterable[KnownMotion] = (),
 ) -> list[Channel]:
-    """What can be seen in start..end of the nods, raised brows and looks aside of those who speak.
+    """Return the channels, visible in start..end, of nods, brow raises and glances during speech.
 
-    They lie in the idle layer, so that a document which asks for less idle motion gets less of them. Where a
-    document moves the same part of the face at any time of a movement, the movement does not come; where
-    that became known when it had begun, it goes back at once.
+    They are in the idle layer, so that a document that reduces idle motion reduces them too. A movement is
+    dropped if a document moves the same part of the face during it; if that becomes known after the movement
+    has begun, it is faded out.
 
     Args:
         talks: what the character says.
         start, end: seconds on the session clock.
         seed: of the character.
-        known_motions: what else moves it, whatever it moves.
+        known_motions: all other channels of the character.
     """
     shown: list[Channel] = []
     fade = prosody_facts()["yield"]["fade"]
@@ -101,7 +100,7 @@ def prosody_channels(
         for gesture in _gestures(phrases(talk.utterance), talk.start, seed):
             if gesture.end < start or gesture.begin > end or gesture.begin >= talk.until:
                 continue
-            if claims is None:  # most of the time nobody speaks
+            if claims is None:  # computed only when needed: characters are silent most of the time
                 claims = list(_claims(known_motions))
             leaves = talk.until
             for part, known, first, last in claims:
@@ -115,10 +114,10 @@ def prosody_channels(
 
 
 def _claims(known_motions: Iterable[KnownMotion]) -> Iterator[tuple[str, float, float, float]]:
-    """(part of the face, since when known, first and last second) of what is asked of it."""
+    """Yield part of the face, time at which it is known, first and last second of motions."""
     for known, channel in known_motions:
         part = _parts().get(channel.target.column)
-        # Nods are laid on the direction that a head keeps, as its sway is.
+        # Nods, like sway, are added to the base direction of the head.
         if part is None or (part == "head" and channel.layer is Layer.BASE) or not channel.values.any():
             continue
         yield part, known, *channel.span
@@ -126,7 +125,7 @@ def _claims(known_motions: Iterable[KnownMotion]) -> Iterator[tuple[str, float, 
 
 @cache
 def _parts() -> dict[int, str]:
-    """Column -> what prosody would move there: "head", "eyes" or "brows"."""
+    """Return the part of the face, "head", "eyes" or "brows", of the columns that prosody may move."""
     parts = {}
     numbers = {row.name: row.fap for row in tables.faps()}
     for name, target in axis().items():
@@ -140,7 +139,7 @@ def _parts() -> dict[int, str]:
 
 @lru_cache(maxsize=64)
 def _gestures(said: tuple[Phrase, ...], start: float, seed: int) -> tuple[Gesture, ...]:
-    """All that comes with an utterance that starts at `start`, if nothing is in its way."""
+    """Return all movements that may accompany an utterance that starts at `start`."""
     return (*_accents(said, start, seed), *_looks_aside(said, start, seed))
 
 
@@ -152,9 +151,9 @@ def _accents(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[Gest
     for phrase in said:
         for accent in phrase.accents:
             chance = "nuclear" if accent.nuclear else "others"
-            # What comes too early in a text for its attack peaks a little later: nothing moves before it.
+            # An accent too close to the start for a full attack peaks later: nothing moves before the speech.
             time = start + max(accent.time, nod["attack"])
-            # The last accent of the phrase goes first, and shows in one way or the other.
+            # The nuclear accent, last in its phrase, has priority and always shows in one way or the other.
             left = np.inf if accent.nuclear else phrase.accents[-1].time - accent.time
             may_nod = min(left, time - nodded) >= nod["apart"]
             may_raise = min(left, time - raised) >= brows["apart"]
@@ -201,9 +200,9 @@ def _looks_aside(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[
             continue
         most = min(aside["longest"], aside["share"] * length)
         away = min(most, aside["shortest"] + lengths[k] * max(0.0, most - aside["shortest"]))
-        # It begins in the first part of the phrase, and the eyes are back for its end.
+        # A glance begins in the first part of the phrase and returns before its end.
         begin = start + phrase.start + late[k] * 0.5 * (length - away)
-        # Away first to one side, never straight up or down.
+        # Mainly to one side, never straight up or down.
         yaw = np.interp(abs(2.0 * yaws[k] - 1.0), (0.0, 1.0), aside["yaw"]) * np.sign(yaws[k] - 0.5)
         pitch = np.interp(pitches[k], (0.0, 1.0), aside["pitch"])
         keys = begin + np.array([0.0, aside["saccade"], away, away + aside["saccade"]])
@@ -212,16 +211,16 @@ def _looks_aside(said: tuple[Phrase, ...], start: float, seed: int) -> Iterator[
 
 
 def _draws(seed: int, kind: int, start: float, count: int, kinds: int = 3) -> list[Float64]:
-    """(count,) numbers for each of some kinds, those of an utterance by when it starts.
+    """Return `count` random numbers for each of `kinds`, which depend on when an utterance starts.
 
-    The first of them stay what they are where more is appended to a text, or its timing turns out otherwise.
+    The first ones stay the same when text is appended or its timing changes.
     """
     k = round(start * 1000.0) * 65536 + np.arange(count, dtype=np.int64)
     return list(uniform(seed, range(kind, kind + kinds), k))
 
 
 def _turn(sides: tuple[int, int], times: Float64, degrees: Float64) -> Iterator[Channel]:
-    """Signed degrees as AUs."""
+    """Yield the channels of signed degrees."""
     for number, sign in zip(sides, (-1.0, 1.0), strict=True):
         values = np.maximum(sign * degrees, 0.0) / tables.by_number()[number].degrees
         if values.any():

@@ -1,4 +1,4 @@
-"""Random numbers that depend only on seed, kind and index: the same on any machine."""
+"""Random numbers that depend on seed, kind and index alone, and are the same on any machine."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from realizer.core.array_types import Float64
 
 
 def uniform(seed: int, kind: int | Sequence[int], k: npt.NDArray[np.int64]) -> Float64:
-    """Numbers in [0, 1) that depend on (seed, kind, k) alone; the mixing step of SplitMix64.
+    """Return numbers in [0, 1) that depend on (seed, kind, k) alone, by the mixing step of SplitMix64.
 
-    A generator of numpy is not promised to draw the same numbers in its next version.
+    Generators of numpy may draw other numbers in its next version.
 
     Args:
-        seed: any whole number.
-        kind: what is drawn; two kinds have nothing to do with each other. Several, (m,), cost little more
-            than one.
-        k: (n,) int64, which of its kind.
+        seed: any integer.
+        kind: the purpose; numbers of different kinds are independent. Several, (m,), cost little more than
+            one.
+        k: (n,) int64, index of each number within its kind.
 
     Returns:
         (n,) float64, or (m, n) of several kinds.

@@ -1,1 +1,1 @@
-"""Lip synchronisation: phonemes to lip, jaw and tongue channels."""
+"""Lip synchronisation: channels of lips, jaw and tongue from phonemes."""

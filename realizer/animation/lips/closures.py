@@ -1,4 +1,4 @@
-"""Lip closures: the times at which sounds close or bite the lips."""
+"""Lip closures: times at which sounds close the lips or bite the lower one."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ BILABIAL, LABIODENTAL = 1, 2  # visemes
 
 
 def lip_weight(track: Track, times: Float64) -> Float64:
-    """(n,) 0..1: how far speech has the lips; 0 at the ends and in long pauses.
+    """Return how far speech masks the lips, (n,) 0..1; 0 at the ends and in long pauses.
 
-    Whole from the first sound that closes the lips to the last: an expression would part them.
+    It is 1 from the first sound that closes the lips to the last, because an expression would part them.
     """
     facts = coarticulation()
     pauses = facts["pauses"]
@@ -48,9 +48,9 @@ def _smoothstep(x: Float64) -> Float64:
 
 
 def closure_mask(track: Track, times: Float64) -> tuple[Bool, Bool]:
-    """(n,) each: whether a sound that closes the lips, or bites the lower one, holds them at each time.
+    """Return whether the lips are closed, and whether the lower lip is bitten, at each time, (n,) each.
 
-    Two different ones that stand close together part as far as a frame allows, and share what is between.
+    Closures of different kinds that are close to each other are moved apart, so that a frame separates them.
     """
     closure, pad = coarticulation()["closure"], coarticulation()["articulators"]["lips"]["smooth"]
     which = np.flatnonzero(track.mix[:, [BILABIAL, LABIODENTAL]].max(axis=1) > 0.5)
@@ -65,7 +65,7 @@ def closure_mask(track: Track, times: Float64) -> tuple[Bool, Bool]:
     opens, closes = middle - half, middle + half
     for k in differ:
         if closes[k] > opens[k + 1]:
-            # Lips that part need time, which the closure gives: pressed lips are closed for longer.
+            # Parting takes time from the closure, which lasts longer because the lips are pressed.
             border = (closes[k] + opens[k + 1]) / 2 + (1 if bites[k] else -1) * closure["gives"]
             closes[k], opens[k + 1] = max(border, opens[k]), min(border, closes[k + 1])
     holds = np.zeros((2, len(times)), bool)

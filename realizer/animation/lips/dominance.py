@@ -31,8 +31,8 @@ class Track:
         begin, end: (m,) float64 seconds.
         mix: (m, 15) float64, part of each viseme.
         vowel: (m,) whether it is a vowel.
-        size: (m,) float64, how much of its shape it reaches.
-        effort: (m,) float64, how much further than that jaw and lips open; 1 is usual.
+        size: (m,) float64, the part of its shape that it reaches.
+        effort: (m,) float64, factor for the opening of jaw and lips, usually 1.
         rest: (m,) whether it is a pause.
     """
 
@@ -58,7 +58,7 @@ SILENT = ((0, 1.0),)
 
 
 def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
-    """The sounds of phonemes (in order, "" is a pause); None where nothing is said."""
+    """Return the sounds of phonemes (in order, "" is a pause), or None if there are only pauses."""
     facts = coarticulation()
     rows: list[_Row] = []
     for phoneme in phonemes:
@@ -79,7 +79,7 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
             at = until
     if all(row.mix in (SILENT, ()) for row in rows):
         return None
-    # A short pause between sounds does not bring the mouth to rest; at the ends it always does.
+    # The mouth does not come to rest in a short pause between sounds, but always does at the ends.
     inner = range(1, len(rows) - 1)
     absorbed = facts["pauses"]["absorbed"]
     rows = [
@@ -88,7 +88,7 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
         if not (k in inner and row.mix == SILENT and row.end - row.begin < absorbed)
     ]
     begin, end = np.array([row.begin for row in rows]), np.array([row.end for row in rows])
-    middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or reach to the middle of what was absorbed
+    middle = (end[:-1] + begin[1:]) / 2  # sounds touch, or extend to the middle of a short pause
     mix = np.zeros((len(rows), VISEMES))
     for k, row in enumerate(rows):
         for viseme, amount in row.mix:
@@ -105,9 +105,9 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
 
 
 def _size(phoneme: Phoneme, length: float) -> float:
-    """How much of its shape a vowel of that length reaches: what is missing falls off exponentially.
+    """Return the part of its shape that a vowel of that length reaches; the rest decays exponentially.
 
-    Source: Lindblom 1963, "Spectrographic study of vowel reduction", of formants; here of the mouth.
+    Source: Lindblom 1963, "Spectrographic study of vowel reduction", for formants; here for the mouth.
     """
     short = coarticulation()["undershoot"]
     stress = coarticulation()["stress"][STRESS.get(phoneme.stress, "none")]
@@ -115,24 +115,24 @@ def _size(phoneme: Phoneme, length: float) -> float:
 
 
 def _effort(phoneme: Phoneme) -> float:
-    """How much further a vowel opens because it is loud."""
+    """Return the factor by which a vowel opens further because it is loud."""
     facts = coarticulation()["loudness"]
     return float(min(max(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"]), facts["most"]))
 
 
 def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:
-    """(n,) seconds from `lead` before the first phoneme to the last, at the table's rate (at least two)."""
+    """Return seconds from `lead` before the first phoneme to the last, at the table's rate; at least two."""
     rate = coarticulation()["rate"]
     first, last = phonemes[0].start - lead, max(phonemes[-1].end, phonemes[0].start + 2 / rate)
     return np.linspace(first, last, int(np.ceil((last - first) * rate)) + 1)
 
 
 def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, tuple[str, ...]]]:
-    """How much the sounds around each time have to say, for each class of articulators.
+    """Yield the dominance of the sounds around each time for each class of articulators.
 
     Yields:
-        Which sounds, (k, n); their parts, (k, n), which add to a little less than 1: the rest is the neutral
-        mouth's; the columns of `SHAPE` that the class moves.
+        The sounds, (k, n); their parts, (k, n), which add up to a little less than 1, as the rest belongs to
+        the neutral mouth; the columns of `SHAPE` that the class moves.
     """
     facts = coarticulation()
     rule = facts["dominance"]
@@ -141,12 +141,12 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
     rate = base * (rule["length"] / length) ** rule["exponent"]
     strength = np.where(track.vowel, rule["strength_vowel"], rule["strength_consonant"])
     weight = (track.mix @ shape_table()[1]).T * strength
-    # A pause is at rest over its whole length but its edges; a sound is strongest in its middle part.
+    # A pause is at rest except at its edges; a sound is strongest in its middle part.
     edge = np.where(track.rest, np.minimum(0.1, length / 3), length * (1 - rule["core"]) / 2)
     core_begin, core_end = track.begin + edge, track.end - edge
 
-    # Sounds further away than `neighbours` add nothing that can be seen: a band, not a matrix. Times lie
-    # along the last axis, where numpy is fast.
+    # Sounds further away than `neighbours` have no visible influence, so a band replaces the full matrix.
+    # Times are the last axis, along which numpy is fast.
     band = np.arange(-rule["neighbours"], rule["neighbours"] + 1)[:, None]
     near = np.searchsorted(track.begin, times, "right") - 1 + band
     beyond = (near < 0) | (near >= len(length))
@@ -165,5 +165,5 @@ def dominances(track: Track, times: Float64) -> Iterator[tuple[Index, Float64, t
 
 
 def _taken(values: Float64, near: Index) -> Float64:
-    """`values[..., near]`, of indices that are known to be there: half as long."""
+    """Return `values[..., near]` for valid indices, in half the time."""
     return values.take(near, axis=-1, mode="clip")

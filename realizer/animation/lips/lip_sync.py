@@ -17,23 +17,23 @@ from realizer.animation.lips.visemes import SHAPE, coarticulation, shape_table
 from realizer.core.array_types import Float64
 from realizer.speech.utterance import Phoneme
 
-OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # what opens further when speech is loud
+OPENING = (*CLASSES["jaw"], *CLASSES["lips"])  # they open further in loud speech
 
 
 def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -> tuple[Channel, ...]:
-    """How the mouth says `phonemes`: channels of the speech layer, in FAPU, and the presence "lips" 0..1.
+    """Return channels of the speech layer that move the mouth, in FAPU, and of the mask "lips", 0..1.
 
     All values are 0 at the first and the last key. The gap between the inner lips (-FAP 4 - FAP 5, and at
     the sides) is at most 0 in every /p b m/ for longer than a frame at 25 fps; the lower lip reaches the
-    teeth in /f v/. Keys come at 100 Hz; speeds stay below those of `coarticulation.toml`.
+    teeth in /f v/. Keys have a rate of 100 Hz; speeds stay below those of `coarticulation.toml`.
 
     Args:
         phonemes: in order, seconds from the start of the utterance; "" is a pause.
-        start: seconds, when the utterance starts on the block's clock.
-        room: seconds before `start` in which the mouth may already make ready for the first sound.
+        start: seconds at which the utterance starts on the block's clock.
+        room: seconds before `start` in which the mouth may prepare for the first sound.
 
     Returns:
-        Channels for FAPs 3-13, 16, 17, 44-46, 51-60 and presence("lips"); () where nothing is said.
+        Channels for FAPs 3-13, 16, 17, 44-46, 51-60 and the mask "lips"; () if there are only pauses.
 
     Source: Cohen & Massaro 1993, "Modeling coarticulation in synthetic visual speech".
     """
@@ -45,12 +45,12 @@ def lip_channels(phonemes: Sequence[Phoneme], start: float, room: float = 0.0) -
     taken = lip_weight(track, times)
     mouth = _mouth(track, times) * taken
     _constrain(mouth, track, times, taken, facts)
-    mouth[:, [0, -1]] = 0.0  # a sound shorter than the smoothing leaves a trace
+    mouth[:, [0, -1]] = 0.0  # smoothing leaves traces of very short sounds
     return _channels(times + start, mouth, taken)
 
 
 def _mouth(track: Track, times: Float64) -> Float64:
-    """(10, n) float64: the weighted mean of the sounds around each time; rows `SHAPE`."""
+    """Return the weighted mean of the sounds around each time, (10, n) float64; rows as `SHAPE`."""
     target = (track.mix @ shape_table()[0]).T * track.size
     target[[SHAPE.index(name) for name in OPENING]] *= track.effort
     mouth = np.empty((len(SHAPE), len(times)))
@@ -61,18 +61,18 @@ def _mouth(track: Track, times: Float64) -> Float64:
 
 
 def _block(members: Sequence[str]) -> slice:
-    """The rows of a class of articulators."""
+    """Return the rows of a class of articulators."""
     return slice(SHAPE.index(members[0]), SHAPE.index(members[-1]) + 1)
 
 
 def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, facts: dict[str, Any]) -> None:
-    """Closures, speeds and smoothness, in place."""
+    """Apply closures, limits of speed and smoothing, in place."""
     shapes, _ = shape_table()
     column = {name: k for k, name in enumerate(SHAPE)}
     closed, bitten = closure_mask(track, times)
     upper, lower, jaw = mouth[column["upper"]], mouth[column["lower"]], mouth[column["jaw"]]
     speed = facts["speed"]["lips"]
-    # The upper lip clears the teeth for f v: raised where it is lower, then lowered wherever p b m close.
+    # The upper lip uncovers the teeth for f v: it is raised there, and then lowered where p b m close.
     raised = shapes[LABIODENTAL, column["upper"]] * taken
     upper[:] = _reachable(upper, times, speed)
     upper[:] = -_reachable(-np.where(bitten, np.maximum(upper, raised), upper), times, speed)
@@ -88,13 +88,13 @@ def _constrain(mouth: Float64, track: Track, times: Float64, taken: Float64, fac
         reach = facts["articulators"][name]["smooth"] * facts["rate"]
         block = _block(members)
         mouth[block] = _smooth(_reachable(mouth[block], times, limit), reach)
-    # Lips that press meet; they do not pass through each other.
+    # Pressed lips meet, but do not pass through each other.
     least = shapes[BILABIAL, column["upper"]] + shapes[BILABIAL, column["lower"]]
     lower[:] = np.maximum(lower, least - upper)
 
 
 def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
-    """The greatest curves along the last axis, nowhere above `values` and nowhere steeper than `speed`."""
+    """Return the greatest curves along the last axis, not above `values` and not steeper than `speed`."""
     climb = speed * times
     values = np.minimum.accumulate(values - climb, axis=-1) + climb
     falling: Float64 = np.minimum.accumulate((values + climb)[..., ::-1], axis=-1)[..., ::-1] - climb
@@ -102,11 +102,11 @@ def _reachable(values: Float64, times: Float64, speed: float) -> Float64:
 
 
 def _smooth(values: Float64, reach: float) -> Float64:
-    """Mean of (k, n) along its last axis under a bell that ends `reach` samples away; end values stay."""
+    """Smooth (k, n) along its last axis with a bell of `reach` samples each way; end values stay."""
     half = min(round(reach), values.shape[1] - 1)
     if half < 1:
         return values
-    # Beyond its ends the curve is turned about its end point, so that the ends do not move.
+    # The curve is extended by point reflection, so that its ends do not move.
     first, last = values[:, :1], values[:, -1:]
     before, after = values[:, half:0:-1], values[:, -2 : -half - 2 : -1]
     padded = np.hstack((2 * first - before, values, 2 * last - after))
@@ -115,7 +115,7 @@ def _smooth(values: Float64, reach: float) -> Float64:
 
 @lru_cache(maxsize=16)
 def _bell(half: int) -> Float64:
-    """(2 half + 1,) weights that add to 1, and nearly reach 0 at both ends."""
+    """Return (2 half + 1,) weights that add up to 1 and nearly reach 0 at both ends."""
     bell = np.hanning(2 * half + 3)[1:-1]
     weights: Float64 = bell / bell.sum()
     return weights

@@ -7,14 +7,14 @@ from realizer.core.array_types import Float64
 
 
 def mouth_faps(mouth: Float64) -> dict[int, Float64]:
-    """FAP -> (n,) its values, in its FAPU; all FAPs that speech moves.
+    """Return the values (n,), in FAPU, of all FAPs that speech moves.
 
     Args:
-        mouth: (n, 10) float64, columns `SHAPE`, as `shape_table` has them.
+        mouth: (n, 10) float64, columns as `SHAPE`.
     """
     contour = coarticulation()["contour"]
     part = {name: mouth[:, k] for k, name in enumerate(SHAPE)}
-    # MPEG-4 counts upper lip FAPs downwards, lower lip FAPs upwards: an open mouth is negative in both.
+    # In MPEG-4 FAPs of the upper lip move it down, those of the lower lip up: both are negative when open.
     upper, lower = -part["upper"], -part["lower"]
     values: dict[tuple[int, ...], Float64] = {
         (3,): part["jaw"].clip(0.0),  # FAP 3 has one direction

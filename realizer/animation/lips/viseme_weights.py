@@ -1,4 +1,4 @@
-"""Weights of visemes over time, of MPEG-4 (FAP 1) or Oculus."""
+"""Weights of MPEG-4 (FAP 1) and Oculus visemes over time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BLEND = 63  # the first viseme alone
 
 @dataclass(frozen=True, slots=True)
 class OculusViseme:
-    """A viseme of Oculus (and of Ready Player Me, as `viseme_NAME`) and the MPEG-4 viseme that it is."""
+    """A viseme of Oculus (and of Ready Player Me, as `viseme_NAME`) and the equal one of MPEG-4."""
 
     name: str
     viseme: int
@@ -28,22 +28,22 @@ class OculusViseme:
 
 @cache
 def oculus_visemes() -> tuple[OculusViseme, ...]:
-    """The 15, in the order of their numbers there."""
+    """Return the 15 Oculus visemes in the order of their numbers."""
     return tables.read_csv(tables.text_of("visemes_oculus.csv"), OculusViseme, "visemes_oculus.csv")
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
-    """How much of each MPEG-4 viseme the mouth shows.
+    """Return the weight of each MPEG-4 viseme over time.
 
-    The parts that sounds have in jaw, lips, width and tongue, as `lip_channels` mixes them, on average;
-    sounds that close the lips or bite the lower one are alone while they hold it.
+    Weights are the mean of the dominances of sounds in jaw, lips, width and tongue (see `lip_channels`);
+    sounds that close the lips or bite the lower one have weight 1 meanwhile.
 
     Args:
         phonemes: in order, seconds from the start of the utterance; "" is a pause.
         times: (n,) seconds on the same clock.
 
     Returns:
-        (n, 15) float64, 0..1, column = viseme (0 is none); each row adds to 1.
+        (n, 15) float64, 0..1, column = viseme (0 is none); each row adds up to 1.
     """
     weights = np.zeros((len(times), VISEMES))
     weights[:, 0] = 1.0
@@ -56,7 +56,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
     for near, parts, _ in classes:
         shown += np.einsum("kn,knv->nv", parts, track.mix[near]) / len(classes)
     for viseme, holds in zip((BILABIAL, LABIODENTAL), closure_mask(track, keys), strict=True):
-        # Over a key on either side, as the lips themselves pass into a closure.
+        # With a transition of one key on either side, as for the lips.
         share = np.convolve(np.pad(holds.astype(float), 1, "edge"), [0.25, 0.5, 0.25], "valid")[:, None]
         shown = shown * (1 - share) + share * np.eye(VISEMES)[viseme]
     shown *= lip_weight(track, keys)[:, None]
@@ -67,20 +67,20 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:
 
 
 def oculus_weights(weights: Float64) -> Float64:
-    """(n, 15) of MPEG-4's visemes as (n, 15) of Oculus', in the order of `oculus_visemes`."""
+    """Reorder the weights (n, 15) of MPEG-4's visemes as in `oculus_visemes`."""
     return np.ascontiguousarray(weights[:, [row.viseme for row in oculus_visemes()]])
 
 
 def fap_1(weights: Float64) -> Int32:
-    """The two strongest visemes and how they are mixed: select1, select2, blend, def of FAP 1.
+    """Return FAP 1 with the two strongest visemes: select1, select2, blend, def.
 
-    What a decoder shows is select1 x blend / 63 + select2 x (1 - blend / 63); one alone is select1 with 63.
+    A decoder shows select1 x blend / 63 + select2 x (1 - blend / 63); a single viseme is select1 with 63.
 
     Args:
         weights: (n, 15), column = viseme.
 
     Returns:
-        (n, 4) int32; `def` is 0: the visemes are the standard's own.
+        (n, 4) int32; `def` is 0, which means the standard's visemes.
     """
     order = np.argsort(-weights, axis=1, kind="stable")[:, :2]
     first, second = np.take_along_axis(weights, order, axis=1).T

@@ -1,4 +1,4 @@
-"""IPA phonemes as mixtures of MPEG-4 visemes, by articulatory features."""
+"""Conversion of IPA phonemes to mixtures of MPEG-4 visemes, by articulatory features."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class VisemeRule:
 
 @dataclass(frozen=True, slots=True)
 class LipShape:
-    """The mouth of one viseme in FAPU, and how strongly it insists; columns as in the table's head."""
+    """The mouth shape of a viseme in FAPU, and its weights; the columns of `visemes.csv`."""
 
     viseme: int
     example: str
@@ -54,8 +54,8 @@ class Sound:
     """One articulation inside a phoneme.
 
     Attributes:
-        mix: part of each viseme, (viseme, part) pairs whose parts add to 1; () where the lips have no aim.
-        vowel: whether it is one.
+        mix: (viseme, part) pairs whose parts add up to 1; () if the sound has no lip shape.
+        vowel: whether it is a vowel.
         share: part of the phoneme's time, 0..1.
     """
 
@@ -66,19 +66,19 @@ class Sound:
 
 @cache
 def lip_shapes() -> tuple[LipShape, ...]:
-    """The 15 mouths; index = viseme."""
+    """Return the 15 mouth shapes; index = viseme."""
     return tables.read_csv(tables.text_of("visemes.csv"), LipShape, "visemes.csv")
 
 
 @cache
 def coarticulation() -> dict[str, Any]:
-    """Constants of the dominance model, with their source in the table's head."""
+    """Return the constants of the dominance model; the file states their sources."""
     return tables.read_toml(tables.text_of("coarticulation.toml"), "coarticulation.toml")
 
 
 @cache
 def shape_table() -> tuple[Float64, Float64]:
-    """(15, 10) shapes in FAPU, columns `SHAPE`; (15, 4) weights, columns `WEIGHT`."""
+    """Return shapes (15, 10) in FAPU, columns as `SHAPE`, and weights (15, 4), columns as `WEIGHT`."""
     assert {f.name for f in fields(LipShape)} >= {*SHAPE, *WEIGHT}
     shapes = np.array([[getattr(row, name) for name in SHAPE] for row in lip_shapes()], np.float64)
     weights = np.array([[getattr(row, name) for name in WEIGHT] for row in lip_shapes()], np.float64)
@@ -87,10 +87,10 @@ def shape_table() -> tuple[Float64, Float64]:
 
 @lru_cache(maxsize=2048)
 def sounds(ipa: str) -> tuple[Sound, ...]:
-    """The articulations of one phoneme string, in order; their shares add to 1.
+    """Return the articulations of a phoneme string, in order; their shares add up to 1.
 
     A string may hold several sounds ("oʊ", "əl", "ɔːɹ", "tʃ"). Length, stress, tone and diacritics are
-    stripped; letters that no table knows are taken for what they look like, or left out.
+    ignored; unknown letters are replaced by their base letter or ignored.
     """
     found: list[tuple[tuple[tuple[int, float], ...], bool]] = []
     for symbol, labialised in _symbols(ipa):
@@ -109,10 +109,10 @@ def sounds(ipa: str) -> tuple[Sound, ...]:
 
 
 def _symbols(ipa: str) -> list[tuple[str, bool]]:
-    """(symbol of the table, is it labialised) in order."""
+    """Return (symbol of the table, whether it is labialised) in order."""
     known = phoneme_features()
     symbols: list[tuple[str, bool]] = []
-    # Composed first: ç is a letter of its own, õ is o with a mark.
+    # The composed form first: ç is a letter of its own, while õ is o with a diacritic.
     for letter in unicodedata.normalize("NFC", ipa):
         if letter == "ʷ" and symbols:
             symbols[-1] = (symbols[-1][0], True)
@@ -128,7 +128,7 @@ def _symbols(ipa: str) -> list[tuple[str, bool]]:
 
 
 def _vowel_mix(row: PhonemeFeatures) -> tuple[tuple[int, float], ...]:
-    """Between the vowels that MPEG-4 names, along height; unrounded and rounded ones apart."""
+    """Interpolate by height between the vowels of MPEG-4, separately for unrounded and rounded ones."""
     anchors = coarticulation()["vowels"]
     mix: dict[int, float] = {}
     for points, part in ((anchors["unrounded"], 1 - row.rounded), (anchors["rounded"], row.rounded)):
